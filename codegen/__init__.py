@@ -1,0 +1,1 @@
+"""The compiler: from a page of SymPy to lean C with an exact tangent."""

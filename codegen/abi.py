@@ -1,0 +1,73 @@
+"""The kernel contract: what every pointer of a generated function is.
+
+Every kernel of a family `NAME` is a function `softehl_NAME_TASK` of one type,
+
+    void f(ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+           const double *coordinates, const double *dofs, const double *data,
+           const double *parameters, const double *rule, const double *basis,
+           double *values, double *tangent);
+
+that handles `n` elements one after another.  Arrays are contiguous, row-major, of doubles, and do
+not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped ones).
+
+| argument      | shape                | meaning                                                  |
+|---------------|----------------------|----------------------------------------------------------|
+| `n`           |                      | number of elements                                       |
+| `points`      |                      | number of quadrature points                              |
+| `modes`       |                      | shape functions of the interpolated field (0 if none)    |
+| `coordinates` | n, nodes * 2         | reference positions z1, r1, z2, r2, ...                  |
+| `dofs`        | n, ndof              | direct unknowns in the model's order, then the `modes`   |
+|               |                      | unknowns of the interpolated field                       |
+| `data`        | n, ndata             | constants of each element, in the manifest's order       |
+| `parameters`  | nparameters          | constants of the call, in the manifest's order           |
+| `rule`        | points, dimension + 1| parent coordinates of each point, then its weight        |
+| `basis`       | points, modes, 2     | value and xi-derivative of the interpolating shapes      |
+| `values`      | see task             | written, never accumulated                               |
+| `tangent`     | n, ndof, ndof        | written by task `tangent` only, row-major dR_i/du_j      |
+
+| task       | `values`                                            |
+|------------|-----------------------------------------------------|
+| `energy`   | n: the potential (only where the residual has one)  |
+| `residual` | n, ndof: internal minus external virtual work       |
+| `tangent`  | n, ndof: the same residual                          |
+| `fields`   | n, points, nfields: values at the quadrature points |
+
+Pointers that a family does not use (no data, no basis, no parameters, no tangent) may be NULL.
+A kernel keeps no state, allocates nothing, reports nothing: a value outside the model's domain
+comes out as not-a-number.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Task(StrEnum):
+    """What a kernel of a family computes."""
+
+    ENERGY = "energy"
+    RESIDUAL = "residual"
+    TANGENT = "tangent"
+    FIELDS = "fields"
+
+
+PREFIX = "softehl"
+
+ARGUMENTS = (
+    "ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,",
+    "const double *restrict coordinates, const double *restrict dofs,",
+    "const double *restrict data, const double *restrict parameters,",
+    "const double *restrict rule, const double *restrict basis,",
+    "double *restrict values, double *restrict tangent",
+)
+
+
+def function_name(family: str, task: Task) -> str:
+    """Name of the C function of a family and task."""
+    return f"{PREFIX}_{family}_{task}"
+
+
+def declaration(family: str, task: Task) -> str:
+    """C prototype without the semicolon."""
+    lines = "\n    ".join(ARGUMENTS)
+    return f"void {function_name(family, task)}(\n    {lines})"

@@ -1,0 +1,82 @@
+"""Compile the generated C into one shared library (no SymPy needed).
+
+`python -m codegen.build` is what `make` calls.  The library carries the signature of the sources
+it was built from; it is written under a temporary name and moved into place, so that two builds
+at once do no harm.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+GENERATED = Path(__file__).resolve().parent.parent / "generated"
+FLAGS = ("-std=c11", "-O3", "-march=native", "-fno-math-errno", "-fPIC", "-shared")
+STRICT = ("-Wall", "-Wextra", "-Werror")
+LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
+
+
+class BuildError(RuntimeError):
+    """The compiler failed or is missing; the message holds its command line and its words."""
+
+
+def signature(directory: Path) -> str:
+    """Signature of the C sources and header in a directory."""
+    digest = hashlib.sha256()
+    for path in sorted(directory.glob("*.[ch]")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def compiler() -> list[str]:
+    """The C compiler as a command: $CC, or cc from the PATH."""
+    return shlex.split(os.environ.get("CC", "cc"))
+
+
+def build(directory: Path = GENERATED, *, extra: Sequence[str] = STRICT) -> Path:
+    """Compile every C file of `directory` into its shared library and return its path."""
+    sources = sorted(str(p) for p in directory.glob("*.c"))
+    target = directory / LIBRARY
+    handle, scratch = tempfile.mkstemp(suffix=".so", dir=directory)
+    os.close(handle)
+    define = f'-DSOFTEHL_SIGNATURE="{signature(directory)}"'
+    command = [*compiler(), *FLAGS, *extra, define, *sources, "-o", scratch, "-lm"]
+    try:
+        _run(command)
+        os.replace(scratch, target)
+    finally:
+        Path(scratch).unlink(missing_ok=True)
+    return target
+
+
+def _run(command: Sequence[str]) -> None:
+    line = shlex.join(command)
+    if shutil.which(command[0]) is None:
+        raise BuildError(
+            f"no C compiler: {command[0]!r} is not on the PATH; install one or set CC\n  {line}"
+        )
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        raise BuildError(f"the C compiler failed ({result.returncode}):\n  {line}\n{result.stderr}")
+
+
+def main() -> int:
+    """Build the kernels that ship."""
+    try:
+        print(f"built {build()}")
+    except BuildError as error:
+        print(f"softehl: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,77 @@
+"""`softehl generate` and `softehl kernels`."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from codegen import pipeline
+from codegen.build import GENERATED
+from codegen.models import ALL
+
+
+def generate(models: Sequence[Path] = (), check: bool = False, trace: str | None = None) -> int:
+    """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1)."""
+    if models:
+        print("softehl: models from other files are not available yet", file=sys.stderr)
+        return 2
+    if trace is not None:
+        return _trace(trace)
+    files = pipeline.files(pipeline.compile_model(make()) for make in ALL.values())
+    stale = [name for name, text in files.items() if _differs(GENERATED / name, text)]
+    known = {*files, "__init__.py"}
+    strange = [p.name for p in GENERATED.glob("*.[chj]*") if p.name not in known]
+    if check:
+        for name in stale + strange:
+            print(f"stale: generated/{name}", file=sys.stderr)
+        if stale or strange:
+            print("mend it with: softehl generate", file=sys.stderr)
+        return 1 if stale or strange else 0
+    GENERATED.mkdir(exist_ok=True)
+    for name in strange:
+        (GENERATED / name).unlink()
+    for name in stale:
+        _write(GENERATED / name, files[name])
+    print(f"{len(files)} files in generated/, {len(stale)} of them new or changed")
+    return 0
+
+
+def _differs(path: Path, text: str) -> bool:
+    return not path.exists() or path.read_text(encoding="utf-8") != text
+
+
+def _write(path: Path, text: str) -> None:
+    scratch = path.with_suffix(path.suffix + ".tmp")
+    scratch.write_text(text, encoding="utf-8")
+    os.replace(scratch, path)
+
+
+def _trace(family: str) -> int:
+    if family not in ALL:
+        print(f"softehl: no model {family!r}; there are {', '.join(ALL)}", file=sys.stderr)
+        return 2
+    kernel = pipeline.compile_model(ALL[family]())
+    for task, function in kernel.functions.items():
+        table = Table("pass", "nodes", "operations", title=f"{family} {task}")
+        for row in function.trace:
+            table.add_row(row.name, str(row.nodes), str(row.operations))
+        Console().print(table)
+    return 0
+
+
+def kernels() -> int:
+    """Print the cost table of the manifest."""
+    entries = json.loads((GENERATED / "manifest.json").read_text())["kernels"]
+    table = Table("kernel", "task", "operations", "once", "per point", "temporaries", "C bytes")
+    for name, entry in entries.items():
+        for task, cost in entry["tasks"].items():
+            row = (cost["operations"], cost["operations_once"], cost["operations_per_point"])
+            table.add_row(name, task, *map(str, row), str(cost["temporaries"]), str(entry["bytes"]))
+    Console().print(table)
+    return 0

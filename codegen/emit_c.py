@@ -1,0 +1,294 @@
+"""Printing: one scheduled value, one line of C.  Nothing is optimised here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from codegen import abi
+from codegen.graph import BOOLEAN, Input, Node, Op
+from codegen.model import Definition
+from codegen.schedule import If, Loop, Schedule, Statement
+
+HEADER = "softehl_kernels.h"
+
+
+class Slot(NamedTuple):
+    """A row or column: a direct unknown, or a component (value, xi-derivative) of the basis."""
+
+    basis: bool
+    position: int
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One output value and where it goes."""
+
+    row: Slot
+    column: Slot | None
+    node: Node
+
+
+_FORMATS: dict[Op, str] = {
+    Op.ADD: "{} + {}",
+    Op.SUB: "{} - {}",
+    Op.MUL: "{} * {}",
+    Op.NEG: "-{}",
+    Op.RECIP: "1.0 / {}",
+    Op.SQRT: "sqrt({})",
+    Op.CBRT: "cbrt({})",
+    Op.LOG: "log({})",
+    Op.EXP: "exp({})",
+    Op.SIN: "sin({})",
+    Op.COS: "cos({})",
+    Op.LT: "{} < {}",
+    Op.LE: "{} <= {}",
+    Op.EQ: "{} == {}",
+    Op.AND: "{} && {}",
+    Op.OR: "{} || {}",
+    Op.NOT: "!{}",
+}
+
+_ARRAYS = {
+    "coordinates": "X[{}]",
+    "dofs": "d[{}]",
+    "data": "a[{}]",
+    "parameters": "parameters[{}]",
+    "rule": "w[{}]",
+    "interpolated": "p{}",
+}
+
+
+def number(value: float) -> str:
+    """A double that C reads back exactly."""
+    text = repr(float(value))
+    return f"({text})" if text.startswith("-") else text
+
+
+class _Printer:
+    """Lines of one function body."""
+
+    def __init__(self, definition: Definition) -> None:
+        self.d = definition
+        self.lines: list[str] = []
+        self.names: dict[Node, str] = {}
+        self.temporaries = 0
+
+    def line(self, depth: int, text: str) -> None:
+        self.lines.append("    " * depth + text)
+
+    def ref(self, n: Node) -> str:
+        if n.op is Op.CONST:
+            return number(float(n.value))
+        if isinstance(n.payload, Input):
+            return _ARRAYS[n.payload.array].format(n.payload.index)
+        return self.names[n]
+
+    def fresh(self, n: Node, letter: str = "v") -> str:
+        self.temporaries += 1
+        self.names[n] = f"{letter}{self.temporaries}"
+        return self.names[n]
+
+    def block(self, depth: int, statements: Iterable[Statement]) -> None:
+        for s in statements:
+            if isinstance(s, If):
+                self.branch(depth, s)
+            else:
+                right = self.expression(s)
+                kind = "int" if s.op in BOOLEAN else "double"
+                self.line(depth, f"const {kind} {self.fresh(s)} = {right};")
+
+    def expression(self, n: Node) -> str:
+        if n.op is Op.POW:
+            return f"pow({self.ref(n.args[0])}, {number(float(n.payload))})"  # type: ignore[arg-type]
+        return _FORMATS[n.op].format(*(self.ref(a) for a in n.args))
+
+    def branch(self, depth: int, s: If) -> None:
+        names = [self.fresh(n) for n in s.merged]
+        self.line(depth, f"double {', '.join(names)};")
+        for head, k, inner in (
+            (f"if ({self.ref(s.condition)}) {{", 1, s.then),
+            ("} else {", 2, s.otherwise),
+        ):
+            self.line(depth, head)
+            self.block(depth + 1, inner)
+            for n, name in zip(s.merged, names, strict=True):
+                self.line(depth + 1, f"{name} = {self.ref(n.args[k])};")
+        self.line(depth, "}")
+
+
+def function(
+    definition: Definition, task: abi.Task, entries: Sequence[Entry], plan: Schedule
+) -> tuple[str, int]:
+    """C text of one kernel and the number of its temporaries."""
+    p = _Printer(definition)
+    p.line(1, "for (ptrdiff_t e = 0; e < n; ++e) {")
+    _pointers(p, task)
+    scattered = [x for x in entries if _in_loop(x)]
+    if scattered and task is not abi.Task.FIELDS:
+        _clear(p, task)
+    for stage in plan.stages:
+        p.block(2, stage.before)
+        if stage.loop is not None:
+            _loop(p, stage.loop, lambda: _store_in_loop(p, task, entries))
+    for x in entries:
+        if not _in_loop(x) and task is not abi.Task.FIELDS:
+            p.line(2, f"{_target(definition, task, x)} = {p.ref(x.node)};")
+    p.line(1, "}")
+    body = "\n".join(_unused(p.lines) + p.lines)
+    text = f"{abi.declaration(definition.name, task)}\n{{\n{body}\n}}\n"
+    return text, p.temporaries
+
+
+def _in_loop(x: Entry) -> bool:
+    return x.row.basis or (x.column is not None and x.column.basis) or x.node.varying
+
+
+def _dofs(d: Definition) -> str:
+    direct = len(d.unknowns)
+    return f"({direct} + modes)" if d.interpolated else str(direct)
+
+
+def _pointers(p: _Printer, task: abi.Task) -> None:
+    d = p.d
+    p.line(2, f"const double *restrict X = coordinates + {2 * d.nodes} * e;")
+    p.line(2, f"const double *restrict d = dofs + {_dofs(d)} * e;")
+    if d.data:
+        p.line(2, f"const double *restrict a = data + {len(d.data)} * e;")
+    if task in (abi.Task.RESIDUAL, abi.Task.TANGENT):
+        p.line(2, f"double *restrict R = values + {_dofs(d)} * e;")
+    if task is abi.Task.TANGENT:
+        p.line(2, f"double *restrict K = tangent + {_dofs(d)} * {_dofs(d)} * e;")
+    for name, arrays in (("X", "coordinates"), ("d", "dofs"), ("a", "data")):
+        if name != "a" or d.data:
+            p.line(2, f"(void){name};  /* {arrays} */")
+
+
+def _clear(p: _Printer, task: abi.Task) -> None:
+    p.line(2, f"for (ptrdiff_t i = 0; i < {_dofs(p.d)}; ++i) R[i] = 0.0;")
+    if task is abi.Task.TANGENT:
+        p.line(2, f"for (ptrdiff_t i = 0; i < {_dofs(p.d)} * {_dofs(p.d)}; ++i) K[i] = 0.0;")
+
+
+def _loop(p: _Printer, loop: Loop, store: Callable[[], None]) -> None:
+    for s in loop.sums:
+        p.line(2, f"double {p.fresh(s, 's')} = 0.0;")
+    p.line(2, "for (ptrdiff_t q = 0; q < points; ++q) {")
+    p.line(3, f"const double *restrict w = rule + {p.d.rule.dimension + 1} * q;")
+    p.line(3, "(void)w;")
+    if p.d.interpolated:
+        p.line(3, "const double *restrict B = basis + 2 * modes * q;")
+        p.line(3, "double p0 = 0.0, p1 = 0.0;")
+        p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
+        p.line(4, f"p0 += B[2 * i] * d[{len(p.d.unknowns)} + i];")
+        p.line(4, f"p1 += B[2 * i + 1] * d[{len(p.d.unknowns)} + i];")
+        p.line(3, "}")
+    p.block(3, loop.body)
+    for s in loop.sums:
+        p.line(3, f"{p.ref(s)} += {p.ref(s.args[0])};")
+    if loop.outputs:
+        store()
+    p.line(2, "}")
+
+
+def _store_in_loop(p: _Printer, task: abi.Task, entries: Sequence[Entry]) -> None:
+    if task is abi.Task.FIELDS:
+        width = len(p.d.fields)
+        p.line(3, f"double *restrict out = values + {width} * (points * e + q);")
+        for x in entries:
+            p.line(3, f"out[{x.row.position}] = {p.ref(x.node)};")
+        return
+    direct = len(p.d.unknowns)
+    at = {(x.row, x.column): p.ref(x.node) for x in entries if _in_loop(x)}
+    p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
+    p.line(4, "const double N = B[2 * i], D = B[2 * i + 1];")
+    for column, target in _scatter_targets(p.d, task):
+        left = _combination([at.get(k) for k in column])
+        if left:
+            p.line(4, f"{target} += {left};")
+    if task is abi.Task.TANGENT:
+        for c in (0, 1):
+            pair = [at.get((Slot(True, r), Slot(True, c))) for r in (0, 1)]
+            p.line(4, f"const double r{c} = {_combination(pair) or '0.0'};")
+        p.line(4, "for (ptrdiff_t j = 0; j < modes; ++j)")
+        p.line(
+            5,
+            f"K[({direct} + i) * {_dofs(p.d)} + {direct} + j] "
+            "+= r0 * B[2 * j] + r1 * B[2 * j + 1];",
+        )
+    p.line(3, "}")
+
+
+Key = tuple[Slot, Slot | None]
+
+
+def _scatter_targets(d: Definition, task: abi.Task) -> list[tuple[list[Key], str]]:
+    """Pairs (value and derivative component of an output, its place for basis function i)."""
+    direct, dofs = len(d.unknowns), _dofs(d)
+    both = [Slot(True, 0), Slot(True, 1)]
+    out: list[tuple[list[Key], str]] = [([(s, None) for s in both], f"R[{direct} + i]")]
+    if task is abi.Task.TANGENT:
+        for k in range(direct):
+            out.append(([(s, Slot(False, k)) for s in both], f"K[({direct} + i) * {dofs} + {k}]"))
+            out.append(([(Slot(False, k), s) for s in both], f"K[{k} * {dofs} + {direct} + i]"))
+    return out
+
+
+def _combination(pair: Sequence[str | None]) -> str:
+    return " + ".join(f"{b} * {v}" for b, v in zip("ND", pair, strict=True) if v is not None)
+
+
+def _target(d: Definition, task: abi.Task, x: Entry) -> str:
+    if task is abi.Task.ENERGY:
+        return "values[e]"
+    if x.column is None:
+        return f"R[{x.row.position}]"
+    if d.interpolated:
+        return f"K[{x.row.position} * {_dofs(d)} + {x.column.position}]"
+    return f"K[{x.row.position * len(d.unknowns) + x.column.position}]"
+
+
+def _unused(lines: Sequence[str]) -> list[str]:
+    """Silence arguments that a family has no use for."""
+    text = "\n".join(lines)
+    names = ("points", "modes", "data", "parameters", "rule", "basis", "tangent")
+    return [f"    (void){name};" for name in names if name not in text]
+
+
+def source(definition: Definition, functions: Iterable[str]) -> str:
+    """The C file of a kernel family."""
+    return "\n".join([_banner(definition), f'#include "{HEADER}"', "", *functions])
+
+
+def _banner(d: Definition) -> str:
+    def rows(label: str, entries: Iterable[str]) -> list[str]:
+        return [f" * {label}[{k}]  {text}" for k, text in enumerate(entries)]
+
+    lines = [
+        "/* Generated by softehl from a model page; do not edit.",
+        " *",
+        f" * {d.name}: {d.doc}",
+    ]
+    lines += [" *", *rows("dofs", d.unknowns)]
+    if d.interpolated:
+        lines.append(f" * dofs[{len(d.unknowns)} + i]  {d.interpolated}, i < modes")
+    for label, arguments in (("parameters", d.parameters), ("data", d.data)):
+        lines += rows(label, [f"{a.name}: {a.meaning}" for a in arguments])
+    lines += rows("fields", [name for name, _ in d.fields])
+    return "\n".join([*lines, " */"])
+
+
+def header(declarations: Iterable[str]) -> str:
+    """The one header of all kernels."""
+    guard = "SOFTEHL_KERNELS_H"
+    lines = ["/* Generated by softehl; do not edit.  codegen/abi.py says what every pointer is. */"]
+    lines += [
+        f"#ifndef {guard}",
+        f"#define {guard}",
+        "",
+        "#include <math.h>",
+        "#include <stddef.h>",
+    ]
+    lines += ["", *(f"{d};" for d in declarations), "", "const char *softehl_signature(void);"]
+    return "\n".join([*lines, "", "#endif", ""])

@@ -1,0 +1,200 @@
+"""The slow oracle: walks the *unoptimised* graph of a model in arbitrary precision.
+
+It shares nothing with differentiation, passes, schedule or emission.  Derivatives are central
+differences in so many digits that their error is far below double precision: the residual is
+the derivative of the potential with the frozen quantities held at their values in the base state,
+the tangent is the derivative of that residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+
+from codegen.graph import Input, Node, Op, reachable
+from codegen.model import Definition
+
+Number = Any
+Vector = list[Number]
+
+_UNARY: dict[Op, Callable[[Number], Number]] = {
+    Op.NAME: lambda a: a,
+    Op.NEG: lambda a: -a,
+    Op.RECIP: lambda a: 1 / a,
+    Op.SQRT: mpmath.sqrt,
+    Op.CBRT: mpmath.cbrt,
+    Op.LOG: mpmath.log,
+    Op.EXP: mpmath.exp,
+    Op.SIN: mpmath.sin,
+    Op.COS: mpmath.cos,
+    Op.NOT: lambda a: not a,
+}
+_BINARY: dict[Op, Callable[[Number, Number], Number]] = {
+    Op.ADD: lambda a, b: a + b,
+    Op.SUB: lambda a, b: a - b,
+    Op.MUL: lambda a, b: a * b,
+    Op.LT: lambda a, b: a < b,
+    Op.LE: lambda a, b: a <= b,
+    Op.EQ: lambda a, b: a == b,
+    Op.AND: lambda a, b: a and b,
+    Op.OR: lambda a, b: a or b,
+}
+
+
+@dataclass(frozen=True)
+class State:
+    """Arguments of one element: exact numbers, as doubles or mpmath values.
+
+    `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative).
+    """
+
+    coordinates: Sequence[Number]
+    dofs: Sequence[Number]
+    data: Sequence[Number] = ()
+    parameters: Sequence[Number] = ()
+    rule: Sequence[Sequence[Number]] = ((1,),)
+    basis: Sequence[Sequence[tuple[Number, Number]]] = ()
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """Values and derivatives of one model, with `digits` digits of working precision."""
+
+    definition: Definition
+    digits: int = 90
+    step: int = 20
+
+    def potential(self, state: State) -> Number:
+        """Value of the (pseudo-)potential."""
+        with mpmath.workdps(self.digits):
+            return _Walk(state, {}).value(self.definition.potential)
+
+    def fields(self, state: State) -> list[Vector]:
+        """Field values, [point][field]."""
+        with mpmath.workdps(self.digits):
+            walk = _Walk(state, {})
+            nodes = [n for _, n in self.definition.fields]
+            return [[walk.at(n, q) for n in nodes] for q in range(len(state.rule))]
+
+    def residual(self, state: State) -> Vector:
+        """Derivative of the potential with the constants frozen at `state`."""
+        with mpmath.workdps(self.digits):
+            return self._residual(state, _mpf(state.dofs))
+
+    def tangent(self, state: State) -> list[Vector]:
+        """Rows dR_i/du_j, derivative of `residual` (constants follow the state here)."""
+        with mpmath.workdps(self.digits):
+            h = mpmath.mpf(10) ** -self.step
+            base = _mpf(state.dofs)
+            columns = []
+            for j in range(len(base)):
+                plus, minus = (self._residual(state, _moved(base, j, s * h)) for s in (1, -1))
+                columns.append([(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)])
+            return [list(row) for row in zip(*columns, strict=True)]
+
+    def _residual(self, state: State, dofs: Vector) -> Vector:
+        h = mpmath.mpf(10) ** -self.step
+        frozen = self._frozen(state, dofs)
+        out = []
+        for j in range(len(dofs)):
+            plus, minus = (
+                _Walk(state, frozen, _moved(dofs, j, s * h)).value(self.definition.potential)
+                for s in (1, -1)
+            )
+            out.append((plus - minus) / (2 * h))
+        return out
+
+    def _frozen(self, state: State, dofs: Vector) -> dict[tuple[Node, int], Number]:
+        walk = _Walk(state, {}, dofs)
+        return {
+            (n, q): walk.at(n, q) for n in self.definition.constant for q in range(len(state.rule))
+        }
+
+
+def _mpf(values: Sequence[Number]) -> Vector:
+    return [mpmath.mpf(v) for v in values]
+
+
+def _moved(values: Vector, j: int, by: Number) -> Vector:
+    return [v + by if i == j else v for i, v in enumerate(values)]
+
+
+class _Walk:
+    """One evaluation; values are remembered per node and point."""
+
+    def __init__(
+        self,
+        state: State,
+        frozen: Mapping[tuple[Node, int], Number],
+        dofs: Vector | None = None,
+    ) -> None:
+        self.state = state
+        self.frozen = frozen
+        self.arrays: dict[str, Vector] = {
+            "coordinates": _mpf(state.coordinates),
+            "dofs": _mpf(state.dofs) if dofs is None else dofs,
+            "data": _mpf(state.data),
+            "parameters": _mpf(state.parameters),
+        }
+        self.known: dict[tuple[Node, int], Number] = {}
+
+    def value(self, n: Node) -> Number:
+        """Value of a node that does not vary with the point."""
+        return self.at(n, 0)
+
+    def at(self, n: Node, q: int) -> Number:
+        """Value of a node at point `q`."""
+        q = q if n.varying else 0
+        key = (n, q)
+        if key in self.frozen:
+            return self.frozen[key]
+        if key not in self.known:
+            self.known[key] = self._compute(n, q)
+        return self.known[key]
+
+    def _compute(self, n: Node, q: int) -> Number:
+        match n.op:
+            case Op.CONST:
+                return mpmath.mpf(n.value.numerator) / n.value.denominator
+            case Op.PI:
+                return +mpmath.pi
+            case Op.INPUT:
+                assert isinstance(n.payload, Input)
+                return self._input(n.payload, q)
+            case Op.SUM:
+                return mpmath.fsum(self.at(n.args[0], k) for k in range(len(self.state.rule)))
+            case Op.BRANCH:
+                return self.at(n.args[1 if self.at(n.args[0], q) else 2], q)
+            case Op.POW:
+                e: Any = n.payload
+                return self.at(n.args[0], q) ** (mpmath.mpf(e.numerator) / e.denominator)
+        args = [self.at(a, q) for a in n.args]
+        return _UNARY[n.op](*args) if len(args) == 1 else _BINARY[n.op](*args)
+
+    def _input(self, source: Input, q: int) -> Number:
+        if source.array == "rule":
+            return mpmath.mpf(self.state.rule[q][source.index])
+        if source.array == "interpolated":
+            modes = self.state.basis[q]
+            unknowns = self.arrays["dofs"][-len(modes) :]
+            return mpmath.fsum(
+                mpmath.mpf(b[source.index]) * p for b, p in zip(modes, unknowns, strict=True)
+            )
+        return self.arrays[source.array][source.index]
+
+
+def evaluate(root: Node, inputs: Mapping[tuple[str, int], Number], digits: int = 50) -> Number:
+    """Value of a graph without loops, for the tests of passes and derivatives."""
+    arrays: dict[str, Vector] = {}
+    for n in reachable([root]):
+        if isinstance(n.payload, Input):
+            column = arrays.setdefault(n.payload.array, [])
+            column += [0] * (n.payload.index + 1 - len(column))
+            column[n.payload.index] = inputs[n.payload.array, n.payload.index]
+    with mpmath.workdps(digits):
+        walk = _Walk(State((), ()), {})
+        walk.arrays = {k: _mpf(v) for k, v in arrays.items()}
+        return walk.value(root)

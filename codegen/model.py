@@ -1,0 +1,216 @@
+"""How a model is written: declared symbols, named intermediates, one potential or weak form.
+
+A model page declares its arguments, writes its mathematics in SymPy, and ends with `potential` or
+`weak_form`.  Nothing is differentiated here; `codegen.pipeline` does that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from codegen.graph import Graph, Node
+from codegen.lower import Lowering, ModelError
+from codegen.quadrature import QuadratureRule
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A named scalar argument of a kernel and what it means (with its unit)."""
+
+    name: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A finished model: everything the compiler needs, nothing differentiated yet."""
+
+    name: str
+    doc: str
+    nodes: int
+    unknowns: tuple[str, ...]
+    interpolated: str | None
+    parameters: tuple[Argument, ...]
+    data: tuple[Argument, ...]
+    rule: QuadratureRule
+    graph: Graph
+    potential: Node
+    constant: tuple[Node, ...]
+    given: Mapping[Node, Mapping[Node, Node]]
+    directions: tuple[Node, ...]
+    waist: tuple[Node, ...]
+    fields: tuple[tuple[str, Node], ...]
+
+    @property
+    def conservative(self) -> bool:
+        """True when the residual is the gradient of the potential (no exceptions)."""
+        return not self.constant and not self.given
+
+
+class Model:
+    """Builder of a `Definition`; every method declares or names something."""
+
+    def __init__(self, name: str, *, nodes: int, rule: QuadratureRule, doc: str = "") -> None:
+        self.name, self.nodes, self.rule = name, nodes, rule
+        self.doc = " ".join(doc.split())
+        self.graph = Graph()
+        self._bound: dict[sp.Symbol, Node] = {}
+        self._lower = Lowering(self.graph, self._bound)
+        self._unknowns: list[str] = []
+        self._interpolated: str | None = None
+        self._directions: list[Node] = []
+        self._arguments: dict[str, list[Argument]] = {"parameters": [], "data": []}
+        self._waist: list[Node] = []
+        self._given: dict[Node, dict[Node, Node]] = {}
+        self._constant: list[Node] = []
+        self._fields: list[tuple[str, Node]] = []
+        self._potential: Node | None = None
+
+    # declarations -------------------------------------------------------------------------------
+
+    def coordinates(self, *names: str) -> list[list[sp.Symbol]]:
+        """Reference coordinates, one list over the nodes for each component."""
+        width = len(names)
+        return [
+            [self._input(f"{name}{a + 1}", "coordinates", a * width + c) for a in range(self.nodes)]
+            for c, name in enumerate(names)
+        ]
+
+    def nodal_unknowns(self, *names: str) -> list[list[sp.Symbol]]:
+        """Unknowns at the nodes, numbered node by node; one list for each component."""
+        columns: list[list[sp.Symbol]] = [[] for _ in names]
+        for a in range(self.nodes):
+            for c, name in enumerate(names):
+                columns[c].append(self.unknown(f"{name}{a + 1}"))
+        return columns
+
+    def unknown(self, name: str) -> sp.Symbol:
+        """One more scalar unknown of the element."""
+        if self._interpolated:
+            raise ModelError(f"declare {name} before the interpolated {self._interpolated}")
+        symbol = self._input(name, "dofs", len(self._unknowns))
+        self._unknowns.append(name)
+        self._directions.append(self._bound[symbol])
+        return symbol
+
+    def interpolated(self, name: str) -> tuple[sp.Symbol, sp.Symbol]:
+        """Value and xi-derivative of a field with any number of element unknowns (`modes`)."""
+        self._interpolated = name
+        pair = [
+            self._input(label, "interpolated", k, varying=True)
+            for k, label in enumerate((name, f"{name}_xi"))
+        ]
+        self._directions.extend(self._bound[s] for s in pair)
+        return pair[0], pair[1]
+
+    def parameters(self, **meanings: str) -> list[sp.Symbol]:
+        """Arguments that are the same for all elements of a call."""
+        return self._declare("parameters", meanings)
+
+    def data(self, **meanings: str) -> list[sp.Symbol]:
+        """Arguments that differ from element to element."""
+        return self._declare("data", meanings)
+
+    def point(self) -> list[sp.Symbol]:
+        """Coordinates of the quadrature point in the parent element."""
+        names = ("xi", "eta", "zeta")[: self.rule.dimension]
+        return [self._input(s, "rule", k, varying=True) for k, s in enumerate(names)]
+
+    @property
+    def weight(self) -> sp.Symbol:
+        """Weight of the quadrature point."""
+        return self._input("weight", "rule", self.rule.dimension, varying=True)
+
+    # mathematics --------------------------------------------------------------------------------
+
+    def define(
+        self,
+        name: str,
+        expression: Any,
+        *,
+        waist: bool = False,
+        derivative: Mapping[sp.Symbol, Any] | None = None,
+    ) -> Any:
+        """Name an intermediate (scalar or matrix); returns its symbol or matrix of symbols.
+
+        A `waist` intermediate is one that derivatives are taken through.  `derivative` replaces
+        the true derivative by given ones with respect to chosen symbols.
+        """
+        if isinstance(expression, sp.MatrixBase):
+            rows, columns = expression.shape
+            return sp.Matrix(
+                rows,
+                columns,
+                lambda i, j: self.define(f"{name}_{i}{j}", expression[i, j], waist=waist),
+            )
+        node = self.graph.name(name, self._lower(expression))
+        if waist:
+            self._waist.append(node)
+        if derivative is not None:
+            self._given[node] = {self._bound[s]: self._lower(e) for s, e in derivative.items()}
+        return self._bind(name, node)
+
+    def integral(self, name: str, integrand: Any) -> sp.Symbol:
+        """Quadrature of `integrand` over the parent element."""
+        return self._bind(name, self.graph.sum(self._lower(integrand * self.weight)))
+
+    def potential(self, expression: Any, *, constant: Iterable[Any] = ()) -> None:
+        """The residual is the gradient of `expression` with the `constant` symbols frozen."""
+        self._constant = [self._bound[s] for s in constant]
+        self._potential = self._lower(expression)
+
+    def weak_form(self, terms: Sequence[tuple[Any, Any]]) -> None:
+        """Residual = integral of sum(factor * variation of varied) over (factor, varied)."""
+        density = sp.Integer(0)
+        frozen = []
+        for k, (factor, varied) in enumerate(terms):
+            frozen.append(self.define(f"factor_{k}", factor, waist=True))
+            density += frozen[-1] * varied
+        self.potential(self.integral("virtual_work", density), constant=frozen)
+
+    def fields(self, **values: Any) -> None:
+        """Quantities to be evaluated at the quadrature points for post-processing."""
+        self._fields = [(name, self._lower(value)) for name, value in values.items()]
+
+    def finish(self) -> Definition:
+        """The frozen definition of the model."""
+        if self._potential is None:
+            raise ModelError(f"model {self.name} has neither a potential nor a weak form")
+        return Definition(
+            name=self.name,
+            doc=self.doc,
+            nodes=self.nodes,
+            unknowns=tuple(self._unknowns),
+            interpolated=self._interpolated,
+            parameters=tuple(self._arguments["parameters"]),
+            data=tuple(self._arguments["data"]),
+            rule=self.rule,
+            graph=self.graph,
+            potential=self._potential,
+            constant=tuple(self._constant),
+            given=self._given,
+            directions=tuple(self._directions),
+            waist=tuple(self._waist),
+            fields=tuple(self._fields),
+        )
+
+    # binding ------------------------------------------------------------------------------------
+
+    def _declare(self, array: str, meanings: Mapping[str, str]) -> list[sp.Symbol]:
+        start = len(self._arguments[array])
+        self._arguments[array] += [Argument(n, " ".join(m.split())) for n, m in meanings.items()]
+        return [self._input(name, array, start + k) for k, name in enumerate(meanings)]
+
+    def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
+        return self._bind(name, self.graph.input(array, index, varying=varying))
+
+    def _bind(self, name: str, node: Node) -> sp.Symbol:
+        symbol = sp.Symbol(name, real=True)
+        if self._bound.get(symbol, node) is not node:
+            raise ModelError(f"the name {name} is used twice in model {self.name}")
+        self._bound[symbol] = node
+        return symbol

@@ -1,0 +1,19 @@
+"""The models: one page of mathematics each.  `ALL` lists the pages that ship."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from codegen.model import Definition
+from codegen.models import boundary, contact, film, solid, support
+
+ALL: dict[str, Callable[[], Definition]] = {
+    "solid_q4": solid.plain,
+    "solid_fbar": solid.fbar,
+    "solid_taylor": solid.taylor,
+    "follower_pressure": boundary.follower_pressure,
+    "contact": contact.augmented_lagrangian,
+    "film": film.reynolds_segment,
+    "mean_rotation": support.mean_rotation,
+    "axial_spring": support.axial_spring,
+}

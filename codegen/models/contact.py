@@ -1,0 +1,40 @@
+"""Frictionless unilateral contact with rigid cylinders and planes, (9)-(10)."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from codegen import quadrature
+from codegen.model import Definition, Model
+
+
+def augmented_lagrangian() -> Definition:
+    """Node against a rigid cylinder or plane, augmented Lagrangian of Alart and Curnier (1991).
+
+    Where lambda + rho g <= 0 (contact) the potential is lambda g + rho g^2 / 2, elsewhere
+    -lambda^2 / (2 rho), times the tributary area; `force_weight` scales the nodal force only.
+    """
+    m = Model(
+        "contact", nodes=1, rule=quadrature.point_rule(), doc=augmented_lagrangian.__doc__ or ""
+    )
+    (z,), (r,) = m.coordinates("Z", "R")
+    (u_z,), (u_r,) = m.nodal_unknowns("u_z", "u_r")
+    lam = m.unknown("lambda")
+    n_z, n_r, c, area, rho = m.data(
+        n_z="normal of the obstacle, axial part",
+        n_r="normal of the obstacle, radial part",
+        c="position of the obstacle along its normal [mm]",
+        area="reference tributary area of the node [mm^2]",
+        rho="augmentation parameter [MPa/mm]",
+    )
+    offset, force_weight = m.parameters(
+        offset="distance by which the obstacle is moved along its normal [mm]",
+        force_weight="factor on the nodal force",
+    )
+    gap = m.define("gap", n_z * (z + u_z) + n_r * (r + u_r) - c - offset)
+    trial = m.define("trial", lam + rho * gap)
+    touching = trial <= 0
+    force = m.define("force", sp.Piecewise((area * force_weight * trial, touching), (0, True)))
+    slack = m.define("slack", sp.Piecewise((area * gap, touching), (-area * lam / rho, True)))
+    m.weak_form([(force * n_z, u_z), (force * n_r, u_r), (slack, lam)])
+    return m.finish()

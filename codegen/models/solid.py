@@ -1,0 +1,128 @@
+"""Axisymmetric 4-node hyperelastic solids, energy (3)-(6): plain, F-bar, Taylor-expanded.
+
+Units mm, MPa, N; nodes counterclockwise in (z, r); unknowns u_z1, u_r1, ..., u_z4, u_r4.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from codegen import kinematics as kin
+from codegen import quadrature, shapes
+from codegen.model import Definition, Model
+
+
+def _element(name: str, doc: str) -> tuple[Model, Any, Any, Any]:
+    """Arguments that the three solids share: coordinates, displacements, material."""
+    m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), doc=doc)
+    X = m.coordinates("Z", "R")
+    u = m.nodal_unknowns("u_z", "u_r")
+    material = m.parameters(
+        mu_1="elastic parameter [MPa]",
+        mu_2="elastic parameter [MPa]",
+        kappa="bulk modulus [MPa]",
+    )
+    return m, X, u, material
+
+
+def _energy(m: Model, label: str, F: kin.Gradient, material: Any) -> Any:
+    """W(F) of (3)."""
+    mu_1, mu_2, kappa = material
+    I1, I2, I3 = kin.invariants(m, label, F)
+    return kin.mooney_rivlin_isochoric((mu_1, mu_2), I1, I2) + kin.volumetric(kappa, I3)
+
+
+def _fields(m: Model, X: Any, u: Any, N: Any, F: kin.Gradient, material: Any) -> None:
+    """Deformed position, volume ratio and Cauchy stress at the quadrature points."""
+    z, r = (shapes.interpolate(N, [a + b for a, b in zip(X[c], u[c], strict=True)]) for c in (0, 1))
+    J, zz, rr, tt, zr = kin.cauchy_mooney_rivlin(material[:2], material[2], F)
+    m.fields(z=z, r=r, J=J, sigma_zz=zz, sigma_rr=rr, sigma_tt=tt, sigma_zr=zr)
+
+
+def plain() -> Definition:
+    """Displacement element, 2x2 points: Pi = integral of W(F) 2 pi R dA, (1)-(6)."""
+    m, X, u, material = _element("solid_q4", plain.__doc__ or "")
+    xi, eta = m.point()
+    e = kin.quad4(m, "", X, xi, eta)
+    F = kin.gradient(m, "", e.dN, [n / e.R for n in e.N], u)
+    m.potential(m.integral("Pi", 2 * sp.pi * e.R * e.detJ * _energy(m, "", F, material)))
+    _fields(m, X, u, e.N, F, material)
+    return m.finish()
+
+
+def fbar() -> Definition:
+    """F-bar element of de Souza Neto et al. (1996): Fbar = a F, a = (J0/J)^(1/3), J0 at centroid.
+
+    P_eff = (J/J0)^(2/3) P(Fbar) is the derivative of the pseudo-potential W(a F) / a^3 with a
+    frozen; the tangent differentiates a as well and is exact and unsymmetric.
+    """
+    m, X, u, material = _element("solid_fbar", fbar.__doc__ or "")
+    xi, eta = m.point()
+    e = kin.quad4(m, "", X, xi, eta)
+    centre = kin.quad4(m, "0", X, sp.Integer(0), sp.Integer(0))
+    F = kin.gradient(m, "", e.dN, [n / e.R for n in e.N], u)
+    F0 = kin.gradient(m, "0", centre.dN, [n / centre.R for n in centre.N], u)
+    J, J0 = m.define("J", F.J), m.define("J0", F0.J)
+    a = m.define("a", (J0 / J) ** sp.Rational(1, 3))
+    Fbar = F.scaled(a)
+    W = _energy(m, "bar", Fbar, material)
+    m.potential(m.integral("Pi", 2 * sp.pi * e.R * e.detJ * W / a**3), constant=[a])
+    _fields(m, X, u, e.N, Fbar, material)
+    return m.finish()
+
+
+def taylor() -> Definition:
+    """Under-integrated element with Taylor-expanded gradients, after Korelc and Wriggers (1997).
+
+    Our reading.  Gradients of the shape functions are expanded about the centre to first order in
+    xi and eta (N_a in the hoop term likewise, over the exact radius), and integrated with the
+    Jacobian of the centre: their mean is then that of the exact ones, as the patch test asks.
+    The isochoric energy is taken at the 2x2 points, the volumetric one at the centre only.
+    """
+    m, X, u, material = _element("solid_taylor", taylor.__doc__ or "")
+    xi, eta = m.point()
+    centre = kin.quad4(m, "0", X, sp.Integer(0), sp.Integer(0))
+    R = m.define("R", shapes.interpolate(shapes.quad4(xi, eta), X[1]))
+    dN, N = _expanded(m, X, centre, xi, eta)
+    F = kin.gradient(m, "", dN, [n / R for n in N], u)
+    F0 = kin.gradient(m, "0", centre.dN, [n / centre.R for n in centre.N], u)
+    mu_1, mu_2, kappa = material
+    I1, I2, _ = kin.invariants(m, "", F)
+    isochoric = m.integral(
+        "isochoric",
+        2 * sp.pi * R * centre.detJ * kin.mooney_rivlin_isochoric((mu_1, mu_2), I1, I2),
+    )
+    volume = 8 * sp.pi * centre.R * centre.detJ
+    m.potential(isochoric + volume * kin.volumetric(kappa, m.define("I3_0", F0.J**2)))
+    # The stress combines the point's isochoric part with the centre's volume ratio.
+    shared = F.scaled(m.define("to_J0", (F0.J / F.J) ** sp.Rational(1, 3)))
+    _fields(m, X, u, shapes.quad4(xi, eta), shared, material)
+    return m.finish()
+
+
+def _expanded(m: Model, X: Any, centre: kin.Quad4, xi: Any, eta: Any) -> tuple[Any, Any]:
+    """First-order expansions about the centre of (dN_a/dZ, dN_a/dR) and of N_a."""
+    signs = [a * b for a, b in shapes.QUAD_NODES]
+    h = [m.define(f"h_{c}", shapes.interpolate(signs, X[c]) / 4) for c in (0, 1)]
+    x0, d0 = centre.dX, centre.detJ
+    # J(xi, eta) = [x_xi + eta h, x_eta + xi h]; d1, d2 are the derivatives of its determinant.
+    d1 = m.define("d_xi", (x0[0][0] * h[1] - x0[1][0] * h[0]) / d0)
+    d2 = m.define("d_eta", (h[0] * x0[1][1] - h[1] * x0[0][1]) / d0)
+    dN, N = [], []
+    for a, (p, q) in enumerate(shapes.QUAD_NODES):
+        gz, gr = centre.dN[a]
+        slope = sp.Rational(p * q, 4)
+        z1 = m.define(f"dN_{a}z_xi", (sp.Rational(p, 4) * h[1] - slope * x0[1][0]) / d0 - gz * d1)
+        z2 = m.define(f"dN_{a}z_eta", (slope * x0[1][1] - sp.Rational(q, 4) * h[1]) / d0 - gz * d2)
+        r1 = m.define(f"dN_{a}r_xi", (slope * x0[0][0] - sp.Rational(p, 4) * h[0]) / d0 - gr * d1)
+        r2 = m.define(f"dN_{a}r_eta", (sp.Rational(q, 4) * h[0] - slope * x0[0][1]) / d0 - gr * d2)
+        dN.append(
+            (
+                m.define(f"dN_{a}z", gz + xi * z1 + eta * z2),
+                m.define(f"dN_{a}r", gr + xi * r1 + eta * r2),
+            )
+        )
+        N.append(m.define(f"N_{a}", (1 + p * xi + q * eta) / 4))
+    return dN, N

@@ -1,0 +1,48 @@
+"""What holds a ring that nothing else holds: its mean rotation, a weak axial spring."""
+
+from __future__ import annotations
+
+from codegen import kinematics as kin
+from codegen import quadrature, shapes
+from codegen.model import Definition, Model
+
+
+def mean_rotation() -> Definition:
+    """Constraint on the mean rotation of the section, with the moment as its multiplier.
+
+    Potential M / I * integral of (X x u - angle |X|^2) dA, X from the centre of the section, I
+    its polar moment: the moment M [N mm per radian of rotation] is work-conjugate to `angle`.
+    """
+    m = Model(
+        "mean_rotation", nodes=4, rule=quadrature.gauss(2, 2), doc=mean_rotation.__doc__ or ""
+    )
+    X = m.coordinates("Z", "R")
+    u = m.nodal_unknowns("u_z", "u_r")
+    moment = m.unknown("moment")
+    centre_z, centre_r, inertia, angle = m.parameters(
+        centre_z="centre of the section, axial [mm]",
+        centre_r="centre of the section, radial [mm]",
+        polar_moment="polar moment of the section about its centre [mm^4]",
+        angle="prescribed mean rotation, from z towards r [rad]",
+    )
+    xi, eta = m.point()
+    e = kin.quad4(m, "", X, xi, eta)
+    z = m.define("z", shapes.interpolate(e.N, X[0]) - centre_z)
+    r = m.define("r", shapes.interpolate(e.N, X[1]) - centre_r)
+    spin = z * shapes.interpolate(e.N, u[1]) - r * shapes.interpolate(e.N, u[0])
+    density = moment / inertia * e.detJ * (spin - angle * (z**2 + r**2))
+    m.potential(m.integral("constraint", density))
+    return m.finish()
+
+
+def axial_spring() -> Definition:
+    """Elastic bedding against axial motion: potential stiffness / 2 * integral of u_z^2 dA."""
+    m = Model("axial_spring", nodes=4, rule=quadrature.gauss(2, 2), doc=axial_spring.__doc__ or "")
+    X = m.coordinates("Z", "R")
+    u = m.nodal_unknowns("u_z", "u_r")
+    (stiffness,) = m.parameters(stiffness="bedding stiffness [N/mm^3]")
+    xi, eta = m.point()
+    e = kin.quad4(m, "", X, xi, eta)
+    u_z = m.define("u_z", shapes.interpolate(e.N, u[0]), waist=True)
+    m.potential(m.integral("bedding", stiffness / 2 * e.detJ * u_z**2))
+    return m.finish()

@@ -1,0 +1,298 @@
+"""Named rewrites of a set of root nodes, and the trace of what each one bought.
+
+Every pass maps roots to roots of the same value.  `STANDARD` is the order in which the compiler
+runs them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import mpmath
+
+from codegen.graph import BOOLEAN, Graph, Node, Op, operations, reachable
+
+Roots = list[Node]
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A rewrite with the name it carries in the trace."""
+
+    name: str
+    apply: Callable[[Graph, Roots], Roots]
+
+
+@dataclass(frozen=True)
+class TraceRow:
+    """State of the graph after a pass."""
+
+    name: str
+    nodes: int
+    operations: int
+
+
+def run(g: Graph, roots: Roots, passes: Sequence[Pass]) -> tuple[Roots, list[TraceRow]]:
+    """Apply `passes` in order; the first row of the trace is the input."""
+    trace = [_row("input", roots)]
+    for p in passes:
+        roots = p.apply(g, roots)
+        trace.append(_row(p.name, roots))
+    return roots, trace
+
+
+def _row(name: str, roots: Roots) -> TraceRow:
+    return TraceRow(name, len(reachable(roots)), operations(roots))
+
+
+def rewrite(g: Graph, roots: Roots, rule: Callable[[Graph, Node, tuple[Node, ...]], Node]) -> Roots:
+    """Rebuild bottom-up: `rule` gets each old node with its rebuilt operands."""
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        new[n] = rule(g, n, tuple(new[a] for a in n.args))
+    return [new[r] for r in roots]
+
+
+def fold(g: Graph, roots: Roots) -> Roots:
+    """Drop names, fold exact constants, apply the identities of the constructors again."""
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        return args[0] if n.op is Op.NAME else g.rebuild(n.op, args, n.payload)
+
+    return rewrite(g, roots, rule)
+
+
+def powers(g: Graph, roots: Roots) -> Roots:
+    """Powers as products, square roots and cube roots that share one reciprocal."""
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        if n.op is not Op.POW:
+            return g.rebuild(n.op, args, n.payload)
+        assert isinstance(n.payload, Fraction)
+        return _power(g, args[0], n.payload)
+
+    return rewrite(g, roots, rule)
+
+
+def _power(g: Graph, a: Node, e: Fraction) -> Node:
+    root = {1: a, 2: Op.SQRT, 3: Op.CBRT}.get(e.denominator)
+    if root is None:
+        return g.power(a, e)
+    base = g.call(root, a) if isinstance(root, Op) else a
+    return _integer_power(g, g.recip(base) if e < 0 else base, abs(e.numerator))
+
+
+def _integer_power(g: Graph, a: Node, n: int) -> Node:
+    if n == 1:
+        return a
+    half = _integer_power(g, a, n // 2)
+    square = g.mul(half, half)
+    return g.mul(square, a) if n % 2 else square
+
+
+def signs(g: Graph, roots: Roots) -> Roots:
+    """Value numbering up to sign: a - b and b - a become one value."""
+    seen = {n for n in reachable(roots) if n.op is Op.SUB}
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        if n.op is Op.SUB:
+            mirrored = g.node(Op.SUB, (n.args[1], n.args[0]))
+            if mirrored in seen and mirrored.id < n.id:
+                return g.neg(g.sub(args[1], args[0]))
+        return g.rebuild(n.op, args, n.payload)
+
+    return rewrite(g, roots, rule)
+
+
+def _uses(roots: Roots) -> Counter[Node]:
+    uses: Counter[Node] = Counter(roots)
+    for n in reachable(roots):
+        uses.update(n.args)
+    return uses
+
+
+def _chain(n: Node, ops: tuple[Op, ...], uses: Counter[Node]) -> list[Node]:
+    """Operands of a chain of `ops` whose inner results nobody else uses."""
+    out: list[Node] = []
+    for a in n.args:
+        out += _chain(a, ops, uses) if a.op in ops and uses[a] == 1 else [a]
+    return out
+
+
+def invariants_first(g: Graph, roots: Roots) -> Roots:
+    """Reorder products: constants, then what does not vary with the point, then the rest."""
+    uses = _uses(roots)
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        if n.op is Op.MUL:
+            factors = [new[f] for f in _chain(n, (Op.MUL,), uses)]
+            new[n] = _product(g, factors)
+        else:
+            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+    return [new[r] for r in roots]
+
+
+def _product(g: Graph, factors: list[Node]) -> Node:
+    ranked = sorted(factors, key=lambda f: (f.op is not Op.CONST, f.varying, f.id))
+    result = g.one
+    for f in ranked:
+        result = g.mul(result, f)
+    return result
+
+
+def factor(g: Graph, roots: Roots) -> Roots:
+    """Common factors: a b + a c becomes a (b + c), the most frequent factor first."""
+    uses = _uses(roots)
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        if n.op in (Op.ADD, Op.SUB):
+            terms = [(s, [new[f] for f in fs]) for s, fs in _terms(n, 1, uses)]
+            shared = _most_shared(terms)
+            new[n] = _factored(g, terms) if shared else _as_it_was(g, n, new)
+        else:
+            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+    return [new[r] for r in roots]
+
+
+Term = tuple[int, list[Node]]
+
+
+def _terms(n: Node, sign: int, uses: Counter[Node]) -> list[Term]:
+    """Signed products whose sum is `n`."""
+    out: list[Term] = []
+    for k, a in enumerate(n.args):
+        s = -sign if (n.op is Op.SUB and k == 1) else sign
+        if a.op in (Op.ADD, Op.SUB) and uses[a] == 1:
+            out += _terms(a, s, uses)
+        elif a.op is Op.MUL and uses[a] == 1:
+            out.append((s, _chain(a, (Op.MUL,), uses)))
+        else:
+            out.append((s, [a]))
+    return out
+
+
+def _as_it_was(g: Graph, n: Node, new: dict[Node, Node]) -> Node:
+    """A sum keeps its order unless there is something to gain: order is rounding."""
+    return g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+
+
+def _most_shared(terms: list[Term]) -> Node | None:
+    """The factor of most terms, None where no two terms share one."""
+    count: Counter[Node] = Counter()
+    for _, factors in terms:
+        count.update(list(dict.fromkeys(factors)))
+    best = max(count, key=lambda f: (count[f], -f.id))
+    return best if count[best] > 1 and best.payload != 1 else None
+
+
+def _factored(g: Graph, terms: list[Term]) -> Node:
+    best = _most_shared(terms)
+    if best is None:
+        return _sum(g, [(s, _product(g, fs)) for s, fs in terms])
+    inside: list[Term] = []
+    outside: list[Term] = []
+    for s, fs in terms:
+        if best in fs:
+            rest = list(fs)
+            rest.remove(best)
+            inside.append((s, rest or [g.one]))
+        else:
+            outside.append((s, fs))
+    grouped = g.mul(best, _factored(g, inside))
+    return _sum(g, [(1, grouped)], _factored(g, outside) if outside else g.zero)
+
+
+def _sum(g: Graph, terms: list[tuple[int, Node]], start: Node | None = None) -> Node:
+    result = g.zero if start is None else start
+    for s, n in sorted(terms, key=lambda t: (t[1].varying, -t[0])):
+        result = g.add(result, n) if s > 0 else g.sub(result, n)
+    return result
+
+
+def assume(g: Graph, roots: Roots) -> Roots:
+    """Inside one side of a branch its condition is known: drop inner branches on it."""
+    memo: dict[tuple[Node, tuple[tuple[Node, bool], ...]], Node] = {}
+
+    def visit(n: Node, known: tuple[tuple[Node, bool], ...]) -> Node:
+        key = (n, known)
+        if key not in memo:
+            memo[key] = build(n, known)
+        return memo[key]
+
+    def build(n: Node, known: tuple[tuple[Node, bool], ...]) -> Node:
+        if n.op is not Op.BRANCH:
+            return g.rebuild(n.op, tuple(visit(a, known) for a in n.args), n.payload)
+        c, a, b = n.args
+        for condition, holds in known:
+            if condition is c:
+                return visit(a if holds else b, known)
+        order = tuple(sorted((*known, (c, True)), key=lambda k: k[0].id))
+        negated = tuple(sorted((*known, (c, False)), key=lambda k: k[0].id))
+        return g.branch(visit(c, known), visit(a, order), visit(b, negated))
+
+    has_branch = any(n.op is Op.BRANCH for n in reachable(roots))
+    for n in reachable(roots) if has_branch else ():
+        visit(n, ())  # ascending order keeps the recursion shallow
+    return [visit(r, ()) for r in roots] if has_branch else roots
+
+
+def literals(g: Graph, roots: Roots) -> Roots:
+    """Values that depend on no argument become numbers, correctly rounded at the last moment."""
+    value: dict[Node, mpmath.mpf] = {}
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        built = g.rebuild(n.op, args, n.payload)
+        if built.op in (Op.CONST, Op.SUM, Op.BRANCH) or built.op in BOOLEAN:
+            return built
+        if built.op is not Op.PI and not (
+            built.args and all(a.op is Op.CONST or a in value for a in built.args)
+        ):
+            return built
+        with mpmath.workdps(50):
+            number = _number(built, [_exact(a, value) for a in built.args])
+            literal = g.const(Fraction(float(number)))
+            value[literal] = number
+        return literal
+
+    return rewrite(g, roots, rule)
+
+
+def _exact(n: Node, value: dict[Node, mpmath.mpf]) -> mpmath.mpf:
+    return value.get(n, mpmath.mpf(n.value.numerator) / n.value.denominator)
+
+
+def _number(n: Node, args: list[mpmath.mpf]) -> mpmath.mpf:
+    if n.op is Op.PI:
+        return mpmath.pi + 0
+    if n.op is Op.POW:
+        assert isinstance(n.payload, Fraction)
+        return args[0] ** (mpmath.mpf(n.payload.numerator) / n.payload.denominator)
+    functions: dict[Op, Callable[..., mpmath.mpf]] = {
+        Op.ADD: lambda a, b: a + b,
+        Op.SUB: lambda a, b: a - b,
+        Op.MUL: lambda a, b: a * b,
+        Op.NEG: lambda a: -a,
+        Op.RECIP: lambda a: 1 / a,
+        Op.SQRT: mpmath.sqrt,
+        Op.CBRT: mpmath.cbrt,
+        Op.LOG: mpmath.log,
+        Op.EXP: mpmath.exp,
+        Op.SIN: mpmath.sin,
+        Op.COS: mpmath.cos,
+    }
+    return functions[n.op](*args)
+
+
+STANDARD = (
+    Pass("fold", fold),
+    Pass("assume", assume),
+    Pass("powers", powers),
+    Pass("signs", signs),
+    Pass("invariants first", invariants_first),
+    Pass("common factors", factor),
+    Pass("common factors again", factor),
+    Pass("literals", literals),
+)

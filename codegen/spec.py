@@ -1,0 +1,50 @@
+"""What a legal graph is: an executable specification, run between passes in the tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from codegen.graph import BOOLEAN, Input, Node, Op, reachable
+
+ARITY: dict[Op, int] = {
+    **dict.fromkeys((Op.CONST, Op.PI, Op.INPUT), 0),
+    **dict.fromkeys((Op.NAME, Op.NEG, Op.RECIP, Op.POW, Op.SQRT, Op.CBRT, Op.LOG, Op.EXP), 1),
+    **dict.fromkeys((Op.SIN, Op.COS, Op.NOT, Op.SUM), 1),
+    **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR), 2),
+    Op.BRANCH: 3,
+}
+PAYLOAD: dict[Op, type] = {Op.CONST: Fraction, Op.POW: Fraction, Op.INPUT: Input, Op.NAME: str}
+
+
+class IllegalGraphError(ValueError):
+    """A node breaks the specification; the message shows it."""
+
+
+def check(roots: Sequence[Node], *, names: bool = True) -> None:
+    """Raise `IllegalGraphError` unless every node below `roots` is legal.
+
+    `names=False` also forbids NAME nodes: they live only until the passes begin.
+    """
+    for n in reachable(roots):
+        if len(n.args) != ARITY[n.op]:
+            raise IllegalGraphError(f"{n}: {n.op} takes {ARITY[n.op]} operands")
+        if not isinstance(n.payload, PAYLOAD.get(n.op, type(None))):
+            raise IllegalGraphError(f"{n}: payload of a wrong kind")
+        if any(a.id >= n.id for a in n.args):
+            raise IllegalGraphError(f"{n}: an operand is younger than its user")
+        if n.op is Op.NAME and not names:
+            raise IllegalGraphError(f"{n}: a name survived the passes")
+        if n.op is Op.SUM and n.varying:
+            raise IllegalGraphError(f"{n}: a sum over points cannot vary with the point")
+        _check_kinds(n)
+
+
+def _check_kinds(n: Node) -> None:
+    """Conditions where conditions belong, numbers everywhere else."""
+    logical = {Op.AND: (0, 1), Op.OR: (0, 1), Op.NOT: (0,), Op.BRANCH: (0,)}.get(n.op, ())
+    for k, a in enumerate(n.args):
+        if (a.op in BOOLEAN) != (k in logical):
+            raise IllegalGraphError(
+                f"{n}: operand {k} is {'no' if k in logical else 'a'} condition"
+            )

@@ -1,0 +1,1 @@
+"""Generated C: kernels, header, manifest.  Never edited by hand: `softehl generate`."""

@@ -1,0 +1,1 @@
+"""Runtime: meshes, assembly and solvers around the generated kernels; no physics formulas here."""

@@ -1,0 +1,89 @@
+"""Quadrature rules on [-1, 1] and the pressure shape functions of the film segment, eq. (27)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Kind = Literal["gauss", "lobatto"]
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """A quadrature rule and, for the film, the pressure shape functions at its points.
+
+    points: (q, dim) reference coordinates; weights: (q,); basis: (q, modes, 2) value and d/dxi of every
+    pressure shape function at every point, or None. All arrays are read-only.
+    """
+
+    points: Array
+    weights: Array
+    basis: Array | None = None
+
+    def __post_init__(self) -> None:
+        for array in (self.points, self.weights, self.basis):
+            if array is not None:
+                array.setflags(write=False)
+
+
+def _line(points: Array, weights: Array, basis: Array | None = None) -> Rule:
+    return Rule(np.ascontiguousarray(points)[:, None].copy(), np.ascontiguousarray(weights), basis)
+
+
+@cache
+def gauss(n: int) -> Rule:
+    """Gauss-Legendre rule with n >= 1 points, exact for polynomials of degree 2 n - 1."""
+    if n < 1:
+        raise ValueError(f"gauss({n}): a Gauss rule has at least 1 point")
+    points, weights = legendre.leggauss(n)
+    return _line(points, weights)
+
+
+@cache
+def lobatto(n: int) -> Rule:
+    """Gauss-Lobatto-Legendre rule with n >= 2 points, ends included, exact for degree 2 n - 3."""
+    if n < 2:
+        raise ValueError(f"lobatto({n}): a Lobatto rule has at least 2 points")
+    highest = legendre.Legendre.basis(n - 1)
+    derivative, curvature = highest.deriv(1), highest.deriv(2)
+    inner = np.sort(np.real(derivative.roots()))
+    for _ in range(3):  # companion-matrix roots carry about 1e-14: polish them
+        inner = inner - derivative(inner) / curvature(inner)
+    points = np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
+    weights = 2.0 / (n * (n - 1) * highest(points) ** 2)
+    return _line(points, weights)
+
+
+def pressure_nodes(m_p: int) -> Array:
+    """The m_p + 1 pressure nodes of a segment, Gauss-Lobatto-Legendre, from its end 1 to its end 2."""
+    return lobatto(m_p + 1).points[:, 0]
+
+
+def lagrange(nodes: Array, points: Array) -> Array:
+    """Lagrange polynomials of `nodes` (modes,) at `points` (q,): (q, modes, 2), value and derivative."""
+    vandermonde = legendre.legvander(nodes, len(nodes) - 1)
+    coefficients = np.linalg.inv(vandermonde)  # column i: Legendre coefficients of shape function i
+    value = legendre.legval(points, coefficients).T
+    slope = legendre.legval(points, legendre.legder(coefficients, axis=0)).T
+    return np.ascontiguousarray(np.stack([value, slope], axis=2))
+
+
+def automatic_points(m_p: int, kind: Kind) -> int:
+    """Fewest points that integrate h^3 (dp/dx)(d dp/dx), of degree 2 m_p + 1, exactly (constant viscosity)."""
+    return m_p + 1 if kind == "gauss" else m_p + 2
+
+
+@cache
+def film_rule(m_p: int, kind: Kind = "gauss", points: int | None = None) -> Rule:
+    """Rule of the film segment with pressures of order m_p >= 1; `points` None means `automatic_points`."""
+    if m_p < 1:
+        raise ValueError(f"film_rule: pressure order {m_p} is not allowed, it is at least 1")
+    count = automatic_points(m_p, kind) if points is None else points
+    rule = gauss(count) if kind == "gauss" else lobatto(count)
+    return Rule(rule.points, rule.weights, lagrange(pressure_nodes(m_p), rule.points[:, 0]))
