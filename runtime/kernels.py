@@ -55,7 +55,7 @@ class Kernel:
     """One kernel family.  Calls take n elements at once; arrays are converted to float64.
 
     coordinates (n, 2*nodes), dofs (n, ndof), data (n, len(data)), parameters (len(parameters),)
-    or a mapping by name, rule None for the model's default.
+    or a mapping by name, rule None for the model's default (the only one when `unrolled`).
     """
 
     name: str
@@ -67,6 +67,7 @@ class Kernel:
     fields: tuple[str, ...]
     tasks: tuple[str, ...]
     default_rule: Rule
+    unrolled: bool
     signature: str
     library: Any
 
@@ -110,6 +111,10 @@ class _Call:
             raise ArgumentError(f"{kernel.name} offers {', '.join(kernel.tasks)}, not {task}")
         self.kernel = kernel
         self.function = getattr(kernel.library, f"softehl_{kernel.name}_{task}")
+        if rule is not None and kernel.unrolled:
+            raise ArgumentError(
+                f"the quadrature rule of {kernel.name} is written into it: give none"
+            )
         self.rule = kernel.default_rule if rule is None else rule
         self.modes = self._modes()
         self.n = len(dofs)
@@ -124,6 +129,11 @@ class _Call:
         )
         points = np.asarray(self.rule.points, dtype=np.float64).reshape(len(self.rule.weights), -1)
         self.table = np.column_stack([points, self.rule.weights])
+        columns = kernel.default_rule.points.reshape(len(kernel.default_rule.weights), -1).shape[1]
+        if points.shape[1] != columns:
+            raise ArgumentError(
+                f"{kernel.name}: the rule has {points.shape[1]} coordinates a point, must be {columns}"
+            )
         self.basis = np.ascontiguousarray(
             np.empty(0) if self.rule.basis is None else self.rule.basis, dtype=np.float64
         )
@@ -136,7 +146,12 @@ class _Call:
                 f"{self.kernel.name} interpolates {self.kernel.interpolated}: give it a rule with "
                 "a basis, e.g. runtime.rules.film_rule(m_p)"
             )
-        return int(self.rule.basis.shape[1])
+        shape = np.shape(self.rule.basis)
+        if len(shape) != 3 or shape[0] != len(self.rule.weights) or shape[2] != 2:
+            raise ArgumentError(
+                f"{self.kernel.name}: basis has shape {shape}, must be (points, modes, 2)"
+            )
+        return int(shape[1])
 
     def _ordered(self, parameters: Array | Mapping[str, float]) -> Any:
         if not isinstance(parameters, Mapping):
@@ -147,7 +162,12 @@ class _Call:
         return [parameters[p] for p in self.kernel.parameters]
 
     def _array(self, what: str, value: Any, shape: tuple[int, ...]) -> Array:
-        array = np.ascontiguousarray(value, dtype=np.float64)
+        given = np.asarray(value)
+        if given.dtype.kind not in "fiu":
+            raise ArgumentError(
+                f"{self.kernel.name}: {what} holds {given.dtype}, must be real numbers"
+            )
+        array = np.ascontiguousarray(given, dtype=np.float64)
         if array.shape != shape:
             raise ArgumentError(
                 f"{self.kernel.name}: {what} has shape {array.shape}, must be {shape}"
@@ -201,6 +221,7 @@ def _library(directory: Path) -> Any:
     library: Any = _ffi.dlopen(str(path))
     built = _ffi.string(library.softehl_signature()).decode()
     if built != _sources_signature(directory):
+        _ffi.dlclose(library)
         raise StaleKernelsError(
             f"{path.name} was built from other sources than {directory.name}/ holds now: {REMEDY}"
         )
@@ -233,6 +254,7 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         data=tuple(entry["data"]),
         fields=tuple(entry["fields"]),
         tasks=tuple(entry["tasks"]),
+        unrolled=entry["unrolled"],
         default_rule=Rule(np.array(rule["points"]), np.array(rule["weights"]), None),
         signature=entry["signature"],
         library=_library(directory),

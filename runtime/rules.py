@@ -18,8 +18,8 @@ Kind = Literal["gauss", "lobatto"]
 class Rule:
     """A quadrature rule and, for the film, the pressure shape functions at its points.
 
-    points: (q, dim) reference coordinates; weights: (q,); basis: (q, modes, 2) value and d/dxi of every
-    pressure shape function at every point, or None. All arrays are read-only.
+    points: (q, dim) reference coordinates; weights: (q,); basis: (q, modes, 2) value and d/dxi of
+    every pressure shape function at every point, or None. All arrays are read-only.
     """
 
     points: Array
@@ -61,12 +61,12 @@ def lobatto(n: int) -> Rule:
 
 
 def pressure_nodes(m_p: int) -> Array:
-    """The m_p + 1 pressure nodes of a segment, Gauss-Lobatto-Legendre, from its end 1 to its end 2."""
+    """The m_p + 1 pressure nodes of a segment (Gauss-Lobatto-Legendre), from end 1 to end 2."""
     return lobatto(m_p + 1).points[:, 0]
 
 
 def lagrange(nodes: Array, points: Array) -> Array:
-    """Lagrange polynomials of `nodes` (modes,) at `points` (q,): (q, modes, 2), value and derivative."""
+    """Lagrange polynomials of `nodes` (modes,) at `points` (q,): (q, modes, 2), value and slope."""
     vandermonde = legendre.legvander(nodes, len(nodes) - 1)
     coefficients = np.linalg.inv(vandermonde)  # column i: Legendre coefficients of shape function i
     value = legendre.legval(points, coefficients).T
@@ -75,13 +75,13 @@ def lagrange(nodes: Array, points: Array) -> Array:
 
 
 def automatic_points(m_p: int, kind: Kind) -> int:
-    """Fewest points that integrate h^3 (dp/dx)(d dp/dx), of degree 2 m_p + 1, exactly (constant viscosity)."""
+    """Fewest points that integrate h^3 dp/dx d(dp)/dx exactly: degree 2 m_p + 1, alpha = 0."""
     return m_p + 1 if kind == "gauss" else m_p + 2
 
 
 @cache
 def film_rule(m_p: int, kind: Kind = "gauss", points: int | None = None) -> Rule:
-    """Rule of the film segment with pressures of order m_p >= 1; `points` None means `automatic_points`."""
+    """Rule of the film segment for pressures of order m_p >= 1; points None: automatic_points."""
     if m_p < 1:
         raise ValueError(f"film_rule: pressure order {m_p} is not allowed, it is at least 1")
     count = automatic_points(m_p, kind) if points is None else points

@@ -1,0 +1,72 @@
+"""Numbering of the unknowns: named fields, one after another, in one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class DofLayout:
+    """Where each named field lives in the vector of unknowns.
+
+    names, counts: fields in the order in which they are numbered.
+    """
+
+    names: tuple[str, ...]
+    counts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, **counts: int) -> DofLayout:
+        """Layout of fields given as name=count, in that order."""
+        return cls(tuple(counts), tuple(counts.values()))
+
+    @property
+    def total(self) -> int:
+        """Length of the vector of unknowns."""
+        return sum(self.counts)
+
+    def count(self, name: str) -> int:
+        """Number of unknowns of a field; KeyError for an unknown name."""
+        return self.counts[self._position(name)]
+
+    def part(self, name: str) -> slice:
+        """Slice of a field in the vector of unknowns; KeyError for an unknown name."""
+        first = sum(self.counts[: self._position(name)])
+        return slice(first, first + self.count(name))
+
+    def dofs(self, name: str) -> Integers:
+        """Numbers (count,) of the unknowns of a field; KeyError for an unknown name."""
+        part = self.part(name)
+        return np.arange(part.start, part.stop)
+
+    def _position(self, name: str) -> int:
+        if name not in self.names:
+            raise KeyError(f"no field {name!r}; there are {', '.join(self.names)}")
+        return self.names.index(name)
+
+
+def displacement_dofs(nodes: Integers) -> Integers:
+    """Displacement unknowns u_z, u_r of nodes (n, k), node by node: (n, 2 k)."""
+    pairs = np.stack([2 * nodes, 2 * nodes + 1], axis=-1)
+    return pairs.reshape(len(nodes), -1)
+
+
+def chain_dofs(segments: int, order: int, first: int) -> Integers:
+    """Unknowns of a continuous piecewise polynomial along a chain: (segments, order + 1).
+
+    Neighbours share the unknown at their common end, so `order * segments + 1` are used.
+    """
+    start = first + order * np.arange(segments)
+    return start[:, None] + np.arange(order + 1)[None, :]
+
+
+def gather_rows(*parts: Integers) -> Integers:
+    """Element dof map (n, ndof) from maps that stand side by side; each (n, k) or (n,)."""
+    columns: Sequence[Integers] = [p[:, None] if p.ndim == 1 else p for p in parts]
+    return np.ascontiguousarray(np.concatenate(columns, axis=1))

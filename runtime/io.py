@@ -1,0 +1,135 @@
+"""Files of a run: every write is atomic, so a run that is killed leaves whole files only.
+
+A file is written beside its place and moved over it (os.replace); a reader sees the old file or the
+new one, never half of one.  CSV numbers are the shortest text that reads back to the same number.
+"""
+
+import contextlib
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Cell = float | int | str
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a path to write to; move it over `path` if the block succeeds, remove it if not.
+
+    The name is fixed, so what a killed run leaves behind is overwritten by the next one.
+    """
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write UTF-8 text atomically.  Raises OSError."""
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def number_text(value: float) -> str:
+    """The shortest decimal text of a number, without a trailing ".0" or a negative zero."""
+    text = repr(float(value) + 0.0)
+    return text.removesuffix(".0")
+
+
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> None:
+    """Write a table atomically: one header line, then one line a row."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow([cell if isinstance(cell, str) else number_text(cell) for cell in row])
+    write_text(path, buffer.getvalue())
+
+
+def read_csv(path: Path, header: Sequence[str]) -> list[list[str]]:
+    """Read the rows of a table written by :func:`write_csv`.
+
+    Raises OSError, and ValueError if the header or the length of a row is another one.
+    """
+    with path.open(encoding="utf-8", newline="") as file:
+        table = list(csv.reader(file))
+    if not table or table[0] != list(header):
+        raise ValueError(f"{path}: the first line is not {','.join(header)}")
+    for row in table[1:]:
+        if len(row) != len(header):
+            raise ValueError(f"{path}: a row has {len(row)} cells instead of {len(header)}")
+    return table[1:]
+
+
+def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
+    """Write arrays of one length (n,) as the columns of a table.  ValueError if they differ."""
+    write_csv(path, list(columns), zip(*(c.tolist() for c in columns.values()), strict=True))
+
+
+def read_columns(path: Path, header: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Read what :func:`write_columns` wrote: name -> (n,).  Raises OSError, ValueError."""
+    rows = [[float(cell) for cell in row] for row in read_csv(path, header)]
+    table = np.array(rows, dtype=np.float64).reshape(len(rows), len(header))
+    return {name: table[:, i].copy() for i, name in enumerate(header)}
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write JSON atomically; a number that is not finite becomes null (JSON has no NaN)."""
+    write_text(path, json.dumps(_plain(value), indent=1, allow_nan=False) + "\n")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON object.  Raises OSError, and ValueError if the file holds anything else."""
+    value = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(value, dict):
+        raise ValueError(f"{path}: not a JSON object")
+    return value
+
+
+def _plain(value: object) -> object:
+    """The same value in types that JSON has."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def write_vtu(
+    path: Path,
+    points: NDArray[np.float64],
+    cells: NDArray[np.int64],
+    point_data: Mapping[str, NDArray[np.float64]],
+    cell_data: Mapping[str, NDArray[np.float64]],
+) -> None:
+    """Write four-node cells in the plane as VTK XML, atomically.
+
+    points: (n, 2), written as (z, r, 0).  cells: (m, 4).  point_data: name -> (n,) or (n, k);
+    cell_data: name -> (m,) or (m, k).
+    """
+    import meshio  # only here: it is slow to import
+
+    flat = np.zeros((len(points), 3))
+    flat[:, :2] = points
+    mesh = meshio.Mesh(
+        flat,
+        [("quad", np.asarray(cells, dtype=np.int64))],
+        point_data={name: np.asarray(data) for name, data in point_data.items()},
+        cell_data={name: [np.asarray(data)] for name, data in cell_data.items()},
+    )
+    with replacing(path) as temporary:
+        meshio.write(temporary, mesh, file_format="vtu")

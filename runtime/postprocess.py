@@ -1,0 +1,73 @@
+"""Results from converged fields: means over elements, nodal averages, intervals along a line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+def element_means(values: Array, weights: Array) -> Array:
+    """Weighted mean (n,) over the points of each element; values and weights (n, points)."""
+    return np.asarray((values * weights).sum(axis=1) / weights.sum(axis=1))
+
+
+def relative_spread(values: Array) -> float:
+    """(largest - smallest) / |mean| of values (n,), n >= 1; inf where the mean is zero."""
+    mean = abs(float(values.mean()))
+    width = float(np.ptp(values))
+    return width / mean if mean > 0.0 else (0.0 if width == 0.0 else float("inf"))
+
+
+def run_around(flags: Flags, index: int) -> slice:
+    """Longest slice of consecutive true flags that holds `index`; just `index` if it is false."""
+    if not flags[index]:
+        return slice(index, index + 1)
+    false = np.flatnonzero(~flags)
+    before, after = false[false < index], false[false > index]
+    first = int(before[-1]) + 1 if len(before) else 0
+    last = int(after[0]) if len(after) else len(flags)
+    return slice(first, last)
+
+
+def interval_below(x: Array, values: Array, level: float) -> tuple[float, float]:
+    """First and last x at which the piecewise linear `values` (n,) are below `level`.
+
+    x: (n,), increasing. Both ends are nan where no value is below the level.
+    """
+    inside = np.flatnonzero(values < level)
+    if not len(inside):
+        return float("nan"), float("nan")
+    first, last = int(inside[0]), int(inside[-1])
+    start = x[0] if first == 0 else _crossing(x, values, level, first - 1)
+    end = x[-1] if last == len(x) - 1 else _crossing(x, values, level, last)
+    return float(start), float(end)
+
+
+def _crossing(x: Array, values: Array, level: float, i: int) -> float:
+    t = (level - values[i]) / (values[i + 1] - values[i])
+    return float(x[i] + t * (x[i + 1] - x[i]))
+
+
+def nodal_average(cells: Integers, values: Mapping[str, Array], nodes: int) -> dict[str, Array]:
+    """Nodal values (nodes,) of each field: mean over the cells of a node of their point means.
+
+    cells: (m, k) node numbers; values: name -> (m, points). Nodes without a cell get nan.
+    """
+    count = np.bincount(cells.ravel(), minlength=nodes).astype(np.float64)
+    count[count == 0.0] = np.nan
+    result = {}
+    for name, field in values.items():
+        repeated = np.repeat(field.mean(axis=1), cells.shape[1])
+        result[name] = np.asarray(np.bincount(cells.ravel(), repeated, nodes) / count)
+    return result
+
+
+def local_exponent(x0: float, y0: float, x1: float, y1: float) -> float:
+    """d log y / d log x between two points of positive coordinates."""
+    return float(np.log(y1 / y0) / np.log(x1 / x0))

@@ -1,0 +1,162 @@
+"""What a solver hands back: failure is a value with advice in it, not an exception.
+
+Newton returns a `Solution`, continuation a `Branch` of them. Inner layers read `status` and react
+(continuation cuts its step); only the outermost caller turns a failure into an exception, with
+`raise_for_status`.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector: TypeAlias = NDArray[np.float64]
+
+
+class Status(enum.Enum):
+    """How a solver ended; `advice` says what to try next."""
+
+    CONVERGED = "converged"
+    MAX_ITERATIONS = "too many iterations"
+    DIVERGED = "diverged"
+    SINGULAR = "singular tangent"
+    NOT_FINITE = "residual not finite"
+    STEP_TOO_SMALL = "continuation step too small"
+
+    @property
+    def advice(self) -> str:
+        """One or two sentences: the likely causes and their remedies (empty when converged)."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    Status.CONVERGED: "",
+    Status.MAX_ITERATIONS: (
+        "Take a smaller step. If the last norms alternate between two values, an active set "
+        "(contact, cavitation) is cycling: change its scaling or allow the line search. If they "
+        "fall slowly and steadily, the tangent is not the derivative of the residual."
+    ),
+    Status.DIVERGED: "Take a smaller step, or start from a solution of a nearby easier problem.",
+    Status.SINGULAR: (
+        "Look for a rigid motion or an unknown that no equation holds; at a limit point of the "
+        "load follow the path by arc length instead."
+    ),
+    Status.NOT_FINITE: (
+        "Take a smaller step; check that the start is admissible (positive Jacobian, positive "
+        "film thickness) and that step_limit keeps it so."
+    ),
+    Status.STEP_TOO_SMALL: (
+        "The path may end or turn back here (limit point: follow it by arc length), or the mesh "
+        "is too coarse for this parameter; otherwise allow smaller steps."
+    ),
+}
+
+
+class NotConverged(RuntimeError):  # noqa: N818 (named after what it is)
+    """Raised by `raise_for_status` only; `result` is the Solution or Branch that failed."""
+
+    def __init__(self, result: Solution | Branch) -> None:
+        super().__init__(f"{result.status.value}: {result.message}. {result.status.advice}")
+        self.result = result
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The end of one Newton solve, converged or not.
+
+    x: (n,) the last accepted iterate; empty (n = 0) once `forget` was called.
+    status, message: how it ended, in code and in words.
+    residual_norms: dimensionless norm at x0 and after each iteration (iterations + 1 values).
+    factorisations: matrices factorised, including one that turned out singular.
+    iterations: completed Newton iterations.
+    """
+
+    x: Vector
+    status: Status
+    message: str
+    residual_norms: tuple[float, ...]
+    factorisations: int
+    iterations: int
+
+    @property
+    def converged(self) -> bool:
+        """True if the status is CONVERGED."""
+        return self.status is Status.CONVERGED
+
+    def forget(self) -> Solution:
+        """The same summary without the solution vector, which a long branch cannot afford."""
+        return replace(self, x=np.empty(0))
+
+    def raise_for_status(self) -> Solution:
+        """Return self if converged, else raise NotConverged: for the outermost caller only."""
+        if not self.converged:
+            raise NotConverged(self)
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A converged point of a branch; `solution.x` is kept for the last two points of a branch."""
+
+    parameter: float
+    solution: Solution
+
+
+@dataclass(frozen=True, eq=False)
+class LimitPoint:
+    """A fold of a branch: the parameter passes a `kind` ("maximum" or "minimum") at x, shape (n,).
+
+    `index` is the number of branch points before the fold. `located` is False if the corrector
+    failed during the search, so that parameter and x are only those of the nearer end of the step.
+    """
+
+    parameter: float
+    x: Vector
+    kind: str
+    index: int
+    located: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A followed path: every converged point, in order, and how the walk ended.
+
+    points: converged points; only the last two keep their x unless everything was asked for.
+    status, message: CONVERGED if the end was reached, else why not and which parameter was.
+    factorisations, iterations: totals that include failed attempts.
+    failures: the failed attempts (without x), in order; each made the step smaller.
+    limit_points: folds met on the way (arc length only).
+    """
+
+    points: tuple[Point, ...]
+    status: Status
+    message: str
+    factorisations: int = 0
+    iterations: int = 0
+    failures: tuple[Point, ...] = ()
+    limit_points: tuple[LimitPoint, ...] = ()
+
+    @property
+    def converged(self) -> bool:
+        """True if the requested end was reached."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Parameters of the converged points, in order."""
+        return tuple(point.parameter for point in self.points)
+
+    @property
+    def last(self) -> Solution:
+        """Solution of the last converged point; IndexError if not even the first converged."""
+        return self.points[-1].solution
+
+    def raise_for_status(self) -> Branch:
+        """Return self if the end was reached, else raise NotConverged (outermost caller only)."""
+        if not self.converged:
+            raise NotConverged(self)
+        return self

@@ -1,0 +1,484 @@
+"""Continuation on paths in closed form: lines, a circle, the Bratu fold, a von Mises truss."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.sparse import csc_array
+
+from runtime.continuation import Arclength, Continuation, StepRule
+from runtime.linear import SparseMatrix
+from runtime.newton import Newton
+from runtime.solution import Branch, NotConverged, Point, Status, Vector
+
+
+def _full_step(x: Vector, dx: Vector) -> float:
+    return 1.0
+
+
+@dataclass(frozen=True)
+class Algebraic:
+    """R and dR/dx at one parameter; `visited` lists the x at which R was asked for."""
+
+    equations: Callable[[Vector], Vector]
+    jacobian: Callable[[Vector], Vector]
+    limit: Callable[[Vector, Vector], float] = _full_step
+    visited: list[Vector] = field(default_factory=list)
+
+    def residual(self, x: Vector) -> Vector:
+        self.visited.append(x.copy())
+        return self.equations(x)
+
+    def linearise(self, x: Vector) -> tuple[Vector, SparseMatrix]:
+        return self.equations(x), csc_array(np.atleast_2d(self.jacobian(x)))
+
+    def norm(self, r: Vector) -> float:
+        return float(np.abs(r).max())
+
+    def step_limit(self, x: Vector, dx: Vector) -> float:
+        return self.limit(x, dx)
+
+
+def line(p: float) -> Algebraic:
+    """x^3 = p^3, whose path is the straight line x = p."""
+    return Algebraic(lambda x: x**3 - p**3, lambda x: np.diag(3.0 * x**2))
+
+
+def parabola(p: float) -> Algebraic:
+    """x^2 = 1 - p, which turns back at p = 1."""
+    return Algebraic(lambda x: x**2 - 1.0 + p, lambda x: np.diag(2.0 * x))
+
+
+def circle(p: float) -> Algebraic:
+    """x^2 + p^2 = 1."""
+    return Algebraic(lambda x: x**2 + p**2 - 1.0, lambda x: np.diag(2.0 * x))
+
+
+STEPS = StepRule(first=0.1, smallest=1e-3, largest=0.4)
+
+
+def natural(steps: StepRule = STEPS, **settings: Any) -> Continuation:
+    return Continuation(Newton(), steps, **settings)
+
+
+# --- the step rule -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("step", "taken", "iterations", "expected"),
+    [
+        (1.0, 1.0, 6, 1.0),  # as many iterations as wanted: unchanged
+        (1.0, 1.0, 4, 1.5),  # 6/4
+        (1.0, 1.0, 0, 2.0),  # growth at most 2
+        (1.0, 1.0, 8, 0.75),  # 6/8
+        (1.0, 1.0, 25, 0.5),  # cut at most to a half
+        (1.0, 0.1, 4, 1.0),  # shortened by a waypoint: the rule's own step survives
+        (1.0, 0.1, 12, 0.05),  # unless even the short one was hard
+        (3.0, 3.0, 3, 4.0),  # largest
+        (0.011, 0.011, 12, 0.01),  # smallest
+    ],
+)
+def test_step_after_success(step: float, taken: float, iterations: int, expected: float) -> None:
+    rule = StepRule(first=1.0, smallest=0.01, largest=4.0)
+    assert rule.after_success(step, taken, iterations) == pytest.approx(expected, rel=1e-14)
+
+
+def test_step_after_failure_is_cut_deeper_when_it_was_wild() -> None:
+    cuts = {s: STEPS.after_failure(0.8, s) for s in Status if s is not Status.CONVERGED}
+    wild = {Status.DIVERGED, Status.NOT_FINITE}
+    assert cuts == {s: pytest.approx(0.2 if s in wild else 0.4) for s in cuts}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"smallest": 0.0}, {"smallest": 0.2}, {"largest": 0.05}, {"growth": 0.9}, {"cut": 1.0}],
+)
+def test_senseless_step_rules_are_rejected(change: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="need 0 < "):
+        replace(STEPS, **change)
+
+
+# --- natural parameter ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("start", "stop"), [(1.0, 3.0), (3.0, 1.0), (-1.0, -2.5)])
+def test_waypoints_and_stop_are_hit_exactly_in_either_direction(start: float, stop: float) -> None:
+    waypoints = [start + part * (stop - start) for part in (0.7, 1 / 3, 0.34, 1.0, 0.0)]
+    met: list[Point] = []
+    branch = natural().follow(
+        line, start, stop, np.array([start]), waypoints=waypoints, on_point=met.append
+    )
+    assert branch.status is Status.CONVERGED
+    assert set(waypoints) <= set(branch.parameters)
+    assert branch.parameters[0] == start
+    assert branch.parameters[-1] == stop
+    travelled = [abs(p - start) for p in branch.parameters]
+    steps = [b - a for a, b in itertools.pairwise(travelled)]
+    assert min(steps) > 0.0
+    assert max(steps) <= 0.4 * (1.0 + 1e-8)
+    assert [point.parameter for point in met] == list(branch.parameters)
+    assert [point.solution.x[0] for point in met] == pytest.approx(branch.parameters, rel=1e-9)
+
+
+def test_the_last_two_steps_before_a_waypoint_are_equal() -> None:
+    branch = natural(StepRule(0.3, 0.3, 0.3)).follow(line, 1.0, 2.0, np.ones(1))
+    assert branch.parameters == pytest.approx((1.0, 1.3, 1.6, 1.8, 2.0))
+
+
+def test_every_point_is_reported_before_the_next_is_tried() -> None:
+    events: list[tuple[str, float]] = []
+
+    def problem_at(p: float) -> Algebraic:
+        events.append(("try", p))
+        return line(p)
+
+    branch = natural().follow(
+        problem_at,
+        1.0,
+        2.0,
+        np.ones(1),
+        on_point=lambda point: events.append(("met", point.parameter)),
+    )
+    assert events == [(what, p) for p in branch.parameters for what in ("try", "met")]
+
+
+def test_secant_needs_no_iteration_on_a_straight_path() -> None:
+    def iterations(predictor: Literal["secant", "previous"]) -> list[int]:
+        walk = Continuation(Newton(), StepRule(0.1, 0.1, 0.1), predictor)
+        points = walk.follow(line, 1.0, 2.0, np.ones(1)).points
+        return [point.solution.iterations for point in points]
+
+    assert iterations("secant")[:2] == iterations("previous")[:2]
+    assert iterations("secant")[2:] == [0] * 9
+    assert min(iterations("previous")[2:]) >= 3
+
+
+def test_a_walk_resumes_with_the_secant_of_its_previous_point() -> None:
+    first = natural().follow(line, 1.0, 1.5, np.ones(1))
+    before, last = first.points[-2:]
+    resumed = natural().follow(
+        line, last.parameter, 2.0, last.solution.x, previous=before, waypoints=[1.6]
+    )
+    assert resumed.converged
+    assert [point.solution.iterations for point in resumed.points] == [0] * len(resumed.points)
+    cold = natural().follow(line, last.parameter, 2.0, last.solution.x)
+    assert cold.points[1].solution.iterations > 0
+
+
+def test_a_transformed_parameter_is_followed_down() -> None:
+    # x^2 = U with U = exp(s), from 1600 down to 100.
+    speeds = [1600.0, 800.0, 400.0, 200.0, 100.0]
+    branch = Continuation(Newton(), StepRule(0.3, 0.01, 0.5), keep_all=True).follow(
+        lambda s: Algebraic(lambda x: x**2 - math.exp(s), lambda x: np.diag(2.0 * x)),
+        math.log(1600.0),
+        math.log(100.0),
+        np.array([40.0]),
+        waypoints=[math.log(speed) for speed in speeds],
+    )
+    found = {point.parameter: point.solution.x[0] for point in branch.points}
+    assert [found[math.log(speed)] for speed in speeds] == pytest.approx(np.sqrt(speeds))
+
+
+def test_a_step_too_long_is_cut_until_newton_converges() -> None:
+    # arctan(x - 10 p): from the previous point Newton converges only if 10 step < 1.3917.
+    def problem_at(p: float) -> Algebraic:
+        return Algebraic(
+            lambda x: np.arctan(x - 10.0 * p), lambda x: np.diag(1.0 / (1.0 + (x - 10.0 * p) ** 2))
+        )
+
+    walk = Continuation(Newton(), StepRule(1.0, 0.01), "previous", keep_all=True)
+    branch = walk.follow(problem_at, 0.0, 1.0, np.zeros(1))
+    assert branch.converged
+    assert len(branch.failures) >= 3
+    assert not any(point.solution.converged for point in branch.failures)
+    assert max(b - a for a, b in itertools.pairwise(branch.parameters)) < 0.13917
+    for point in branch.points:
+        assert point.solution.x == pytest.approx([10.0 * point.parameter], abs=1e-9)
+    attempts = [point.solution for point in (*branch.points, *branch.failures)]
+    assert branch.iterations == sum(solution.iterations for solution in attempts)
+    assert branch.factorisations == sum(solution.factorisations for solution in attempts)
+
+
+def test_a_turning_path_ends_with_a_step_too_small_next_to_its_fold() -> None:
+    walk = Continuation(Newton(), STEPS, name="load factor")
+    branch = walk.follow(parabola, 0.0, 2.0, np.ones(1))
+    assert branch.status is Status.STEP_TOO_SMALL
+    reached = branch.parameters[-1]
+    assert 0.0 <= 1.0 - reached < 4.0 * STEPS.smallest
+    assert branch.last.x == pytest.approx([math.sqrt(1.0 - reached)], abs=1e-7)
+    assert f"reached load factor = {reached:.9g};" in branch.message
+    assert branch.failures[-1].parameter > 1.0
+    assert branch.failures[-1].solution.status.value in branch.message
+    assert "arc length" in branch.status.advice
+    with pytest.raises(NotConverged, match="load factor") as caught:
+        branch.raise_for_status()
+    assert caught.value.result is branch
+
+
+def test_no_solution_at_the_start_is_reported_as_it_is() -> None:
+    branch = natural().follow(parabola, 0.0, 1.0, np.zeros(1))
+    assert branch.status is Status.SINGULAR
+    assert branch.points == ()
+    assert "start, parameter = 0" in branch.message
+
+
+@pytest.mark.parametrize("keep_all", [False, True])
+def test_only_the_last_two_points_keep_their_vectors(keep_all: bool) -> None:
+    branch = natural(keep_all=keep_all).follow(line, 1.0, 3.0, np.ones(1))
+    sizes = [point.solution.x.size for point in branch.points]
+    assert len(sizes) > 4
+    assert sizes == [1 if keep_all else 0] * (len(sizes) - 2) + [1, 1]
+    assert all(point.solution.residual_norms[-1] <= 1e-9 for point in branch.points)
+    assert branch.last is branch.points[-1].solution
+
+
+def test_the_predictor_stays_admissible() -> None:
+    # log x = -p: the secant through p = 0 and 2 is negative at 4.
+    tried: list[Algebraic] = []
+
+    def positive(x: Vector, dx: Vector) -> float:
+        return min(1.0, 0.9 * x[0] / -dx[0]) if dx[0] < 0.0 else 1.0
+
+    def problem_at(p: float) -> Algebraic:
+        tried.append(Algebraic(lambda x: np.log(x) + p, lambda x: np.diag(1.0 / x), positive))
+        return tried[-1]
+
+    branch = natural(StepRule(2.0, 0.5, 2.0)).follow(problem_at, 0.0, 6.0, np.ones(1))
+    assert branch.parameters == (0.0, 2.0, 4.0, 6.0)
+    secant = 2.0 * math.exp(-2.0) - 1.0
+    assert secant < 0.0
+    assert tried[2].visited[0] == pytest.approx([0.1 * math.exp(-2.0)])
+    assert min(x[0] for problem in tried for x in problem.visited) > 0.0
+    assert branch.last.x == pytest.approx([math.exp(-6.0)], rel=1e-8)
+
+
+def test_start_equal_to_stop_is_one_point() -> None:
+    branch = natural().follow(line, 2.0, 2.0, np.ones(1), waypoints=[2.0])
+    assert (branch.parameters, branch.status) == ((2.0,), Status.CONVERGED)
+
+
+@pytest.mark.parametrize("waypoint", [0.9, 2.1, math.nan])
+def test_waypoints_out_of_range_are_rejected(waypoint: float) -> None:
+    with pytest.raises(ValueError, match="outside"):
+        natural().follow(line, 1.0, 2.0, np.ones(1), waypoints=[waypoint])
+
+
+@pytest.mark.parametrize("stop", [math.inf, math.nan])
+def test_ends_must_be_finite(stop: float) -> None:
+    with pytest.raises(ValueError, match="finite"):
+        natural().follow(line, 1.0, stop, np.ones(1))
+
+
+# --- arc length ----------------------------------------------------------------------------------
+
+
+def arc(**settings: Any) -> Arclength:
+    defaults = Arclength(Newton(), StepRule(0.1, 1e-4, 0.3), keep_all=True)
+    return replace(defaults, **settings)
+
+
+def after_folds(count: int) -> Callable[[Branch], bool]:
+    return lambda branch: len(branch.limit_points) == count
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_circle_is_followed_round_through_both_folds(direction: float) -> None:
+    branch = arc().follow(circle, 0.0, np.ones(1), direction=direction, until=after_folds(2))
+    assert branch.converged
+    angles = [
+        math.atan2(direction * point.parameter, point.solution.x[0]) for point in branch.points
+    ]
+    turned = np.unwrap(angles)
+    assert (np.diff(turned) > 0.0).all()
+    assert turned[-1] > 1.5 * math.pi
+    for point in branch.points:
+        assert point.parameter**2 + point.solution.x[0] ** 2 == pytest.approx(1.0, abs=2e-9)
+    first, second = branch.limit_points
+    assert [first.kind, second.kind] == ["maximum", "minimum"][:: int(direction)]
+    assert first.located
+    assert second.located
+    assert [first.parameter, second.parameter] == pytest.approx([direction, -direction], abs=2e-9)
+    assert [first.x[0], second.x[0]] == pytest.approx([0.0, 0.0], abs=2e-7)
+
+
+def test_limit_point_index_counts_the_points_before_it() -> None:
+    branch = arc().follow(circle, 0.0, np.ones(1), until=after_folds(1))
+    (fold,) = branch.limit_points
+    before, after = branch.points[fold.index - 1 : fold.index + 1]
+    assert before.solution.x[0] > 0.0 >= after.solution.x[0]
+
+
+def test_a_skew_flat_fold_is_located() -> None:
+    # p = 1 - x^4 (1 - x): dp/dx vanishes with x^3, which one-sided false position hardly closes in.
+    def problem_at(p: float) -> Algebraic:
+        return Algebraic(
+            lambda x: x**4 * (1.0 - x) + p - 1.0, lambda x: np.diag(4.0 * x**3 - 5.0 * x**4)
+        )
+
+    start = 1.0 - 0.6**4 * 0.4
+    branch = arc().follow(problem_at, start, np.array([0.6]), until=after_folds(1))
+    (fold,) = branch.limit_points
+    assert fold.located
+    assert fold.parameter == pytest.approx(1.0, abs=2e-9)
+    assert fold.x == pytest.approx([0.0], abs=(1e-7 / 4.0) ** (1.0 / 3.0))
+
+
+def test_walk_ends_exactly_on_the_bound_it_crosses() -> None:
+    branch = arc().follow(circle, 0.0, np.ones(1), within=(-0.5, 2.0))
+    assert branch.converged
+    assert branch.parameters[-1] == -0.5
+    assert branch.last.x == pytest.approx([-math.sqrt(0.75)], rel=1e-8)
+    assert max(branch.parameters) <= 1.0 + 1e-9
+    assert len(branch.limit_points) == 1
+
+
+def test_a_bound_just_behind_a_fold_is_not_confused_with_it() -> None:
+    # Up to the fold at 1 and back to the bound 0.9 below the start, although one step spans both.
+    walk = arc(steps=StepRule(0.8, 1e-4, 0.8), turn=80.0)
+    branch = walk.follow(circle, 0.95, np.array([math.sqrt(1 - 0.95**2)]), within=(0.9, 2.0))
+    assert branch.converged
+    assert len(branch.limit_points) == 1
+    assert branch.last.x == pytest.approx([-math.sqrt(1.0 - 0.9**2)], rel=1e-8)
+    assert any("limit point and the bound" in f.solution.message for f in branch.failures)
+
+
+def test_a_sharp_turn_is_refused_and_the_step_cut() -> None:
+    branch = arc(steps=StepRule(0.9, 1e-3, 0.9), turn=30.0).follow(
+        circle, 0.0, np.ones(1), until=after_folds(1)
+    )
+    assert branch.failures[0].solution.status is Status.DIVERGED
+    assert "turned by" in branch.failures[0].solution.message
+    angles = [math.atan2(point.parameter, point.solution.x[0]) for point in branch.points]
+    assert max(np.diff(angles)) <= math.radians(30.0) + 1e-6
+
+
+def bratu(inner: int) -> Callable[[float], Algebraic]:
+    """-u'' = lambda exp u on (0, 1) by second differences on `inner` points."""
+    A = (2 * np.eye(inner) - np.eye(inner, k=1) - np.eye(inner, k=-1)) * (inner + 1.0) ** 2
+    return lambda p: Algebraic(
+        lambda u: (A @ u - p * np.exp(u)) / 8.0, lambda u: (A - p * np.diag(np.exp(u))) / 8.0
+    )
+
+
+def test_bratu_fold_converges_with_second_order_to_the_closed_form() -> None:
+    # u = 2 ln(cosh z / cosh((1 - 2 x) z)), lambda = 8 z^2 / cosh^2 z, largest where z tanh z = 1.
+    z = brentq(lambda z: z * math.tanh(z) - 1.0, 1.0, 2.0, xtol=1e-15)
+    exact, u_mid = 8.0 * (z / math.cosh(z)) ** 2, 2.0 * math.log(math.cosh(z))
+    assert exact == pytest.approx(3.513830719, abs=1e-9)
+    walk = arc(parameter_scale=3.0)
+    folds, mids = [], []
+    for inner in (15, 31, 63):
+        branch = walk.follow(bratu(inner), 0.0, np.zeros(inner), until=after_folds(1))
+        assert branch.converged
+        (fold,) = branch.limit_points
+        assert (fold.kind, fold.located) == ("maximum", True)
+        folds.append(fold.parameter)
+        mids.append(fold.x[inner // 2])
+    errors = np.array(folds) - exact
+    orders = np.log2(errors[:-1] / errors[1:])
+    assert orders == pytest.approx([2.0, 2.0], abs=0.02)
+    assert (4.0 * folds[2] - folds[1]) / 3.0 == pytest.approx(exact, abs=1e-6)
+    assert (4.0 * mids[2] - mids[1]) / 3.0 == pytest.approx(u_mid, abs=1e-5)
+
+
+HEIGHT = 0.3  # of the truss, over half its span 1; load in units of E A height^3 / length^3
+
+
+def truss(p: float) -> Algebraic:
+    """Two bars of a von Mises truss in Green strain: p = s (1 - s^2), s = 1 - w / height."""
+
+    def force(w: Vector) -> Vector:
+        s = 1.0 - w / HEIGHT
+        return s * (1.0 - s**2)
+
+    def stiffness(w: Vector) -> Vector:
+        return np.diag((3.0 * (1.0 - w / HEIGHT) ** 2 - 1.0) / HEIGHT)
+
+    return Algebraic(lambda w: force(w) - p, stiffness)
+
+
+def test_von_mises_truss_snaps_through_at_its_closed_form_limit_loads() -> None:
+    # dp/ds = 0 at s = +- 1/sqrt 3: p = +- 2 / (3 sqrt 3).
+    limit = 2.0 / (3.0 * math.sqrt(3.0))
+    walk = arc(x_scale=HEIGHT, parameter_scale=limit)
+    branch = walk.follow(truss, 0.0, np.zeros(1), within=(-2.0, 0.75))
+    assert branch.converged
+    up, down = branch.limit_points
+    assert [up.kind, down.kind] == ["maximum", "minimum"]
+    assert [up.parameter, down.parameter] == pytest.approx([limit, -limit], rel=1e-8)
+    sway = HEIGHT / math.sqrt(3.0)
+    assert [up.x[0], down.x[0]] == pytest.approx([HEIGHT - sway, HEIGHT + sway], rel=1e-6)
+    assert branch.parameters[-1] == 0.75
+    s = 1.0 - branch.last.x[0] / HEIGHT
+    assert s < -1.0  # snapped through and in tension
+    assert s * (1.0 - s**2) == pytest.approx(0.75, abs=1e-8)
+    deflections = [point.solution.x[0] for point in branch.points]
+    assert (np.diff(deflections) > 0.0).all()
+
+
+def quadratic_order(derivative: Callable[[float, Vector], Vector] | None) -> float:
+    """Exponent of the last residual norms of the longest corrector on the Bratu path."""
+    walk = arc(parameter_scale=3.0, steps=StepRule(0.6, 0.6, 0.6), turn=60.0, max_points=3)
+    branch = walk.follow(bratu(15), 0.0, np.zeros(15), derivative=derivative)
+    norms = branch.points[1].solution.residual_norms
+    a, b, c = [norm for norm in norms if norm > 1e-12][-3:]
+    return math.log(c / b) / math.log(b / a)
+
+
+def test_corrector_is_quadratic_only_with_the_right_parameter_derivative() -> None:
+    assert quadratic_order(lambda p, u: -np.exp(u) / 8.0) == pytest.approx(2.0, abs=0.3)
+    assert quadratic_order(None) == pytest.approx(2.0, abs=0.3)
+    assert quadratic_order(lambda p, u: -1.1 * np.exp(u) / 8.0) == pytest.approx(1.0, abs=0.2)
+
+
+def test_start_on_a_limit_point_is_singular() -> None:
+    branch = arc().follow(circle, 1.0, np.zeros(1))
+    assert branch.status is Status.SINGULAR
+    assert branch.points == ()
+    assert "no tangent" in branch.message
+
+
+def test_path_that_ends_is_reported_with_the_parameter_reached() -> None:
+    def wall(p: float) -> Algebraic:
+        return Algebraic(
+            lambda x: np.where(x > 1.0, np.nan, x - p), lambda x: np.eye(1), lambda x, dx: 1.0
+        )
+
+    branch = arc(name="load factor").follow(wall, 0.0, np.zeros(1), within=(0.0, 2.0))
+    assert branch.status is Status.STEP_TOO_SMALL
+    reached = branch.parameters[-1]
+    assert 0.0 <= 1.0 - reached < 1e-3
+    assert f"reached load factor = {reached:.9g};" in branch.message
+    assert branch.failures[-1].solution.status is Status.NOT_FINITE
+
+
+@pytest.mark.parametrize(
+    ("within", "status"),
+    [((-math.inf, math.inf), Status.CONVERGED), ((-2.0, 2.0), Status.MAX_ITERATIONS)],
+)
+def test_max_points_is_a_failure_only_if_another_end_was_asked_for(
+    within: tuple[float, float], status: Status
+) -> None:
+    branch = arc(max_points=5).follow(circle, 0.0, np.ones(1), within=within)
+    assert (len(branch.points), branch.status) == (5, status)
+
+
+def test_arc_length_forgets_vectors_and_reports_points_too() -> None:
+    met: list[float] = []
+    branch = arc(keep_all=False, max_points=6).follow(
+        circle, 0.0, np.ones(1), on_point=lambda point: met.append(point.parameter)
+    )
+    assert [point.solution.x.size for point in branch.points] == [0, 0, 0, 0, 1, 1]
+    assert met == list(branch.parameters)
+
+
+def test_start_out_of_bounds_is_rejected() -> None:
+    with pytest.raises(ValueError, match="outside"):
+        arc().follow(circle, 0.0, np.ones(1), within=(0.5, 1.0))
