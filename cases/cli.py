@@ -1,0 +1,64 @@
+"""`softehl run` and `softehl reproduce`.  What is heavy is imported when a command needs it."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("case", metavar="CASE")
+@click.option(
+    "--set",
+    "assignments",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Change a parameter; VALUE is a TOML value, a bare word is a string. Repeatable.",
+)
+@click.option(
+    "--out",
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Folder for the files, results/<case> if left out. An earlier run in it is replaced.",
+)
+@click.option("--resume", is_flag=True, help="Keep the speeds that DIR has and run the others.")
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(min=1),
+    default=1,
+    help="With N > 1 the two strokes run side by side, in a process each.",
+)
+@click.option("--quiet", is_flag=True, help="No progress and no table.")
+def run(
+    case: str,
+    assignments: tuple[str, ...],
+    folder: Path | None,
+    resume: bool,
+    jobs: int,
+    quiet: bool,
+) -> int:
+    """Run CASE, a TOML file or the name of a case that ships (oring).
+
+    Writes curve.csv, profiles, sections (.vtu), plots and run.json to DIR, each state as soon as it
+    is there. Exit code: 0 done, 2 bad input, 3 not converged (what was reached is saved).
+    """
+    from cases.case_file import read_case
+    from cases.session import run_case
+
+    read = read_case(case, assignments)
+    target = Path("results", read.name) if folder is None else folder
+    return run_case(read, target, resume=resume, jobs=jobs, quiet=quiet)
+
+
+@click.command()
+@click.argument("items", metavar="[ITEM]...", nargs=-1)
+@click.option("--density", metavar="N", type=click.IntRange(min=1), help="Mesh density.")
+@click.option("--out", "folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--resume", is_flag=True, help="Keep what DIR has and run the rest.")
+@click.option("--jobs", metavar="N", type=click.IntRange(min=1), default=1)
+def reproduce(
+    items: tuple[str, ...], density: int | None, folder: Path | None, resume: bool, jobs: int
+) -> int:
+    """Reproduce tables and figures of the paper (not available yet)."""
+    raise click.UsageError("reproduce: not available yet; allowed: softehl run oring")

@@ -1,0 +1,174 @@
+"""The reciprocating O-ring seal of section 5: build, follow the path, report every state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cases.observer import FilmState, Observer, Outcome, StageRecord
+from cases.oring_parameters import ORing
+from cases.oring_path import (
+    Film,
+    PathSettings,
+    Stroke,
+    contact_problem,
+    film_problem,
+    load_stage,
+    release_stage,
+    shear_stage,
+    speed_stage,
+    squeeze_stage,
+    weight_stage,
+)
+from cases.oring_results import Verdict, contact_state, film_numbers, film_state
+from cases.oring_section import OringSection, build_section
+from cases.stages import Stage, Walker
+from runtime.continuation import Branch, Point
+from runtime.solution import Status
+
+Array = NDArray[np.float64]
+
+FOLD = (
+    "the path ends or turns back there, as it does when the film collapses on a mesh that is too "
+    "coarse: use a finer mesh (larger density)"
+)
+
+
+class _Stopped(Exception):  # noqa: N818 (control flow inside this module)
+    """A stage did not reach its end; carries its branch."""
+
+    def __init__(self, stage: Stage, branch: Branch) -> None:
+        super().__init__(stage.name)
+        self.stage, self.branch = stage, branch
+
+    @property
+    def message(self) -> str:
+        """How far the stage came, in its own units, why no further, and what may help."""
+        stage, branch = self.stage, self.branch
+        goal = f"{stage.name} {stage.shown(stage.stop):.5g}"
+        if not branch.points:
+            return f"{goal} was not reached, not even the start: {branch.message}"
+        reached = stage.shown(branch.points[-1].parameter)
+        return f"{goal} was not reached, only {reached:.5g}"
+
+    @property
+    def advice(self) -> str:
+        """What may help, for a path that ends on the way."""
+        return FOLD if self.branch.points else self.branch.status.advice
+
+
+@dataclass
+class _Run:
+    """A run in progress: the only thing in this case that changes."""
+
+    section: OringSection
+    observer: Observer
+    settings: PathSettings
+    walker: Walker
+    records: list[StageRecord] = field(default_factory=list)
+    states: list[FilmState] = field(default_factory=list)
+    stopped: list[tuple[Status, str]] = field(default_factory=list)
+
+    def walk(self, stage: Stage, x: Array) -> Array:
+        """Unknowns at the end of a stage; raises _Stopped if it is not reached."""
+        branch, record = self.walker.walk(stage, x, self.observer)
+        self.records.append(record)
+        if not branch.converged:
+            raise _Stopped(stage, branch)
+        return branch.last.x
+
+    def contact(self) -> Array:
+        """First stage, shared by both strokes."""
+        p_s = self.section.parameters.sealed_pressure
+        x = self.walk(squeeze_stage(self.section, self.settings), self.section.at_rest())
+        if p_s > 0.0:
+            x = self.walk(load_stage(self.section, self.settings, p_s), x)
+        if self.section.parameters.rotation == "free":
+            x = self.walk(release_stage(self.section, self.settings, p_s, x), x)
+        problem = contact_problem(self.section, self.settings, p_s)
+        self.observer.contact_state(contact_state(self.section, problem, p_s, x))
+        return x
+
+    def stroke(self, stroke: Stroke, x: Array) -> None:
+        """Second and third stage of one stroke, from the contact state x."""
+        section, settings, p = self.section, self.settings, self.section.parameters
+        speed = max(settings.start_speed, *p.speeds)
+        multipliers = x[section.layout.part("rod")].copy()
+        shear = 1.0 if p.shear_traction else 0.0
+        film = Film(p.sealed_pressure, stroke, speed, multipliers, shear=shear)
+        reference = contact_state(
+            section, contact_problem(section, settings, p.sealed_pressure), p.sealed_pressure, x
+        ).p_max_MPa
+        x = self.walk(weight_stage(section, settings, film), x)
+        if p.shear_traction:
+            x = self.walk(shear_stage(section, settings, film), x)
+        judge = _Judge(self, Verdict(reference))
+        self.walk(speed_stage(section, settings, film, p.speeds, judge), x)
+
+
+@dataclass
+class _Judge:
+    """Looks at every step of falling speed; a requested speed becomes a state."""
+
+    run: _Run
+    verdict: Verdict
+
+    def __call__(self, film: Film, point: Point) -> None:
+        run, x = self.run, point.solution.x
+        problem = film_problem(run.section, run.settings, film)
+        self.verdict = self.verdict.after(film_numbers(run.section, problem, film, x))
+        if film.speed not in run.section.parameters.speeds:
+            return
+        iterations = point.solution.iterations
+        state = film_state(run.section, problem, film, x, self.verdict, iterations)
+        run.states.append(state)
+        run.observer.film_state(state)
+
+
+def run(
+    parameters: ORing,
+    observer: Observer,
+    settings: PathSettings | None = None,
+    walker: Walker | None = None,
+) -> Outcome:
+    """Solve the O-ring and report to the observer; failure is in the outcome's status.
+
+    Raises NotImplementedError for reynolds = "dg".
+    """
+    if parameters.reynolds != "fe":
+        raise NotImplementedError('reynolds = "dg" is not available yet: use "fe"')
+    section = build_section(parameters)
+    progress = _Run(section, observer, settings or PathSettings(), walker or Walker())
+    strokes: tuple[Stroke, ...] = ("out", "in")
+    wanted = strokes if parameters.stroke == "both" else (parameters.stroke,)
+    try:
+        x = progress.contact()
+    except _Stopped as stop:
+        progress.stopped.append(_explain(stop, "contact"))
+        return _outcome(progress)
+    for stroke in wanted:
+        try:
+            progress.stroke(stroke, x)
+        except _Stopped as stop:
+            progress.stopped.append(_explain(stop, f"stroke {stroke}"))
+    return _outcome(progress)
+
+
+def _explain(stop: _Stopped, where: str) -> tuple[Status, str]:
+    return stop.branch.status, f"{where}: {stop.message}; {stop.advice}"
+
+
+def _outcome(progress: _Run) -> Outcome:
+    section, stopped = progress.section, progress.stopped
+    blocks = section.problem.assembler.blocks
+    return Outcome(
+        states=tuple(progress.states),
+        status=stopped[0][0] if stopped else Status.CONVERGED,
+        message="; ".join(message for _, message in stopped) or "all requested states converged",
+        unknowns_total=section.layout.total,
+        unknowns_pressure=section.layout.count("pressure"),
+        kernel_signatures={b.kernel.name: b.kernel.signature for b in blocks},
+        stages=tuple(progress.records),
+    )

@@ -1,0 +1,11 @@
+"""The O-ring in the groove and on the arc that the numbers of the tests belong to."""
+
+from typing import Any
+
+from cases.oring_parameters import ORing
+
+
+def oring(**changes: Any) -> ORing:
+    """The O-ring with other values for some keys."""
+    values: dict[str, Any] = {"groove_width": 3.74, "arc_start": -34.0, "arc_end": 43.0, **changes}
+    return ORing(**values)

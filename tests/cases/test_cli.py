@@ -1,0 +1,494 @@
+"""The command line: what it refuses, what it writes, what survives, what is resumed.
+
+The solver is replaced by one that answers h* = sqrt(U)/10 at once; see `solve`.
+"""
+
+import json
+import multiprocessing
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import softehl
+from cases import report
+from cases.case_file import Case, Solve
+from cases.observer import (
+    COLLAPSED,
+    OK,
+    ContactState,
+    FilmState,
+    Observer,
+    Outcome,
+    Profile,
+    Section,
+    StageRecord,
+)
+from cases.oring_parameters import ORing
+from cases.record import RunRecord
+from runtime.kernels import MissingKernelsError
+from runtime.solution import Status
+
+HEADER = (
+    "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_min_um,p_max_MPa,pressure_jump_max_MPa,"
+    "rod_friction_N,leak_rate_mm3_s,contact_start_mm,contact_end_mm,newton_iterations,"
+    "flux_variation,moment_N_mm,contact_p_max_MPa,verdict"
+)
+FAST = ("--set", "speeds=[400, 100]")
+PLOTS = {"curve.png", "curve.svg", "profiles.png", "profiles.svg"}
+FILES = {
+    *("run.json", "curve.csv"),
+    *("contact_1.csv", "contact_1.vtu"),
+    *(f"profile_1_{u}.csv" for u in (400, 100, -400, -100)),
+    *(f"section_1_{u}.vtu" for u in (400, 100, -400, -100)),
+}
+
+
+# --- a case that answers at once ---------------------------------------------------------------
+
+
+def section() -> Section:
+    points = np.array([[0.0, 25.0], [1.0, 25.0], [1.0, 26.0], [0.0, 26.0]])
+    return Section(points, np.array([[0, 1, 2, 3]]), {}, {"sigma_zz": np.array([-1.0])})
+
+
+def film_state(parameters: ORing, speed: float, verdict: str = OK) -> FilmState:
+    x = np.linspace(-1.0, 1.0, 5)
+    h_star = abs(speed) ** 0.5 / 10
+    return FilmState(
+        sealed_pressure=parameters.sealed_pressure,
+        rod_speed=speed,
+        h_star_um=h_star,
+        h_min_um=0.8 * h_star,
+        p_max_MPa=4.0,
+        pressure_jump_max_MPa=0.0,
+        rod_friction_N=3.0,
+        leak_rate_mm3_s=speed * h_star,
+        contact_start_mm=-0.9,
+        contact_end_mm=0.8,
+        newton_iterations=5,
+        flux_variation=1e-12,
+        moment_N_mm=7.0,
+        contact_p_max_MPa=4.1,
+        verdict=verdict,
+        advice="" if verdict == OK else "Use a finer mesh.",
+        profile=Profile(x, h_star + 50 * x**2, 4 - 4 * x**2, 0.01 * x, h_star * speed + 0 * x),
+        section=section(),
+    )
+
+
+def solve(parameters: ORing, observer: Observer) -> Outcome:
+    """Every requested state, fast ones first."""
+    p = parameters.sealed_pressure
+    x = np.array([-1.0, 0.0, 1.0])
+    observer.stage("contact", sealed_pressure=p, stroke=parameters.stroke, steps=1)
+    observer.step(label="load", parameter=1.0, iterations=3, residuals=(1.0, 1e-12), fraction=1.0)
+    observer.contact_state(ContactState(p, 4.1, -0.9, 0.8, x, 4.1 - x**2, section()))
+    strokes = {"out": [1.0], "in": [-1.0], "both": [1.0, -1.0]}[parameters.stroke]
+    states = []
+    for sign in strokes:
+        observer.stage("speed", sealed_pressure=p, stroke="out" if sign > 0 else "in", steps=None)
+        for speed in sorted(parameters.speeds, reverse=True):
+            state = film_state(parameters, sign * speed)
+            observer.step(label="U", parameter=speed, iterations=4, residuals=(), fraction=None)
+            observer.film_state(state)
+            states.append(state)
+    return outcome(*states)
+
+
+def outcome(*states: FilmState, status: Status = Status.CONVERGED, message: str = "") -> Outcome:
+    stage = StageRecord("contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), 1.0, "out")
+    return Outcome(states, status, message, 1234, 109, {"film": "abc"}, (stage,))
+
+
+def solve_and_stop(parameters: ORing, observer: Observer) -> Outcome:
+    """One state, then no convergence."""
+    state = film_state(parameters, max(parameters.speeds))
+    observer.film_state(state)
+    return outcome(state, status=Status.STEP_TOO_SMALL, message="stopped at\nU = 250 mm/s")
+
+
+def solve_and_collapse(parameters: ORing, observer: Observer) -> Outcome:
+    """A good state and a collapsed one."""
+    fast, slow = max(parameters.speeds), min(parameters.speeds)
+    states = [film_state(parameters, fast), film_state(parameters, slow, COLLAPSED)]
+    for state in states:
+        observer.film_state(state)
+    return outcome(*states)
+
+
+def solve_and_forget(parameters: ORing, observer: Observer) -> Outcome:
+    """Claims convergence without having reached everything."""
+    observer.film_state(film_state(parameters, max(parameters.speeds)))
+    return outcome()
+
+
+def solve_and_break(parameters: ORing, observer: Observer) -> Outcome:
+    """One state, then an error in the program."""
+    observer.stage("speed", sealed_pressure=1.0, stroke="out", steps=None)
+    observer.step(label="U", parameter=400.0, iterations=4, residuals=(1.0,), fraction=None)
+    observer.film_state(film_state(parameters, max(parameters.speeds)))
+    raise ArithmeticError("broken")
+
+
+def solve_and_die(parameters: ORing, observer: Observer) -> Outcome:
+    """One state, then the end of the process without any clean-up."""
+    observer.film_state(film_state(parameters, max(parameters.speeds)))
+    os._exit(9)
+
+
+def solve_without_kernels(parameters: ORing, observer: Observer) -> Outcome:
+    raise MissingKernelsError("no compiled kernels;\nrun `python -m codegen.build`")
+
+
+# --- helpers -----------------------------------------------------------------------------------
+
+Result = tuple[int, list[str], list[str]]
+Invoke = Callable[..., Result]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def invoke(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Invoke:
+    """Run the command line with a fake case; exit code, lines of stdout, lines of stderr.
+
+    Plots are only drawn where they are asked for: they take longer than the rest together.
+    """
+
+    def run(*arguments: str, solver: Solve = solve, plots: bool = False) -> Result:
+        monkeypatch.setattr(Case, "load_solve", lambda _: solver)
+        if not plots:
+            monkeypatch.setattr(report, "write_plots", lambda *_: None)
+        code = softehl.main(arguments)
+        captured = capfd.readouterr()
+        return code, captured.out.splitlines(), captured.err.splitlines()
+
+    return run
+
+
+def rows(folder: Path) -> list[list[str]]:
+    header, *lines = (folder / "curve.csv").read_text().splitlines()
+    assert header == HEADER
+    return [line.split(",") for line in lines]
+
+
+def speeds(folder: Path) -> list[float]:
+    return [float(row[1]) for row in rows(folder)]
+
+
+def run_json(folder: Path) -> dict[str, Any]:
+    content = json.loads((folder / "run.json").read_text())
+    assert isinstance(content, dict)
+    return content
+
+
+def names(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+# --- bad input ---------------------------------------------------------------------------------
+
+BAD = {
+    "unknown key": (["oring", "--set", "densty=4"], "did you mean 'density'"),
+    "wrong type": (["oring", "--set", "sealed_pressure=high"], 'sealed_pressure = "high"'),
+    "negative pressure": (["oring", "--set", "sealed_pressure=-1"], "sealed_pressure = -1"),
+    "nan pressure": (["oring", "--set", "sealed_pressure=nan"], "sealed_pressure = NaN"),
+    "no speeds": (["oring", "--set", "speeds=[]"], "speeds = []"),
+    "zero speed": (["oring", "--set", "speeds=[100, 0]"], "speeds = [100, 0]"),
+    "negative speed": (["oring", "--set", "speeds=[-100]"], "speeds = [-100]"),
+    "speed twice": (["oring", "--set", "speeds=[100, 100.0]"], "a speed is given twice"),
+    "density": (["oring", "--set", "density=3"], "allowed: mesh density d"),
+    "bool for number": (["oring", "--set", "mu_1=true"], "mu_1 = true"),
+    "no TOML value": (["oring", "--set", "speeds=[100"], "not a TOML value"),
+    "no value": (["oring", "--set", "density"], "KEY=VALUE"),
+    "geometry": (["oring", "--set", "rod_diameter=40"], "gap between rod and housing"),
+    "not available": (["oring", "--set", "reynolds=dg"], "not available yet"),
+    "unknown case": (["o-ring"], "did you mean 'oring'"),
+    "missing file": (["missing.toml"], "no case or file 'missing.toml'"),
+    "folder for file": (["."], "cannot read the case file"),
+    "broken file": (["broken.toml"], "broken.toml: not a TOML file"),
+    "binary file": (["binary.toml"], "binary.toml: not a TOML file"),
+    "file without case": (["nameless.toml"], 'allowed: case = "oring"'),
+    "file with unknown case": (["other.toml"], 'case = "piston"'),
+    "file with unknown key": (["typo.toml"], "typo.toml: unknown key 'speed'"),
+    "file with code": (["code.toml"], r"sealed_pressure = \"__import__('os')"),
+    "file with a table": (["nested.toml"], "density = {"),
+    "out is a file": (["oring", "--out", "typo.toml"], "is not a folder"),
+    "out below a file": (["oring", "--out", "typo.toml/deep/er"], "is not a folder"),
+    "out cannot be": (["oring", "--out", "/proc/softehl/oring"], "/proc"),
+    "unknown option": (["oring", "--dens", "4"], "--dens"),
+    "jobs": (["oring", "--jobs", "0"], "--jobs"),
+    "no case": ([], "CASE"),
+}
+CASE_FILES: Mapping[str, bytes] = {
+    "broken.toml": b'case = "oring\ndensity = 4',
+    "binary.toml": b"\xff\xfe\x00",
+    "nameless.toml": b"density = 4",
+    "other.toml": b'case = "piston"',
+    "typo.toml": b'case = "oring"\nspeed = 3',
+    "code.toml": b'case = "oring"\n'
+    b"sealed_pressure = \"__import__('os').system('touch ran') or 1.0\"",
+    "nested.toml": b'case = "oring"\n[density]\nvalue = 4',
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_bad_input(what: str, here: Path, invoke: Invoke) -> None:
+    for name, content in CASE_FILES.items():
+        (here / name).write_bytes(content)
+    arguments, words = BAD[what]
+    code, out, err = invoke("run", *arguments)
+    assert (code, out, len(err)) == (2, [], 1)
+    assert err[0].startswith("softehl: ")
+    assert words.replace("\\", "") in err[0].replace("\\", "")
+    assert names(here) == set(CASE_FILES)
+    assert [path for path in here.iterdir() if path.is_dir()] == []
+
+
+def test_reproduce_is_not_there_yet(here: Path, invoke: Invoke) -> None:
+    code, out, err = invoke("reproduce", "table2", "--density", "4")
+    assert (code, out, len(err)) == (2, [], 1)
+    assert "not available yet" in err[0]
+
+
+def test_no_kernels(here: Path, invoke: Invoke) -> None:
+    code, out, err = invoke("run", "oring", solver=solve_without_kernels)
+    assert (code, out) == (2, [])
+    assert err == ["softehl: no compiled kernels; run `python -m codegen.build`"]
+    assert list(here.iterdir()) == []
+
+
+# --- a run -------------------------------------------------------------------------------------
+
+
+def test_a_run_writes_its_files(here: Path, invoke: Invoke) -> None:
+    code, out, err = invoke("run", "oring", *FAST, plots=True)
+    folder = here / "results" / "oring"
+    assert code == 0
+    assert names(folder) == FILES | PLOTS
+    assert speeds(folder) == [400.0, 100.0, -400.0, -100.0]
+    assert rows(folder)[0][2:4] == ["2", "1.6"]
+    assert {row[-1] for row in rows(folder)} == {OK}
+    profile = (folder / "profile_1_-100.csv").read_text().splitlines()
+    assert profile[0] == "x_mm,h_um,p_MPa,tau_MPa,flux_mm2_s"
+    assert len(profile) == 6
+    assert any("h*" in line and "friction" in line for line in out)
+    assert sum("ok" in line for line in out) == 4
+    assert out[-1] == "written to results/oring"
+    assert err[0] == "contact, p_s = 1 MPa, stroke both"
+
+
+def test_run_json(here: Path, invoke: Invoke) -> None:
+    assert invoke("run", "oring", *FAST, "--set", "density=4", "--out", "a")[0] == 0
+    content = run_json(here / "a")
+    parameters = ORing(density=4, speeds=(400.0, 100.0)).model_dump()
+    assert content["parameters"] == {**parameters, "speeds": [400.0, 100.0]}
+    assert (content["case"], content["status"]) == ("oring", "converged")
+    assert content["kernels"] == {"film": "abc"}
+    assert content["unknowns"] == {"total": 1234, "pressure": 109}
+    assert {"python", "numpy", "scipy", "softehl"} <= set(content["versions"])
+    assert content["stages"] == [
+        {
+            "name": "contact",
+            "sealed_pressure_MPa": 1.0,
+            "stroke": "out",
+            "seconds": 0.5,
+            "factorisations": 4,
+            "iterations": 3,
+            "steps": [{"parameter": 1.0, "residuals": [1.0, 1e-2, 1e-5]}],
+        }
+    ]
+    assert len(content["states"]) == 4
+    listed = {file for state in content["states"] for file in state["files"]}
+    assert listed <= names(here / "a")
+
+
+def test_quiet(here: Path, invoke: Invoke) -> None:
+    assert invoke("run", "oring", *FAST, "--quiet") == (0, [], [])
+
+
+def test_plots_are_the_same_every_time(here: Path, invoke: Invoke) -> None:
+    invoke("run", "oring", *FAST, "--out", "a", plots=True)
+    invoke("run", "oring", *FAST, "--out", "b", plots=True)
+    for name in PLOTS:
+        assert (here / "a" / name).read_bytes() == (here / "b" / name).read_bytes()
+
+
+def test_strokes_side_by_side(here: Path, invoke: Invoke) -> None:
+    code, _, err = invoke("run", "oring", *FAST, "--jobs", "2")
+    assert code == 0, err
+    assert names(here / "results" / "oring") == FILES
+    assert speeds(here / "results" / "oring") == [400.0, 100.0, -400.0, -100.0]
+
+
+def test_side_by_side_kernel_error(here: Path, invoke: Invoke) -> None:
+    code, _, err = invoke("run", "oring", "--jobs", "2", solver=solve_without_kernels)
+    assert (code, len(err)) == (2, 1)
+    assert list(here.iterdir()) == []
+
+
+def test_side_by_side_death(here: Path, invoke: Invoke) -> None:
+    with pytest.raises(RuntimeError, match="ended without an outcome"):
+        invoke("run", "oring", *FAST, "--jobs", "2", solver=solve_and_die)
+
+
+def test_not_converged(here: Path, invoke: Invoke) -> None:
+    code, out, err = invoke("run", "oring", *FAST, solver=solve_and_stop)
+    folder = here / "results" / "oring"
+    assert code == 3
+    assert speeds(folder) == [400.0]
+    assert run_json(folder)["status"] == "not converged"
+    assert err[-1].startswith("softehl: not converged: continuation step too small: stopped at U =")
+    assert "not reached: U = +100 mm/s, U = -400 mm/s, U = -100 mm/s" in err[-1]
+    assert "reached and saved in results/oring: U = +400 mm/s" in err[-1]
+    assert any("+400" in line for line in out)
+
+
+def test_a_missing_state_is_noticed(here: Path, invoke: Invoke) -> None:
+    code, _, err = invoke("run", "oring", *FAST, "--set", "stroke=out", solver=solve_and_forget)
+    assert code == 3
+    assert "not reached: U = +100 mm/s" in err[-1]
+
+
+def test_a_collapsed_film_is_no_result(here: Path, invoke: Invoke) -> None:
+    arguments = ("run", "oring", *FAST, "--set", "stroke=out")
+    code, out, err = invoke(*arguments, solver=solve_and_collapse)
+    folder = here / "results" / "oring"
+    assert code == 3
+    assert speeds(folder) == [400.0]
+    assert speeds(folder / "rejected") == [100.0]
+    assert not (folder / "profile_1_100.csv").exists()
+    flagged = [line for line in out if "COLLAPSED" in line]
+    assert len(flagged) == 1
+    assert flagged[0].split() == ["+100", *"-------", "COLLAPSED"]
+    assert "collapsed film, not a result: U = +100 mm/s. Use a finer mesh." in err[-1]
+    assert [state["verdict"] for state in run_json(folder)["rejected"]] == [COLLAPSED]
+    assert invoke(*arguments)[0] == 0
+    assert names(folder / "rejected") == set()
+
+
+# --- killed and resumed ------------------------------------------------------------------------
+
+
+def test_an_error_leaves_what_was_reached(here: Path, invoke: Invoke) -> None:
+    with pytest.raises(ArithmeticError, match="broken"):
+        invoke("run", "oring", *FAST, solver=solve_and_break)
+    folder = here / "results" / "oring"
+    assert speeds(folder) == [400.0]
+    content = run_json(folder)
+    assert content["status"] == "interrupted"
+    assert content["message"] == "ArithmeticError: broken"
+    assert content["stages"][0]["steps"] == [{"parameter": 400.0, "residuals": [1.0]}]
+    assert names(folder) == {"run.json", "curve.csv", "profile_1_400.csv", "section_1_400.vtu"}
+
+
+def run_and_die(folder: str) -> None:
+    """Body of a process that is ended in the middle of a run."""
+    Case.load_solve = lambda self: solve_and_die  # type: ignore[method-assign]
+    softehl.main(["run", "oring", *FAST, "--out", folder])
+
+
+def test_a_killed_run_is_resumed(here: Path, invoke: Invoke) -> None:
+    folder = here / "killed"
+    process = multiprocessing.get_context("spawn").Process(target=run_and_die, args=(str(folder),))
+    process.start()
+    process.join()
+    assert process.exitcode == 9
+    assert speeds(folder) == [400.0]
+    assert run_json(folder)["status"] == "running"
+    asked: list[tuple[str, tuple[float, ...]]] = []
+
+    def counting(parameters: ORing, observer: Observer) -> Outcome:
+        asked.append((parameters.stroke, parameters.speeds))
+        return solve(parameters, observer)
+
+    arguments = ("run", "oring", *FAST, "--out", "killed", "--resume")
+    assert invoke(*arguments, solver=counting)[0] == 0
+    assert asked == [("out", (100.0,)), ("in", (400.0, 100.0))]
+    assert speeds(folder) == [400.0, 100.0, -400.0, -100.0]
+    assert run_json(folder)["status"] == "converged"
+    assert names(folder) == FILES
+    stages = run_json(folder)["stages"]
+
+    code, out, _ = invoke(*arguments, solver=counting)
+    assert code == 0
+    assert len(asked) == 2
+    assert sum("ok" in line for line in out) == 4
+    assert run_json(folder)["stages"] == stages
+
+
+def test_resume_takes_more_speeds(here: Path, invoke: Invoke) -> None:
+    invoke("run", "oring", *FAST, "--set", "stroke=out", "--out", "a")
+    code, _, _ = invoke("run", "oring", "--set", "speeds=[25]", "--out", "a", "--resume")
+    assert code == 0
+    assert speeds(here / "a") == [400.0, 100.0, 25.0, -25.0]
+
+
+def test_resume_refuses_other_parameters(here: Path, invoke: Invoke) -> None:
+    invoke("run", "oring", *FAST, "--out", "a")
+    before = {name: (here / "a" / name).read_bytes() for name in names(here / "a")}
+    code, _, err = invoke("run", "oring", *FAST, "--set", "density=4", "--out", "a", "--resume")
+    assert (code, len(err)) == (2, 1)
+    assert "density = 2, now 4" in err[0]
+    assert before == {name: (here / "a" / name).read_bytes() for name in names(here / "a")}
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("run.json", "{"),
+        ("run.json", "[]"),
+        ("curve.csv", "a,b\n"),
+        ("curve.csv", HEADER + "\n1\n"),
+    ],
+)
+def test_resume_refuses_what_it_cannot_read(
+    name: str, content: str, here: Path, invoke: Invoke
+) -> None:
+    invoke("run", "oring", *FAST, "--out", "a")
+    (here / "a" / name).write_text(content)
+    code, _, err = invoke("run", "oring", *FAST, "--out", "a", "--resume")
+    assert (code, len(err)) == (2, 1)
+    assert "cannot read the earlier run" in err[0]
+
+
+def test_resume_of_nothing_is_a_run(here: Path, invoke: Invoke) -> None:
+    assert invoke("run", "oring", *FAST, "--resume")[0] == 0
+    assert names(here / "results" / "oring") == FILES
+
+
+def test_a_new_run_replaces_the_earlier_one(here: Path, invoke: Invoke) -> None:
+    invoke("run", "oring", "--set", "speeds=[25]", "--out", "a")
+    (here / "a" / "notes.txt").write_text("mine")
+    assert invoke("run", "oring", *FAST, "--out", "a")[0] == 0
+    assert names(here / "a") == {*FILES, "notes.txt"}
+
+
+def test_a_foreign_folder_keeps_its_files(here: Path, invoke: Invoke) -> None:
+    (here / "a").mkdir()
+    (here / "a" / "profile_of_mine.csv").write_text("mine")
+    assert invoke("run", "oring", *FAST, "--out", "a")[0] == 0
+    assert (here / "a" / "profile_of_mine.csv").read_text() == "mine"
+
+
+def test_a_full_disk_is_one_line(
+    here: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(RunRecord, "film", full)
+    code, _, err = invoke("run", "oring", *FAST, "--quiet")
+    assert (code, len(err)) == (2, 1)
+    assert "cannot write 'results/oring': No space left on device" in err[0]
+    assert run_json(here / "results" / "oring")["status"] == "interrupted"

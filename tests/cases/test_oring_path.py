@@ -1,0 +1,169 @@
+"""The O-ring solved: convergence, flux, both strokes, p_s = 0, labelled collapse, named failure."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from cases.observer import COLLAPSED, OK, ContactState, FilmState, Outcome, Silent
+from cases.oring import run
+from runtime.solution import Status
+from tests.cases.oring_cases import oring
+
+
+class Recorder(Silent):
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.contacts: list[ContactState] = []
+        self.films: list[FilmState] = []
+        self.stages: list[str] = []
+        self.fractions: list[float] = []
+
+    def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
+        self.stages.append(f"{name} {stroke}")
+
+    def step(
+        self,
+        *,
+        label: str,
+        parameter: float,
+        iterations: int,
+        residuals: Sequence[float],
+        fraction: float | None,
+    ) -> None:
+        assert fraction is not None
+        self.fractions.append(fraction)
+
+    def contact_state(self, state: ContactState) -> None:
+        self.contacts.append(state)
+
+    def film_state(self, state: FilmState) -> None:
+        self.films.append(state)
+
+
+@pytest.fixture(scope="module")
+def default() -> tuple[Outcome, Recorder]:
+    """Density 2, m_p = 4, p_s = 1, both strokes: the run of the README."""
+    recorder = Recorder()
+    speeds = (1600.0, 800.0, 400.0, 200.0, 100.0)
+    return run(oring(density=2, speeds=speeds), recorder), recorder
+
+
+def test_every_requested_state_converges_and_is_told(default: tuple[Outcome, Recorder]) -> None:
+    outcome, recorder = default
+    assert outcome.converged, outcome.message
+    speeds = [s.rod_speed for s in outcome.states]
+    assert speeds == [1600, 800, 400, 200, 100, -1600, -800, -400, -200, -100]
+    assert recorder.films == list(outcome.states)
+    assert len(recorder.contacts) == 1  # shared by both strokes
+    assert recorder.stages.count("falling speed out") == 1
+    assert min(recorder.fractions) == 0.0
+    assert max(recorder.fractions) == 1.0
+    assert {str(s.verdict) for s in outcome.states} == {OK}
+
+
+def test_cost(default: tuple[Outcome, Recorder]) -> None:
+    outcome, _ = default
+    assert sum(stage.factorisations for stage in outcome.stages) < 400
+
+
+def test_newton_ends_quadratically_in_every_stage(default: tuple[Outcome, Recorder]) -> None:
+    outcome, _ = default
+    checked = 0
+    for stage in outcome.stages:
+        for norms in stage.residual_histories:
+            above = [k for k, norm in enumerate(norms) if norm > 1e-6]
+            if not above or len(norms) == 1:
+                continue
+            last = above[-1]
+            # the exponent of the last step before rounding; 2 in theory
+            floor = 1e-8
+            assert norms[last + 1] <= max(floor, norms[last] ** 1.5), (stage.name, norms)
+            checked += 1
+    assert checked > 40
+
+
+def test_flux_is_constant_outside_cavitation(default: tuple[Outcome, Recorder]) -> None:
+    outcome, _ = default
+    assert max(s.flux_variation for s in outcome.states) < 1e-6
+
+
+def test_film_thickness_against_a_fine_mesh(default: tuple[Outcome, Recorder]) -> None:
+    outcome, _ = default
+    fine = {1600: 3.1815, 400: 1.3723, 100: 0.5913, -1600: 2.628, -400: 1.131, -100: 0.489}
+    for state in outcome.states:
+        if state.rod_speed in fine:
+            assert state.h_star_um == pytest.approx(fine[int(state.rod_speed)], rel=0.035)
+        assert 0.0 < state.h_min_um < state.h_star_um
+
+
+@pytest.mark.parametrize("first", [0, 5])
+def test_film_thickness_is_a_power_of_the_speed(
+    default: tuple[Outcome, Recorder], first: int
+) -> None:
+    states = default[0].states[first : first + 5]
+    h = [s.h_star_um for s in states]
+    exponents = np.log2(np.array(h[:-1]) / np.array(h[1:]))
+    assert exponents.min() > 0.5
+    assert exponents.max() < 0.7
+    friction = [abs(s.rod_friction_N) for s in states]
+    assert friction == sorted(friction, reverse=True)
+
+
+def test_leakage_pressure_and_contact_of_each_state(default: tuple[Outcome, Recorder]) -> None:
+    outcome, recorder = default
+    for state in outcome.states:
+        flux = 0.5 * state.rod_speed * state.h_star_um * 1e-3
+        assert state.leak_rate_mm3_s == pytest.approx(2 * math.pi * 25.0 * flux, rel=1e-12)
+        assert state.p_max_MPa == pytest.approx(recorder.contacts[0].p_max_MPa, rel=0.06)
+        assert state.contact_start_mm < recorder.contacts[0].contact_start_mm < 0.0
+        assert 1.0 < state.contact_end_mm < 1.15
+        # boundary conditions (15), seen at the quadrature points next to the ends
+        assert state.profile.p_MPa[[0, -1]] == pytest.approx([1.0, 0.0], abs=2e-3)
+
+
+def test_film_is_thick_at_both_ends_of_the_arc(default: tuple[Outcome, Recorder]) -> None:
+    for state in default[0].states:
+        assert state.profile.h_um[[0, -1]].min() > 100.0
+
+
+@pytest.mark.parametrize("p_s", [0.0, 0.5])
+def test_low_sealed_pressure_works_in_both_strokes(p_s: float) -> None:
+    speeds = (1600.0, 800.0)
+    outcome = run(oring(density=1, sealed_pressure=p_s, speeds=speeds), Recorder())
+    assert outcome.converged, outcome.message
+    assert [s.rod_speed for s in outcome.states] == [1600, 800, -1600, -800]
+    if p_s == 0.0:  # nearly symmetric about the middle of the groove
+        h = [s.h_star_um for s in outcome.states]
+        assert h[0] == pytest.approx(h[2], rel=0.02)
+
+
+def test_a_collapsed_film_is_labelled_and_the_end_of_the_path_named() -> None:
+    speeds = (1600.0, 400.0, 50.0)
+    parameters = oring(density=1, sealed_pressure=3.0, stroke="in", speeds=speeds)
+    outcome = run(parameters, Recorder())
+    slowest = outcome.states[-1]
+    assert slowest.verdict == COLLAPSED or not outcome.converged
+    if not outcome.converged:
+        assert outcome.status is Status.STEP_TOO_SMALL
+        assert "stroke in" in outcome.message
+        assert "finer mesh" in outcome.message
+    assert slowest.rod_speed == -1600.0 or slowest.verdict == COLLAPSED
+
+
+def test_shear_stress_can_be_switched_off() -> None:
+    states = [
+        run(oring(density=1, stroke="out", speeds=(1600.0,), shear_traction=on), Recorder()).states
+        for on in (True, False)
+    ]
+    with_shear, without = states[0][0], states[1][0]
+    assert with_shear.h_star_um == pytest.approx(without.h_star_um, rel=0.02)
+    assert with_shear.h_star_um != pytest.approx(without.h_star_um, rel=1e-5)
+    assert with_shear.moment_N_mm > without.moment_N_mm + 5.0  # the film turns the section
+
+
+def test_discontinuous_galerkin_is_refused() -> None:
+    with pytest.raises(NotImplementedError, match='use "fe"'):
+        run(oring(reynolds="dg"), Recorder())

@@ -1,0 +1,111 @@
+"""Verdicts on films, and the numbers of a film that is known in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cases.observer import COLLAPSED, OK
+from cases.oring_path import Film, PathSettings, contact_problem, film_problem
+from cases.oring_results import FilmNumbers, Verdict, contact_pressure, film_numbers, film_state
+from cases.oring_section import build_section
+from tests.cases.oring_cases import oring
+
+HEALTHY = FilmNumbers(
+    speed=400.0,
+    flux=0.27,
+    h_star=1.36e-3,
+    h_min=1.0e-3,
+    p_max=3.71,
+    friction=5.0,
+    flux_variation=1e-10,
+)
+SLOWER = replace(HEALTHY, speed=200.0, h_star=1.36e-3 * 0.5**0.6, friction=3.7)
+
+
+def _verdict(*films: FilmNumbers) -> Verdict:
+    verdict = Verdict(reference=3.74)
+    for film in films:
+        verdict = verdict.after(film)
+    return verdict
+
+
+def test_a_film_that_follows_the_power_law_is_believed() -> None:
+    verdict = _verdict(HEALTHY, SLOWER)
+    assert verdict.word == OK
+    assert verdict.advice == ""
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"p_max": 4.8}, "1.06 MPa above"),
+        ({"friction": 5.2}, "friction on the rod rises"),
+        ({"h_star": 0.5e-3}, "thickness falls too fast"),
+        ({"h_star": -1e-6}, "thickness falls too fast"),
+    ],
+)
+def test_each_sign_of_collapse_is_seen(change: dict[str, float], reason: str, sign: float) -> None:
+    slower = replace(SLOWER, **change)
+    instroke = replace(slower, friction=sign * slower.friction)
+    verdict = _verdict(replace(HEALTHY, friction=sign * 5.0), instroke)
+    assert verdict.word == COLLAPSED
+    assert reason in verdict.advice
+    assert "finer mesh" in verdict.advice
+
+
+def test_a_collapsed_path_stays_collapsed() -> None:
+    verdict = _verdict(HEALTHY, replace(SLOWER, p_max=4.8), replace(SLOWER, speed=100.0))
+    assert verdict.word == COLLAPSED
+
+
+def test_numbers_of_a_film_of_constant_thickness_and_pressure() -> None:
+    # without pressure gradient the flux is U h / 2 and the friction that of Couette
+    section = build_section(oring(density=1, pressure_viscosity=0.0))
+    mesh, layout = section.mesh, section.layout
+    film = Film(2.0, "in", 400.0, np.zeros(mesh.arc + 1))
+    problem = film_problem(section, PathSettings(), film)
+    x = section.at_rest()
+    x[2 * mesh.arc_nodes + 1] = 25.005 - mesh.points[mesh.arc_nodes, 1]
+    x[layout.part("pressure")] = 2.0
+    numbers = film_numbers(section, problem, film, x)
+    assert numbers.h_star == pytest.approx(0.005, rel=1e-9)
+    assert numbers.flux == pytest.approx(-200.0 * 0.005, rel=1e-9)
+    assert numbers.h_min == pytest.approx(0.005, rel=1e-9)
+    assert numbers.p_max == pytest.approx(2.0)
+    assert numbers.flux_variation < 1e-9
+    length = float(np.ptp(mesh.points[mesh.arc_nodes, 0]))
+    couette = 2 * np.pi * 25.0 * length * 6.59e-8 * -400.0 / 0.005
+    assert numbers.friction == pytest.approx(couette, rel=1e-9)
+    state = film_state(section, problem, film, x, Verdict(2.0).after(numbers), 3)
+    assert state.leak_rate_mm3_s == pytest.approx(-2 * np.pi * 25.0, rel=1e-9)
+    assert state.rod_speed == -400.0
+    assert [state.contact_start_mm, state.contact_end_mm] == pytest.approx(
+        mesh.points[mesh.arc_nodes[[0, -1]], 0]
+    )
+    assert state.profile.h_um == pytest.approx(np.full(27 * 5, 5.0), rel=1e-9)
+    assert np.all(np.diff(state.profile.x_mm) > 0.0)
+    assert state.section.points.shape == mesh.points.shape
+    assert np.isfinite(state.section.point_data["sigma_zz"]).all()
+
+
+def test_contact_pressure_is_the_multiplier_plus_the_sealed_pressure() -> None:
+    section = build_section(oring(density=1))
+    x = section.at_rest()
+    x[section.layout.part("rod")] = -3.0
+    pressure = contact_pressure(section, 1.0, x)
+    low = section.lowest
+    assert pressure[:low] == pytest.approx(np.full(low, 4.0))
+    assert pressure[low] == pytest.approx(3.5)
+    assert pressure[low + 1 :] == pytest.approx(np.full(len(pressure) - low - 1, 3.0))
+    x[section.layout.part("rod")] = 0.2  # positive multipliers do not pull
+    assert contact_pressure(section, 0.0, x).max() == 0.0
+
+
+def test_sealed_pressure_changes_the_load_of_the_contact_problem_only() -> None:
+    section = build_section(oring(density=1))
+    problem = contact_problem(section, PathSettings(), 2.5)
+    assert problem.parameters["sealed_side"].tolist() == [2.5]
+    assert "film" not in problem.parameters
+    assert "spring" not in problem.parameters

@@ -1,0 +1,96 @@
+"""The discrete O-ring: counts of Table 2, loads on the right surfaces, tangent of the whole."""
+
+import numpy as np
+import pytest
+
+from cases.oring_path import Film, PathSettings, film_problem
+from cases.oring_section import build_section, number_unknowns
+from runtime.mesh import Disc, disc_mesh
+from tests.cases.oring_cases import oring
+
+TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16: (189941, 1729)}
+
+
+@pytest.mark.parametrize("d", TABLE_2)
+def test_unknowns_of_table_2(d: int) -> None:
+    layout = number_unknowns(disc_mesh(Disc(0.0, 26.96, 1.765, -34.0, 43.0), d), 4)
+    total, pressures = TABLE_2[d]
+    assert layout.count("pressure") == pressures == 108 * d + 1
+    assert layout.total == pytest.approx(total, rel=0.03)
+
+
+@pytest.mark.parametrize("m_p", range(1, 6))
+def test_every_pressure_order_has_its_unknowns(m_p: int) -> None:
+    section = build_section(oring(density=1, pressure_order=m_p))
+    assert section.layout.count("pressure") == 27 * m_p + 1
+    film = section.problem.assembler.block("film")
+    assert film.dofs.shape == (27, 4 + m_p + 1)
+    ends = section.layout.dofs("pressure")[[0, -1]]
+    assert [film.dofs[0, 4], film.dofs[-1, -1]] == ends.tolist() == section.film_ends.tolist()
+
+
+def test_sealed_pressure_acts_from_the_sealed_end_of_the_arc_to_the_crown() -> None:
+    section = build_section(oring(density=4))
+    block = section.problem.assembler.block("sealed_side")
+    z = block.coordinates[:, [0, 2]].mean(axis=1)
+    assert z.max() < 0.0
+    r = block.coordinates[:, [1, 3]]
+    assert r.max() == pytest.approx(28.725, abs=2e-3)  # the crown
+    sealed_end = section.mesh.points[section.mesh.arc_nodes[0]]
+    assert block.coordinates[-1, 2:] == pytest.approx(sealed_end)
+    arc = section.problem.assembler.block("sealed_arc")
+    assert arc.coordinates[0, :2] == pytest.approx(sealed_end)
+    assert arc.coordinates[-1, 3] == section.mesh.points[section.mesh.arc_nodes, 1].min()
+
+
+def test_axial_force_of_the_sealed_pressure_is_pressure_times_projected_area() -> None:
+    section = build_section(oring(density=2))
+    x = section.at_rest()
+    force = 0.0
+    for name in ("sealed_side", "sealed_arc"):
+        block = section.problem.assembler.block(name)
+        force -= block.residual(x, np.array([2.0]))[:, [0, 2]].sum()
+    top, bottom = section.mesh.points[:, 1].max(), section.mesh.points[:, 1].min()
+    assert force == pytest.approx(2.0 * np.pi * (top**2 - bottom**2), rel=2e-3)
+
+
+def test_obstacles_touch_the_free_section_where_they_should() -> None:
+    section = build_section(oring(density=2))
+    points = section.mesh.points
+    gaps = {name: obstacle.gap(points).min() for name, obstacle in section.obstacles.items()}
+    assert gaps["rod"] == pytest.approx(0.195, abs=1e-3)
+    assert gaps["housing"] == pytest.approx(28.15 - 28.725, abs=1e-3)
+    assert gaps["sealed_wall"] == pytest.approx(1.87 - 1.765, abs=5e-3)
+    assert gaps["air_wall"] == pytest.approx(1.87 - 1.765, abs=5e-3)
+
+
+@pytest.mark.parametrize("solid", ["taylor", "fbar", "q4"])
+@pytest.mark.parametrize("stroke", ["out", "in"])
+def test_tangent_of_the_whole_problem(solid: str, stroke: str, rng: np.random.Generator) -> None:
+    section = build_section(oring(density=1, solid=solid))
+    layout = section.layout
+    film = Film(1.0, stroke, 400.0, rng.uniform(-3, 0, 28), weight=0.6)  # type: ignore[arg-type]
+    problem = film_problem(section, PathSettings(), film)
+    x = 1e-3 * rng.normal(size=layout.total)
+    x[layout.part("pressure")] = rng.uniform(0.5, 3.0, layout.count("pressure"))
+    x[problem.fixed] = problem.values
+    direction = rng.normal(size=layout.total)
+    direction[problem.fixed] = 0.0
+    direction[layout.part("displacement")] *= 1e-3
+    step = 1e-4
+    difference = problem.residual(x + step * direction) - problem.residual(x - step * direction)
+    r, K = problem.linearise(x)
+    exact = np.asarray(K @ direction)
+    for name in ("displacement", "pressure", "rotation", "housing"):
+        part = layout.part(name)
+        error = difference[part] / (2 * step) - exact[part]
+        assert np.linalg.norm(error) < 1e-5 * np.linalg.norm(exact[part]) + 1e-12
+    assert r == pytest.approx(problem.residual(x), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("rotation", ["fixed", "free"])
+def test_the_film_acts_on_a_held_or_on_a_free_section(rotation: str) -> None:
+    section = build_section(oring(density=1, rotation=rotation))
+    problem = film_problem(section, PathSettings(), Film(1.0, "out", 400.0, np.zeros(28)))
+    moment = section.layout.dofs("rotation")[0]
+    assert (moment in problem.fixed) == (rotation == "free")

@@ -1,0 +1,142 @@
+"""The parameter set of the O-ring: Table 1, limits, case files and `--set`."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from cases.case_file import BadInput, read_assignment, read_case
+from cases.oring_parameters import ORing
+
+TABLE_1 = {
+    "inner_diameter": 50.39,
+    "section_diameter": 3.53,
+    "rod_diameter": 50.0,
+    "housing_diameter": 56.30,
+    "mu_1": 3.04,
+    "mu_2": 0.62,
+    "bulk_modulus": 500.0,
+    "viscosity": 6.59e-8,
+    "pressure_viscosity": 0.02,
+    "cavitation_penalty": 1.0e4,
+}
+
+
+def test_defaults_are_table_1() -> None:
+    parameters = ORing()
+    assert {key: getattr(parameters, key) for key in TABLE_1} == TABLE_1
+    assert (parameters.density, parameters.pressure_order, parameters.solid) == (2, 4, "taylor")
+    assert parameters.speeds == (1600.0, 800.0, 400.0, 200.0, 100.0)
+    assert (parameters.stroke, parameters.sealed_pressure) == ("both", 1.0)
+
+
+def test_an_integer_is_a_number() -> None:
+    parameters = ORing(sealed_pressure=2, speeds=(400, 100))
+    assert repr(parameters.sealed_pressure) == "2.0"
+    assert repr(parameters.speeds) == "(400.0, 100.0)"
+
+
+def test_parameters_are_frozen() -> None:
+    with pytest.raises(ValidationError, match="frozen"):
+        ORing().density = 4
+
+
+@pytest.mark.parametrize("density", [1, 2, 4, 8, 16])
+def test_every_density_of_the_list(density: int) -> None:
+    assert read_case("oring", [f"density={density}"]).parameters.density == density
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("density", 3),
+        ("density", 2.0),
+        ("density", True),
+        ("pressure_order", 0),
+        ("pressure_order", 4.0),
+        ("sealed_pressure", True),
+        ("sealed_pressure", "1"),
+        ("sealed_pressure", -1e-9),
+        ("sealed_pressure", float("nan")),
+        ("sealed_pressure", float("inf")),
+        ("speeds", []),
+        ("speeds", 100.0),
+        ("speeds", [100.0, 0.0]),
+        ("speeds", [100.0, float("nan")]),
+        ("speeds", [100.0, True]),
+        ("speeds", [100.0, "25"]),
+        ("speeds", [100.0, 100]),
+        ("shear_traction", 1),
+        ("rotation", "loose"),
+        ("viscosity", 0.0),
+        ("arc_start", 10.0),
+        ("case", "oring"),
+    ],
+)
+def test_a_wrong_value_is_named(key: str, value: Any) -> None:
+    with pytest.raises(ValidationError, match=key):
+        ORing(**{key: value})
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"rod_diameter": 60.0}, "the gap between rod and housing is -1.85 mm"),
+        ({"section_diameter": 3.0}, "to squeeze the seal"),
+        ({"section_diameter": 7.0}, "to squeeze the seal"),
+        ({"inner_diameter": 60.0}, "the section centre lies at radius 31.765 mm"),
+        ({"groove_width": 3.0}, "at least section_diameter, 3.53 mm"),
+        ({"groove_centre": 3.0}, "the round section must lie between the walls"),
+    ],
+)
+def test_a_seal_that_cannot_be_mounted(changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(ValidationError, match=reason):
+        ORing(**changes)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("a=1", 1),
+        ("a = 1.5", 1.5),
+        ("a=true", True),
+        ("a=in", "in"),
+        ('a="in"', "in"),
+        ("a=[400, 100]", [400, 100]),
+        ("a=x=1", None),
+        ("a=", None),
+        ("a", None),
+        ("=1", None),
+        ("a=1\nb=2", None),
+        ("a=1 2", None),
+    ],
+)
+def test_assignment(text: str, value: object) -> None:
+    if value is None:
+        with pytest.raises(BadInput):
+            read_assignment(text)
+    else:
+        assert read_assignment(text) == ("a", value)
+
+
+def test_case_file_and_set(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('case = "oring"\ndensity = 4\nspeeds = [800, 25]\nstroke = "in"\n')
+    case = read_case(str(path), ["stroke=out", "stroke=both"])
+    assert case.name == "oring"
+    assert case.parameters == ORing(density=4, speeds=(800.0, 25.0), stroke="both")
+
+
+def test_several_complaints_are_counted() -> None:
+    with pytest.raises(BadInput, match=r"density = 3: .* \(and 1 more\); allowed: .*1, 2, 4, 8"):
+        read_case("oring", ["density=3", "sealed_pressure=-1", "speeds=[1]"])
+
+
+def test_the_readme_has_the_table_of_keys() -> None:
+    readme = Path(__file__).parents[2].joinpath("README.md").read_text(encoding="utf-8")
+    for key, field in ORing.model_fields.items():
+        default = "-" if field.default is None else f"`{json.dumps(field.default)}`"
+        meaning = str(field.description).replace("|", "&#124;")
+        assert f"| `{key}` | {default} | {meaning} |\n" in readme

@@ -1,0 +1,159 @@
+"""Sparse assembly against a dense loop, prescribed unknowns, norms and guards."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from runtime.assembly import Assembler, ElementBlock, build_pattern
+from runtime.dofs import DofLayout
+from runtime.newton import Newton
+from runtime.problem import KeepsOrientation, Problem, StaysPositive
+from tests.runtime.springs import Spring
+
+SIZE, ELEMENTS = 12, 25
+PARAMETERS = {"a": np.array([1.5, 0.0]), "b": np.array([0.3, 0.0])}
+
+
+def _blocks(rng: np.random.Generator) -> list[ElementBlock]:
+    def block(name: str, n: int) -> ElementBlock:
+        dofs = np.stack([rng.permutation(SIZE)[:3] for _ in range(n)])
+        return ElementBlock(name, Spring(), np.zeros((n, 2)), dofs, rng.uniform(1, 2, (n, 1)))
+
+    return [block("a", ELEMENTS), block("b", 7)]
+
+
+def _dense(blocks: list[ElementBlock], x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    r, K = np.zeros(SIZE), np.zeros((SIZE, SIZE))
+    for block in blocks:
+        local, tangents = block.tangent(x, PARAMETERS[block.name])
+        for e, dofs in enumerate(block.dofs):
+            for i, row in enumerate(dofs):
+                r[row] += local[e, i]
+                for j, column in enumerate(dofs):
+                    K[row, column] += tangents[e, i, j]
+    return r, K
+
+
+def test_assembly_equals_a_dense_loop(rng: np.random.Generator) -> None:
+    blocks, x = _blocks(rng), rng.normal(size=SIZE)
+    r, K = Assembler.build(SIZE, blocks).linearise(x, PARAMETERS)
+    dense_r, dense_K = _dense(blocks, x)
+    assert r == pytest.approx(dense_r, rel=1e-13, abs=1e-13)
+    assert K.toarray() == pytest.approx(dense_K, rel=1e-13, abs=1e-13)
+    assert Assembler.build(SIZE, blocks).residual(x, PARAMETERS) == pytest.approx(r, rel=1e-14)
+
+
+def test_a_wrong_scatter_is_seen(rng: np.random.Generator) -> None:
+    blocks, x = _blocks(rng), rng.normal(size=SIZE)
+    assembler = Assembler.build(SIZE, blocks)
+    first = assembler.pattern.scatter[0].reshape(ELEMENTS, 3, 3)
+    transposed = first.transpose(0, 2, 1).ravel()
+    pattern = replace(assembler.pattern, scatter=(transposed, *assembler.pattern.scatter[1:]))
+    _, K = replace(assembler, pattern=pattern).linearise(x, PARAMETERS)
+    assert np.abs(K.toarray() - _dense(blocks, x)[1]).max() > 0.1
+
+
+def test_tangent_is_the_derivative_of_the_residual(rng: np.random.Generator) -> None:
+    assembler, x = Assembler.build(SIZE, _blocks(rng)), rng.normal(size=SIZE)
+    direction, step = rng.normal(size=SIZE), 1e-6
+    ahead = assembler.residual(x + step * direction, PARAMETERS)
+    behind = assembler.residual(x - step * direction, PARAMETERS)
+    _, K = assembler.linearise(x, PARAMETERS)
+    assert K @ direction == pytest.approx((ahead - behind) / (2 * step), rel=1e-7, abs=1e-7)
+
+
+def test_pattern_is_symmetric_with_a_full_diagonal(rng: np.random.Generator) -> None:
+    pattern = build_pattern(SIZE, [_blocks(rng)[1].dofs])
+    ones = pattern.matrix(np.ones(pattern.nnz)).toarray()
+    assert np.array_equal(ones, ones.T)
+    assert np.array_equal(np.diag(ones), np.ones(SIZE))
+    positions = pattern.matrix(np.arange(pattern.nnz, dtype=float)).toarray()
+    assert np.array_equal(np.diag(positions), pattern.diagonal)
+
+
+def test_a_block_without_parameters_is_off_but_keeps_its_place(rng: np.random.Generator) -> None:
+    blocks, x = _blocks(rng), rng.normal(size=SIZE)
+    assembler = Assembler.build(SIZE, blocks)
+    r, K = assembler.linearise(x, {"a": PARAMETERS["a"]})
+    assert r == pytest.approx(Assembler.build(SIZE, blocks[:1]).residual(x, PARAMETERS))
+    assert K.nnz == assembler.pattern.nnz
+
+
+def test_misuse_is_refused(rng: np.random.Generator) -> None:
+    blocks = _blocks(rng)
+    with pytest.raises(ValueError, match="same name"):
+        Assembler.build(SIZE, [blocks[0], blocks[0]])
+    with pytest.raises(ValueError, match="outside the 5 unknowns"):
+        Assembler.build(5, blocks)
+    with pytest.raises(KeyError, match="no block 'c'; there are a, b"):
+        Assembler.build(SIZE, blocks).block("c")
+
+
+def _problem(rng: np.random.Generator) -> Problem:
+    layout = DofLayout.of(u=8, p=4)
+    assembler = Assembler.build(SIZE, _blocks(rng))
+    return Problem(assembler, layout, PARAMETERS, {"u": 2.0, "p": 0.5})
+
+
+def test_prescribed_unknowns_get_their_values(rng: np.random.Generator) -> None:
+    problem = _problem(rng).with_fixed(
+        [np.array([1, 9]), np.array([4])], [np.array([0.2, -0.1]), 0.3]
+    )
+    solution = Newton().solve(problem, np.zeros(SIZE)).raise_for_status()
+    assert solution.x[[1, 9, 4]] == pytest.approx([0.2, -0.1, 0.3], abs=1e-15)
+    reactions = problem.assembler.residual(solution.x, PARAMETERS)
+    free = np.setdiff1d(np.arange(SIZE), [1, 4, 9])
+    assert reactions[free] == pytest.approx(np.zeros(len(free)), abs=1e-9)
+    assert np.abs(reactions[[1, 4, 9]]).min() > 1e-3
+
+
+def test_elimination_gives_the_newton_step_of_the_whole_system(rng: np.random.Generator) -> None:
+    problem = _problem(rng).with_fixed([np.array([1, 9])], [np.array([0.2, -0.1])])
+    x = rng.normal(size=SIZE)
+    r, K = problem.linearise(x)
+    full_r, full_K = problem.assembler.linearise(x, PARAMETERS)
+    rows, dense = full_r.copy(), full_K.toarray()
+    rows[[1, 9]] = x[[1, 9]] - [0.2, -0.1]
+    dense[[1, 9]] = np.eye(SIZE)[[1, 9]]
+    step = np.linalg.solve(K.toarray(), r)
+    assert step == pytest.approx(np.linalg.solve(dense, rows), rel=1e-10, abs=1e-12)
+    assert problem.residual(x) == pytest.approx(rows, rel=1e-13)
+
+
+def test_changing_parameters_leaves_the_problem_as_it_was(rng: np.random.Generator) -> None:
+    problem = _problem(rng)
+    other = problem.with_parameters(a={"stiffness": 9.0}, b=None)
+    assert other.parameters["a"].tolist() == [9.0, 0.0]
+    assert "b" not in other.parameters
+    assert problem.parameters["a"].tolist() == [1.5, 0.0]
+    assert other.assembler is problem.assembler
+    with pytest.raises(KeyError, match="no parameter viscosity"):
+        problem.with_parameters(a={"viscosity": 1.0})
+    with pytest.raises(KeyError, match="give all of stiffness, unused"):
+        other.with_parameters(b={"stiffness": 1.0})
+
+
+def test_norm_weighs_each_field_by_its_reference(rng: np.random.Generator) -> None:
+    r = np.zeros(SIZE)
+    r[0], r[8] = 6.0, 2.0
+    assert _problem(rng).norm(r) == pytest.approx(5.0)  # 6 / 2 and 2 / 0.5
+
+
+def test_film_may_lose_only_a_fraction() -> None:
+    guard = StaysPositive(np.array([1, 3]), np.array([0.5, 0.0]), fraction=0.8)
+    x = np.array([0.0, 0.5, 0.0, 2.0])
+    assert guard.limit(x, np.array([9.0, 1.0, -9.0, 3.0])) == 1.0
+    limit = guard.limit(x, np.array([0.0, -2.0, 0.0, -1.0]))
+    assert limit == pytest.approx(0.4)
+    assert x[1] + 0.5 + limit * -2.0 == pytest.approx(0.2)
+
+
+def test_elements_may_not_fold() -> None:
+    square = np.array([[0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 0.0, 2.0]])
+    guard = KeepsOrientation(square, np.arange(8)[None])
+    dx = np.zeros(8)
+    dx[4] = -3.0  # moves corner 3 across the square
+    limit = guard.limit(np.zeros(8), dx)
+    assert limit == 0.25
+    assert guard.limit(np.zeros(8), 0.1 * dx) == 1.0

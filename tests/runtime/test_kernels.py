@@ -1,0 +1,346 @@
+"""The uniform interface of the kernels: shapes, parameters, rules, batches and their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from runtime.kernels import (
+    ArgumentError,
+    Kernel,
+    KernelError,
+    MissingKernelsError,
+    load_kernel,
+    manifest,
+)
+from runtime.rules import Rule, film_rule, gauss
+
+Array = npt.NDArray[np.float64]
+FAMILIES = tuple(manifest())
+VALUES = {
+    "mu_1": 3.04,
+    "mu_2": 0.62,
+    "kappa": 500.0,
+    "pressure": 2.5,
+    "offset": 0.01,
+    "force_weight": 0.7,
+    "rod_radius": 25.0,
+    "rod_speed": 400.0,
+    "viscosity": 6.6e-8,
+    "pressure_viscosity": 0.02,
+    "cavitation_penalty": 1e4,
+    "shear_weight": 0.9,
+    "centre_z": 0.1,
+    "centre_r": 25.4,
+    "polar_moment": 7.6,
+    "angle": 0.05,
+    "stiffness": 0.4,
+}
+MATERIAL = np.array([3.04, 0.62, 500.0])
+Call = Callable[..., Any]
+
+
+def arguments(name: str, n: int, rng: np.random.Generator) -> tuple[tuple[Array, Array], Any]:
+    """Random admissible arguments for n elements of a family."""
+    kernel = load_kernel(name)
+    corners = {
+        4: [[-0.1, 25.3], [0.1, 25.3], [0.1, 25.5], [-0.1, 25.5]],
+        2: [[-0.1, 25.4], [0.1, 25.45]],
+        1: [[0.1, 25.4]],
+    }[kernel.nodes]
+    X = np.array(corners)[None] + rng.uniform(-0.02, 0.02, (n, kernel.nodes, 2))
+    rule = film_rule(3) if kernel.interpolated else None
+    ndof = len(kernel.unknowns) + (4 if rule else 0)
+    u = rng.uniform(-0.01, 0.01, (n, ndof))
+    data = rng.uniform(0.5, 1.5, (n, len(kernel.data)))
+    named = {"parameters": {p: VALUES[p] for p in kernel.parameters}, "data": data, "rule": rule}
+    return (X.reshape(n, 2 * kernel.nodes), u), named
+
+
+def methods(kernel: Kernel) -> dict[str, Call]:
+    return {t: getattr(kernel, "fields_at" if t == "fields" else t) for t in kernel.tasks}
+
+
+def solid(n: int, rng: np.random.Generator) -> tuple[Kernel, Array, Array]:
+    (X, u), _ = arguments("solid_q4", n, rng)
+    return load_kernel("solid_q4"), X, u
+
+
+# ----------------------------------------------------------------------------------- description
+
+
+def test_families_offer_what_the_contract_says() -> None:
+    found = {n: (load_kernel(n).nodes, len(load_kernel(n).unknowns)) for n in FAMILIES}
+    assert found == {
+        "solid_q4": (4, 8),
+        "solid_fbar": (4, 8),
+        "solid_taylor": (4, 8),
+        "follower_pressure": (2, 4),
+        "contact": (1, 3),
+        "film": (2, 4),
+        "mean_rotation": (4, 9),
+        "axial_spring": (4, 8),
+    }
+    for name in FAMILIES:
+        kernel = load_kernel(name)
+        assert kernel.name == name
+        assert {"residual", "tangent"} <= set(kernel.tasks)
+        assert ("fields" in kernel.tasks) == bool(kernel.fields)
+        assert len(kernel.signature) == 16
+        assert set(kernel.parameters) <= set(VALUES)
+        assert load_kernel(name) is kernel
+
+
+def test_names_are_in_the_order_of_the_arrays() -> None:
+    film, contact = load_kernel("film"), load_kernel("contact")
+    assert film.parameters == (
+        "rod_radius",
+        "rod_speed",
+        "viscosity",
+        "pressure_viscosity",
+        "cavitation_penalty",
+        "force_weight",
+        "shear_weight",
+    )
+    assert film.unknowns == ("u_z1", "u_r1", "u_z2", "u_r2")
+    assert film.interpolated == "p"
+    assert film.fields == ("x", "dx", "h", "p", "tau", "flux", "tau_rod", "eta")
+    assert contact.data == ("n_z", "n_r", "c", "area", "rho")
+    assert contact.unknowns[-1] == "lambda"
+    assert load_kernel("mean_rotation").unknowns[-1] == "moment"
+    stress = ("z", "r", "J", "sigma_zz", "sigma_rr", "sigma_tt", "sigma_zr")
+    assert load_kernel("solid_fbar").fields == stress
+
+
+# ----------------------------------------------------------------------------------- good calls
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_shapes_and_kinds_of_results(name: str, rng: np.random.Generator) -> None:
+    kernel, n = load_kernel(name), 3
+    positional, named = arguments(name, n, rng)
+    ndof = positional[1].shape[1]
+    points = len((named["rule"] or kernel.default_rule).weights)
+    shapes = {
+        "energy": [(n,)],
+        "residual": [(n, ndof)],
+        "tangent": [(n, ndof), (n, ndof, ndof)],
+        "fields": [(n, points, len(kernel.fields))],
+    }
+    for task, call in methods(kernel).items():
+        result = call(*positional, **named)
+        arrays = result if isinstance(result, tuple) else (result,)
+        assert [a.shape for a in arrays] == shapes[task]
+        assert all(a.dtype == np.float64 and np.isfinite(a).all() for a in arrays)
+        assert all(a.any() for a in arrays)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_batch_is_exactly_its_elements_one_by_one(name: str, rng: np.random.Generator) -> None:
+    kernel, n = load_kernel(name), 7
+    (X, u), named = arguments(name, n, rng)
+    for task, call in methods(kernel).items():
+        together = call(X, u, **named)
+        for e in range(n):
+            one = {**named, "data": named["data"][e : e + 1]}
+            alone = call(X[e : e + 1], u[e : e + 1], **one)
+            pairs = zip(together, alone, strict=True) if task == "tangent" else [(together, alone)]
+            for many, single in pairs:
+                np.testing.assert_array_equal(many[e], single[0])
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_no_elements_are_no_error(name: str, rng: np.random.Generator) -> None:
+    kernel = load_kernel(name)
+    positional, named = arguments(name, 0, rng)
+    for task, call in methods(kernel).items():
+        result = call(*positional, **named)
+        assert all(len(a) == 0 for a in (result if task == "tangent" else (result,)))
+
+
+def test_arguments_are_not_written(rng: np.random.Generator) -> None:
+    for name in FAMILIES:
+        (X, u), named = arguments(name, 2, rng)
+        for array in (X, u, named["data"]):
+            array.setflags(write=False)
+        for call in methods(load_kernel(name)).values():
+            call(X, u, **named)
+
+
+def test_residual_and_tangent_hand_out_the_same_residual(rng: np.random.Generator) -> None:
+    for name in FAMILIES:
+        positional, named = arguments(name, 4, rng)
+        kernel = load_kernel(name)
+        R, _ = kernel.tangent(*positional, **named)
+        alone = kernel.residual(*positional, **named)
+        np.testing.assert_allclose(R, alone, rtol=0, atol=1e-13 * np.abs(alone).max())
+
+
+def test_results_are_new_arrays(rng: np.random.Generator) -> None:
+    kernel, X, u = solid(2, rng)
+    first = kernel.residual(X, u, parameters=MATERIAL)
+    kept = first.copy()
+    kernel.residual(X, 2 * u, parameters=MATERIAL)
+    np.testing.assert_array_equal(first, kept)
+
+
+def test_parameters_by_name_in_any_order(rng: np.random.Generator) -> None:
+    kernel, X, u = solid(2, rng)
+    by_order = kernel.residual(X, u, parameters=MATERIAL)
+    by_name = kernel.residual(X, u, parameters={"kappa": 500.0, "mu_2": 0.62, "mu_1": 3.04})
+    np.testing.assert_array_equal(by_order, by_name)
+    with_more = kernel.residual(X, u, parameters={**VALUES, "unrelated": 1.0})
+    np.testing.assert_array_equal(by_order, with_more)
+    np.testing.assert_array_equal(by_order, kernel.residual(X, u, parameters=list(MATERIAL)))
+    assert (by_order != kernel.residual(X, u, parameters=MATERIAL[[1, 0, 2]])).any()
+
+
+def test_views_and_other_number_types_are_converted(rng: np.random.Generator) -> None:
+    kernel, X, u = solid(4, rng)
+    expected = kernel.residual(X[::2], u[::2].copy(), parameters=MATERIAL)
+    views = (np.asfortranarray(X)[::2], np.repeat(u, 2, axis=1)[::2, ::2])
+    assert not any(v.flags.c_contiguous for v in views)
+    np.testing.assert_array_equal(kernel.residual(*views, parameters=MATERIAL), expected)
+    lists = kernel.residual(X[::2].tolist(), u[::2].tolist(), parameters=MATERIAL)
+    np.testing.assert_array_equal(lists, expected)
+    big_endian = kernel.residual(X[::2].astype(">f8"), u[::2], parameters=MATERIAL)
+    np.testing.assert_array_equal(big_endian, expected)
+    zeros = kernel.residual(X, np.zeros((4, 8), dtype=int), parameters=MATERIAL)
+    np.testing.assert_allclose(zeros, 0.0, atol=1e-11)
+
+
+def test_the_rule_of_the_call_is_used(rng: np.random.Generator) -> None:
+    kernel = load_kernel("film")
+    positional, named = arguments("film", 2, rng)
+    coarse, fine, finer = (
+        kernel.residual(*positional, **{**named, "rule": film_rule(3, "gauss", n)})
+        for n in (2, 12, 14)
+    )
+    np.testing.assert_allclose(fine, finer, rtol=0, atol=1e-5 * np.abs(fine).max())
+    assert np.abs(coarse - fine).max() > 1e-3 * np.abs(fine).max()
+    values = kernel.fields_at(*positional, **{**named, "rule": film_rule(3, "lobatto", 9)})
+    assert values.shape == (2, 9, 8)
+    ends = values[:, [0, -1], kernel.fields.index("p")]
+    np.testing.assert_allclose(ends, positional[1][:, [4, -1]], rtol=1e-12)
+
+
+def test_the_number_of_modes_is_that_of_the_rule(rng: np.random.Generator) -> None:
+    kernel = load_kernel("film")
+    (X, u), named = arguments("film", 2, rng)
+    for m_p in (1, 2, 5):
+        dofs = np.column_stack([u[:, :4], np.ones((2, m_p + 1))])
+        _, K = kernel.tangent(X, dofs, **{**named, "rule": film_rule(m_p)})
+        assert K.shape == (2, 5 + m_p, 5 + m_p)
+
+
+# ----------------------------------------------------------------------------------- bad calls
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"X": (2, 6)}, r"solid_q4: coordinates has shape \(2, 6\), must be \(2, 8\)"),
+        ({"X": (3, 8)}, r"coordinates has shape \(3, 8\), must be \(2, 8\)"),
+        ({"X": (2, 4, 2)}, r"coordinates has shape \(2, 4, 2\)"),
+        ({"u": (2, 9)}, r"dofs has shape \(2, 9\), must be \(2, 8\)"),
+        ({"u": (8,)}, r"coordinates has shape \(2, 8\), must be \(8, 8\)"),
+        ({"data": (2, 1)}, r"data has shape \(2, 1\), must be \(2, 0\)"),
+        ({"parameters": (2,)}, r"parameters has shape \(2,\), must be \(3,\)"),
+        ({"parameters": (1, 3)}, r"parameters has shape \(1, 3\), must be \(3,\)"),
+    ],
+    ids=str,
+)
+def test_wrong_shapes_are_named(change: dict[str, tuple[int, ...]], message: str) -> None:
+    shapes: dict[str, tuple[int, ...]] = {"X": (2, 8), "u": (2, 8), "parameters": (3,), **change}
+    X, u, *rest = (np.ones(s) for s in shapes.values())
+    named = dict(zip(list(shapes)[2:], rest, strict=True))
+    for call in methods(load_kernel("solid_q4")).values():
+        with pytest.raises(ArgumentError, match=message):
+            call(X, u, **named)
+
+
+def test_missing_arguments_are_named(rng: np.random.Generator) -> None:
+    kernel, X, u = solid(1, rng)
+    with pytest.raises(ArgumentError, match=r"^solid_q4 needs mu_2, kappa$"):
+        kernel.residual(X, u, parameters={"mu_1": 1.0})
+    with pytest.raises(ArgumentError, match=r"parameters has shape \(0,\), must be \(3,\)"):
+        kernel.residual(X, u)
+    (X, u), named = arguments("contact", 1, rng)
+    with pytest.raises(ArgumentError, match=r"contact: data has shape \(1, 0\), must be \(1, 5\)"):
+        load_kernel("contact").residual(X, u, parameters=named["parameters"])
+
+
+def test_a_task_that_is_not_offered_is_named(rng: np.random.Generator) -> None:
+    positional, named = arguments("solid_fbar", 1, rng)
+    message = "solid_fbar offers residual, tangent, fields, not energy"
+    with pytest.raises(ArgumentError, match=message):
+        load_kernel("solid_fbar").energy(*positional, **named)
+    positional, named = arguments("contact", 1, rng)
+    with pytest.raises(ArgumentError, match="contact offers residual, tangent, not fields"):
+        load_kernel("contact").fields_at(*positional, **named)
+
+
+def test_an_unknown_kernel_is_named() -> None:
+    with pytest.raises(MissingKernelsError, match=r"no kernel 'solid_q8'; there are solid_q4, "):
+        load_kernel("solid_q8")
+
+
+def test_a_rule_without_a_basis_is_refused(rng: np.random.Generator) -> None:
+    kernel = load_kernel("film")
+    positional, named = arguments("film", 1, rng)
+    for rule in (None, gauss(3)):
+        with pytest.raises(ArgumentError, match=r"film interpolates p: .*film_rule"):
+            kernel.residual(*positional, **{**named, "rule": rule})
+
+
+def test_a_rule_for_a_kernel_that_has_its_own_is_refused(rng: np.random.Generator) -> None:
+    kernel, X, u = solid(1, rng)
+    assert kernel.unrolled
+    assert not load_kernel("film").unrolled
+    with pytest.raises(ArgumentError, match="rule of solid_q4 is written into it: give none"):
+        kernel.residual(X, u, parameters=MATERIAL, rule=kernel.default_rule)
+
+
+def test_dofs_must_match_the_modes_of_the_rule(rng: np.random.Generator) -> None:
+    positional, named = arguments("film", 1, rng)
+    with pytest.raises(ArgumentError, match=r"dofs has shape \(1, 8\), must be \(1, 9\)"):
+        load_kernel("film").residual(*positional, **{**named, "rule": film_rule(4)})
+
+
+def test_errors_have_one_ancestor() -> None:
+    assert issubclass(ArgumentError, KernelError)
+    assert issubclass(ArgumentError, ValueError)
+    assert issubclass(MissingKernelsError, KernelError)
+
+
+def test_a_rule_of_another_dimension_is_refused(rng: np.random.Generator) -> None:
+    positional, named = arguments("film", 0, rng)  # no elements: nothing is read while it fails
+    line = film_rule(3)
+    plane = Rule(np.column_stack([line.points, line.points]), line.weights, line.basis)
+    with pytest.raises(ArgumentError, match="rule"):
+        load_kernel("film").residual(*positional, **{**named, "rule": plane})
+
+
+def test_a_basis_at_other_points_is_refused(rng: np.random.Generator) -> None:
+    (X, u), named = arguments("film", 0, rng)
+    many, few = film_rule(3, "gauss", 9), film_rule(3, "gauss", 4)
+    with pytest.raises(ArgumentError, match="basis"):
+        load_kernel("film").residual(
+            X, u, **{**named, "rule": Rule(many.points.copy(), many.weights.copy(), few.basis)}
+        )
+
+
+@pytest.mark.parametrize("kind", ["complex", "text", "object"])
+def test_values_that_are_no_real_numbers_are_refused(kind: str, rng: np.random.Generator) -> None:
+    kernel, X, u = solid(1, rng)
+    wrong: Any = {
+        "complex": u.astype(complex),
+        "text": np.full((1, 8), "a"),
+        "object": np.full((1, 8), None),
+    }[kind]
+    with pytest.raises(ArgumentError, match="dofs"):
+        kernel.residual(X, wrong, parameters=MATERIAL)

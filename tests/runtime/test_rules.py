@@ -1,0 +1,80 @@
+"""Quadrature rules and pressure shape functions against exact integrals and polynomials."""
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from runtime.rules import film_rule, gauss, lagrange, lobatto, pressure_nodes
+
+
+def _error(points: np.ndarray, weights: np.ndarray, degree: int) -> float:
+    exact = 2.0 / (degree + 1) if degree % 2 == 0 else 0.0
+    return float(abs(weights @ points**degree - exact))
+
+
+@pytest.mark.parametrize("n", range(1, 13))
+def test_gauss_is_exact_to_its_degree_and_no_further(n: int) -> None:
+    rule = gauss(n)
+    x = rule.points[:, 0]
+    assert max(_error(x, rule.weights, k) for k in range(2 * n)) < 2e-14
+    # the error of x^(2n) shrinks like 4^-n, so it stays far from rounding here
+    assert _error(x, rule.weights, 2 * n) > 1e-8
+
+
+@pytest.mark.parametrize("n", range(2, 13))
+def test_lobatto_is_exact_to_its_degree_and_no_further(n: int) -> None:
+    rule = lobatto(n)
+    x = rule.points[:, 0]
+    assert x[0] == -1.0
+    assert x[-1] == 1.0
+    assert max(_error(x, rule.weights, k) for k in range(2 * n - 2)) < 2e-14
+    assert _error(x, rule.weights, 2 * n - 2) > 1e-8
+
+
+def test_known_lobatto_points() -> None:
+    assert lobatto(4).points[:, 0] == pytest.approx([-1, -(0.2**0.5), 0.2**0.5, 1], abs=1e-15)
+    assert lobatto(4).weights == pytest.approx([1 / 6, 5 / 6, 5 / 6, 1 / 6], abs=1e-15)
+
+
+@pytest.mark.parametrize("m_p", range(1, 8))
+@pytest.mark.parametrize("kind", ["gauss", "lobatto"])
+def test_shape_functions_reproduce_polynomials_and_their_slopes(m_p: int, kind: str) -> None:
+    rule = film_rule(m_p, kind)
+    assert rule.basis is not None
+    polynomial = Polynomial(np.linspace(1.0, -0.7, m_p + 1))
+    nodal = polynomial(pressure_nodes(m_p))
+    x = rule.points[:, 0]
+    assert rule.basis[:, :, 0] @ nodal == pytest.approx(polynomial(x), abs=1e-13)
+    assert rule.basis[:, :, 1] @ nodal == pytest.approx(polynomial.deriv()(x), abs=1e-12)
+
+
+@pytest.mark.parametrize("m_p", range(1, 8))
+def test_shape_functions_are_one_at_their_own_node(m_p: int) -> None:
+    nodes = pressure_nodes(m_p)
+    assert nodes[0] == -1.0
+    assert np.all(np.diff(nodes) > 0)
+    assert lagrange(nodes, nodes)[:, :, 0] == pytest.approx(np.eye(m_p + 1), abs=1e-14)
+
+
+@pytest.mark.parametrize("m_p", range(1, 6))
+@pytest.mark.parametrize("kind", ["gauss", "lobatto"])
+def test_automatic_rule_is_the_smallest_that_is_exact(m_p: int, kind: str) -> None:
+    rule = film_rule(m_p, kind)
+    degree = 2 * m_p + 1
+    assert _error(rule.points[:, 0], rule.weights, degree - 1) < 1e-14
+    fewer = film_rule(m_p, kind, len(rule.weights) - 1)
+    assert _error(fewer.points[:, 0], fewer.weights, degree - 1) > 1e-6
+
+
+def test_rules_cannot_be_changed() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        gauss(3).weights[0] = 1.0
+
+
+def test_impossible_rules_are_refused() -> None:
+    with pytest.raises(ValueError, match="at least 1 point"):
+        gauss(0)
+    with pytest.raises(ValueError, match="at least 2 points"):
+        lobatto(1)
+    with pytest.raises(ValueError, match="at least 1"):
+        film_rule(0)

@@ -1,0 +1,114 @@
+"""The walls between the rooms: who may import what, and what solving never loads."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import softehl
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("codegen", "generated", "runtime", "cases")
+OURS = {*ROOMS, "softehl", "tests"}
+
+ALLOWED = {
+    "codegen": {"codegen"},
+    "generated": {"generated"},
+    "runtime": {"runtime", "generated"},
+    "cases": {"cases", "runtime"},
+}
+SOLVERS = ("newton", "continuation", "linear", "solution")
+NOT_FOR_SOLVERS = {"runtime.mesh", "runtime.dofs", "runtime.assembly", "cases", "codegen"}
+HEAVY = ("sympy", "mpmath", "jax")
+
+
+def imports_of(source: str) -> Iterator[str]:
+    """Every module that a file names in an import statement, also inside functions."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute, by room"
+            assert node.module is not None
+            yield node.module
+            # `from runtime import mesh` imports runtime.mesh
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def files_of(room: str) -> list[Path]:
+    return sorted((ROOT / room).rglob("*.py"))
+
+
+def breaches(room: str, source: str) -> set[str]:
+    """The rooms of ours that a file of `room` imports and must not."""
+    return {name.split(".")[0] for name in imports_of(source)} & (OURS - ALLOWED[room])
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_import_only_what_they_may(room: str) -> None:
+    assert (ROOT / room).is_dir()
+    found = {path: breaches(room, path.read_text(encoding="utf-8")) for path in files_of(room)}
+    assert {str(path): rooms for path, rooms in found.items() if rooms} == {}
+
+
+@pytest.mark.parametrize(
+    ("room", "source"),
+    [
+        ("cases", "import codegen.build"),
+        ("cases", "def f():\n    from codegen import graph"),
+        ("runtime", "from codegen.graph import Graph"),
+        ("runtime", "import cases.oring"),
+        ("codegen", "from runtime.rules import gauss"),
+    ],
+)
+def test_a_breach_is_seen(room: str, source: str) -> None:
+    assert breaches(room, source)
+
+
+@pytest.mark.parametrize("module", SOLVERS)
+def test_solvers_know_no_mesh(module: str) -> None:
+    source = (ROOT / "runtime" / f"{module}.py").read_text(encoding="utf-8")
+    assert not set(imports_of(source)) & NOT_FOR_SOLVERS
+
+
+@pytest.mark.parametrize("room", ["runtime", "cases"])
+def test_solving_names_no_symbolic_package(room: str) -> None:
+    for path in files_of(room):
+        names = {name.split(".")[0] for name in imports_of(path.read_text(encoding="utf-8"))}
+        assert not names & set(HEAVY), path
+
+
+def loaded_after(code: str) -> set[str]:
+    """The top-level modules that are loaded in a fresh interpreter after `code`."""
+    shown = f"{code}\nimport sys\nprint(*sorted({{n.split('.')[0] for n in sys.modules}}))"
+    done = subprocess.run(
+        [sys.executable, "-c", shown], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_solving_loads_no_sympy() -> None:
+    loaded = loaded_after("import softehl\nfor name in softehl.__all__: getattr(softehl, name)")
+    assert "numpy" in loaded
+    assert not loaded & {"sympy", "mpmath", "codegen", "matplotlib", "meshio"}
+
+
+def test_help_loads_nothing_heavy() -> None:
+    loaded = loaded_after(
+        "import softehl\nassert softehl.main(['--help']) == softehl.main(['run', '--help']) == 0"
+    )
+    assert not loaded & {"numpy", "scipy", "pydantic", "rich", "sympy", "matplotlib", "meshio"}
+
+
+def test_building_loads_no_sympy() -> None:
+    assert "sympy" not in loaded_after("import codegen.build")
+
+
+def test_public_names() -> None:
+    assert sorted([*softehl._PUBLIC, "main"]) == softehl.__all__
+    assert set(softehl.__all__) <= set(dir(softehl))
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        softehl.nothing  # noqa: B018
