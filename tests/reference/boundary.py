@@ -1,0 +1,53 @@
+"""Follower pressure (8) and augmented-Lagrangian contact (9)-(10)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mpf
+from tests.reference.rules import gauss
+
+
+def residual_pressure(X: Sequence[Number], u: Sequence[Number], pressure: Number) -> Vector:
+    """Integral of pressure n . delta u 2 pi r ds over the deformed segment, N.
+
+    n ds = (dr, -dz); the integrand is a quadratic, two Gauss points integrate it exactly.
+    """
+    z1, r1, z2, r2 = (a + b for a, b in zip(X, u, strict=True))
+    forces = [mpf(0)] * 4
+    for xi, weight in zip(*gauss(2), strict=True):
+        shapes = ((1 - xi) / 2, (1 + xi) / 2)
+        ring = 2 * PI * (shapes[0] * r1 + shapes[1] * r2) * weight * pressure
+        for a in (0, 1):
+            forces[2 * a] += ring * shapes[a] * (r2 - r1) / 2
+            forces[2 * a + 1] -= ring * shapes[a] * (z2 - z1) / 2
+    return forces
+
+
+def tangent_pressure(X: Sequence[Number], u: Vector, pressure: Number) -> Matrix:
+    """Differences of the residual."""
+    return jacobian(lambda v: residual_pressure(X, v, pressure), u)
+
+
+def residual_contact(
+    X: Sequence[Number],
+    dofs: Sequence[Number],
+    data: Sequence[Number],
+    parameters: Sequence[Number],
+) -> Vector:
+    """Node against an obstacle: (u_z, u_r, lambda) with gap g and augmented pressure l + rho g."""
+    n_z, n_r, c, area, rho = data
+    offset, force_weight = parameters
+    gap = n_z * (X[0] + dofs[0]) + n_r * (X[1] + dofs[1]) - c - offset
+    augmented = dofs[2] + rho * gap
+    if augmented > 0:
+        return [mpf(0), mpf(0), -area * dofs[2] / rho]
+    push = force_weight * area * augmented
+    return [push * n_z, push * n_r, area * gap]
+
+
+def tangent_contact(
+    X: Sequence[Number], dofs: Vector, data: Sequence[Number], parameters: Sequence[Number]
+) -> Matrix:
+    """Differences of the residual (the state must not sit on the switch)."""
+    return jacobian(lambda v: residual_contact(X, v, data, parameters), dofs)

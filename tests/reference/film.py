@@ -1,0 +1,111 @@
+"""Reynolds film on a deformed segment, equations (13)-(18), (20)-(21) and (25)-(28).
+
+Unknowns: u_z1 u_r1 u_z2 u_r2 and the pressures at the Gauss-Lobatto-Legendre points, end 1 to 2.
+Parameters: rod_radius rod_speed viscosity pressure_viscosity cavitation_penalty force_weight
+shear_weight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.rules import lagrange, lobatto, rule
+
+
+@dataclass(frozen=True)
+class FilmPoint:
+    """State of the film at one quadrature point (names as in the paper)."""
+
+    shapes: tuple[Number, Number]
+    test: Vector
+    test_slope: Vector  # d/dx of the pressure shape functions
+    dx: Number
+    ds: Number
+    x: Number
+    r: Number
+    h: Number
+    p: Number
+    slope: Number  # dp/dx
+    viscosity: Number
+    flux: Number
+    tau: Number
+    tau_rod: Number
+    n_ds: tuple[Number, Number]
+
+
+@lru_cache
+def _tables(order: int, kind: str, count: int) -> list[tuple[Number, Number, Vector, Vector]]:
+    nodes = lobatto(order + 1)[0]
+    return [
+        (xi, weight, *lagrange(nodes, xi)) for xi, weight in zip(*rule(kind, count), strict=True)
+    ]
+
+
+def film_points(
+    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
+) -> Iterator[FilmPoint]:
+    """All quadrature points of the segment."""
+    rod_radius, speed, eta_0, alpha = parameters[:4]
+    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    pressures = dofs[4:]
+    half_z, half_r = (z2 - z1) / 2, (r2 - r1) / 2
+    for xi, weight, basis, slopes in _tables(len(pressures) - 1, kind, count):
+        one, two = (1 - xi) / 2, (1 + xi) / 2
+        r = one * r1 + two * r2
+        h = r - rod_radius
+        p = mp.fdot(basis, pressures)
+        slope = mp.fdot(slopes, pressures) / half_z
+        eta = eta_0 * mp.exp(alpha * p)
+        yield FilmPoint(
+            shapes=(one, two),
+            test=basis,
+            test_slope=[s / half_z for s in slopes],
+            dx=weight * half_z,
+            ds=weight * mp.sqrt(half_z**2 + half_r**2),
+            x=one * z1 + two * z2,
+            r=r,
+            h=h,
+            p=p,
+            slope=slope,
+            viscosity=eta,
+            flux=speed / 2 * h - h**3 / (12 * eta) * slope,
+            tau=eta * speed / h - h / 2 * slope,
+            tau_rod=eta * speed / h + h / 2 * slope,
+            n_ds=(weight * half_r, -weight * half_z),
+        )
+
+
+def residual_film(
+    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
+) -> Vector:
+    """Forces of (18) on the two nodes (N), then the Reynolds rows (25)."""
+    penalty, force_weight, shear_weight = parameters[4:]
+    forces, rows = [mpf(0)] * 4, [mpf(0)] * (len(dofs) - 4)
+    for at in film_points(X, dofs, parameters, kind, count):
+        pull = (at.p * at.n_ds[0] - shear_weight * at.tau * at.ds, at.p * at.n_ds[1])
+        for a in (0, 1):
+            for k in (0, 1):
+                forces[2 * a + k] += force_weight * pull[k] * at.shapes[a] * 2 * PI * at.r
+        for i, (value, slope) in enumerate(zip(at.test, at.test_slope, strict=True)):
+            rows[i] += (slope * at.flux + penalty * value * max(-at.p, mpf(0))) * at.dx
+    return forces + rows
+
+
+def tangent_film(
+    X: Sequence[Number], dofs: Vector, parameters: Sequence[Number], kind: str, count: int
+) -> Matrix:
+    """Differences of the residual (no quadrature point may sit at p = 0)."""
+    return jacobian(lambda v: residual_film(X, v, parameters, kind, count), dofs)
+
+
+def fields_film(
+    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
+) -> Matrix:
+    """x dx h p tau flux tau_rod eta at the quadrature points."""
+    return [
+        [at.x, abs(at.dx), at.h, at.p, at.tau, at.flux, at.tau_rod, at.viscosity]
+        for at in film_points(X, dofs, parameters, kind, count)
+    ]

@@ -1,0 +1,151 @@
+"""Exact residual, tangent, energy and fields of a `State`, and the block-wise comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from tests.reference import boundary, film, section, solids
+from tests.reference.differentiate import Matrix, Number, Vector, mpf, numbers
+from tests.reference.states import State
+
+TOLERANCE = 1e-12
+Block = tuple[str, slice]
+Oracle = Callable[[State], Any]
+
+
+def _film(function: Callable[..., Any]) -> Callable[[State], Any]:
+    return lambda s: function(*_exact(s), s.kind, s.count)
+
+
+def _plain(function: Callable[..., Any]) -> Callable[[State], Any]:
+    return lambda s: function(*_exact(s))
+
+
+def _single(function: Callable[..., Any]) -> Callable[[State], Any]:
+    def call(s: State) -> Any:
+        X, u, parameters = _exact(s)
+        return function(X, u, parameters[0])
+
+    return call
+
+
+def _contact(function: Callable[..., Any]) -> Callable[[State], Any]:
+    def call(s: State) -> Any:
+        X, u, parameters = _exact(s)
+        return function(X, u, numbers(s.data), parameters)
+
+    return call
+
+
+def _exact(s: State) -> tuple[Vector, Vector, Vector]:
+    return numbers(s.coordinates), numbers(s.dofs), numbers(s.parameters)
+
+
+RESIDUALS: dict[str, Oracle] = {
+    "solid_q4": _plain(solids.residual_q4),
+    "solid_fbar": _plain(solids.residual_fbar),
+    "solid_taylor": _plain(solids.residual_taylor),
+    "follower_pressure": _single(boundary.residual_pressure),
+    "contact": _contact(boundary.residual_contact),
+    "film": _film(film.residual_film),
+    "mean_rotation": _plain(section.residual_rotation),
+    "axial_spring": _single(section.residual_spring),
+}
+TANGENTS: dict[str, Oracle] = {
+    "solid_q4": _plain(solids.tangent_q4),
+    "solid_fbar": _plain(solids.tangent_fbar),
+    "solid_taylor": _plain(solids.tangent_taylor),
+    "follower_pressure": _single(boundary.tangent_pressure),
+    "contact": _contact(boundary.tangent_contact),
+    "film": _film(film.tangent_film),
+    "mean_rotation": _plain(section.tangent_rotation),
+    "axial_spring": _single(section.tangent_spring),
+}
+ENERGIES: dict[str, Oracle] = {
+    "solid_q4": _plain(solids.energy_q4),
+    "solid_taylor": _plain(solids.energy_taylor),
+    "mean_rotation": _plain(section.energy_rotation),
+    "axial_spring": _single(section.energy_spring),
+}
+FIELDS: dict[str, Oracle] = {
+    "solid_q4": _plain(solids.fields_q4),
+    "solid_fbar": _plain(solids.fields_fbar),
+    "solid_taylor": _plain(solids.fields_taylor),
+    "film": _film(film.fields_film),
+}
+
+
+@lru_cache
+def residual(state: State) -> Vector:
+    """Exact residual (ndof)."""
+    exact: Vector = RESIDUALS[state.family](state)
+    return exact
+
+
+@lru_cache
+def tangent(state: State) -> Matrix:
+    """Exact tangent (ndof, ndof)."""
+    exact: Matrix = TANGENTS[state.family](state)
+    return exact
+
+
+@lru_cache
+def energy(state: State) -> Number:
+    """Exact potential, for the families in `ENERGIES`."""
+    return ENERGIES[state.family](state)
+
+
+@lru_cache
+def fields(state: State) -> Matrix:
+    """Exact fields (points, fields), for the families in `FIELDS`."""
+    exact: Matrix = FIELDS[state.family](state)
+    return exact
+
+
+def blocks(family: str, count: int) -> tuple[Block, ...]:
+    """Groups of unknowns of one kind: displacements, and pressures or multipliers."""
+    split = {"contact": 2, "film": 4, "mean_rotation": 8}.get(family, count)
+    rest = () if split == count else (("p", slice(split, count)),)
+    return (("u", slice(0, split)), *rest)
+
+
+def _difference(actual: np.ndarray, exact: np.ndarray, largest: Number) -> float:
+    """Largest difference over the largest exact entry of its block."""
+    if not np.all(np.isfinite(actual)):
+        return float("inf")
+    wrong = max(abs(mpf(float(a)) - e) for a, e in zip(actual.flat, exact.flat, strict=True))
+    here = max(abs(e) for e in exact.flat)
+    if here <= largest * mpf("1e-35"):  # an empty block must be empty, exactly
+        return 0.0 if not np.any(actual) else float("inf")
+    return float(wrong / here)
+
+
+def residual_errors(actual: np.ndarray, exact: Sequence[Number], family: str) -> dict[str, float]:
+    """Error of each block of a residual (ndof,), relative to the largest exact entry in it."""
+    reference = np.array(exact, dtype=object)
+    largest = max(abs(e) for e in exact)
+    return {
+        name: _difference(np.asarray(actual)[rows], reference[rows], largest)
+        for name, rows in blocks(family, len(exact))
+    }
+
+
+def tangent_errors(actual: np.ndarray, exact: Matrix, family: str) -> dict[str, float]:
+    """Error of each block of a tangent (ndof, ndof), relative to the largest exact entry in it."""
+    reference = np.array(exact, dtype=object)
+    largest = max(abs(e) for e in reference.flat)
+    parts = blocks(family, len(exact))
+    return {
+        row + column: _difference(np.asarray(actual)[i, j], reference[i, j], largest)
+        for row, i in parts
+        for column, j in parts
+    }
+
+
+def agrees(errors: dict[str, float], tolerance: float = TOLERANCE) -> bool:
+    """Whether every block is within the tolerance (NaN is not)."""
+    return all(error <= tolerance for error in errors.values())

@@ -1,0 +1,222 @@
+"""Axisymmetric four-node solids: plain, F-bar and Taylor-expanded, section coordinates (Z, R).
+
+Every function takes the 8 node coordinates (reference), the 8 displacements and the parameters
+(mu_1, mu_2, kappa), all exact numbers; energies in N mm, residuals in N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tests.reference import material
+from tests.reference.differentiate import (
+    PI,
+    STEP,
+    Matrix,
+    Number,
+    Vector,
+    hessian,
+    jacobian,
+    mp,
+    mpf,
+)
+from tests.reference.differentiate import gradient as differences
+from tests.reference.rules import gauss
+
+CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+Coordinates = Sequence[Number]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Geometry of one point: shape functions, gradients by (Z, R), radius, det dX/dxi, weight."""
+
+    shapes: Vector
+    gradients: list[tuple[Number, Number]]
+    radius: Number
+    area: Number
+
+    def deformation(self, u: Sequence[Number]) -> Vector:
+        """F = 1 + Grad u with the hoop stretch 1 + u_r / R."""
+        zz = 1 + mp.fsum(g[0] * u[2 * a] for a, g in enumerate(self.gradients))
+        zr = mp.fsum(g[1] * u[2 * a] for a, g in enumerate(self.gradients))
+        rz = mp.fsum(g[0] * u[2 * a + 1] for a, g in enumerate(self.gradients))
+        rr = 1 + mp.fsum(g[1] * u[2 * a + 1] for a, g in enumerate(self.gradients))
+        tt = 1 + mp.fsum(s * u[2 * a + 1] for a, s in enumerate(self.shapes)) / self.radius
+        return [zz, zr, rz, rr, tt]
+
+    def work(self, P: Sequence[Number]) -> Vector:
+        """Nodal forces P . Grad (delta phi) per unit reference volume."""
+        forces = []
+        for shape, (along_z, along_r) in zip(self.shapes, self.gradients, strict=True):
+            forces.append(P[0] * along_z + P[1] * along_r)
+            forces.append(P[2] * along_z + P[3] * along_r + P[4] * shape / self.radius)
+        return forces
+
+    @property
+    def volume(self) -> Number:
+        """2 pi R dA for unit weight, mm^3."""
+        return 2 * PI * self.radius * self.area
+
+
+def point(X: Coordinates, xi: Number, eta: Number) -> Point:
+    """The bilinear map and its inverse transposed Jacobian at (xi, eta)."""
+    shapes = [(1 + a * xi) * (1 + b * eta) / 4 for a, b in CORNERS]
+    slopes = [(a * (1 + b * eta) / 4, b * (1 + a * xi) / 4) for a, b in CORNERS]
+    z_xi, z_eta = (mp.fsum(s[k] * X[2 * a] for a, s in enumerate(slopes)) for k in (0, 1))
+    r_xi, r_eta = (mp.fsum(s[k] * X[2 * a + 1] for a, s in enumerate(slopes)) for k in (0, 1))
+    det = z_xi * r_eta - z_eta * r_xi
+    gradients = [((s * r_eta - t * r_xi) / det, (t * z_xi - s * z_eta) / det) for s, t in slopes]
+    radius = mp.fsum(s * X[2 * a + 1] for a, s in enumerate(shapes))
+    return Point(shapes, gradients, radius, det)
+
+
+def gauss_places() -> list[tuple[Number, Number]]:
+    """The 2x2 Gauss points (unit weights)."""
+    line = gauss(2)[0]
+    return [(xi, eta) for eta in line for xi in line]
+
+
+def gauss_points(X: Coordinates) -> list[Point]:
+    """Geometry of the 2x2 Gauss points."""
+    return [point(X, xi, eta) for xi, eta in gauss_places()]
+
+
+def energy_q4(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+    """Integral of (3) over the element."""
+    return _energy_q4(gauss_points(X), u, parameters)
+
+
+def _energy_q4(points: list[Point], u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+    return mp.fsum(at.volume * material.energy(at.deformation(u), *parameters) for at in points)
+
+
+def residual_q4(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Vector:
+    """Gradient of the energy."""
+    points = gauss_points(X)
+    return differences(lambda v: _energy_q4(points, v, parameters), u)
+
+
+def tangent_q4(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Matrix:
+    """Second differences of the energy."""
+    points = gauss_points(X)
+    return hessian(lambda v: _energy_q4(points, v, parameters), u)
+
+
+def modified_gradient(at: Point, centre: Point, u: Sequence[Number]) -> tuple[Vector, Number]:
+    """Fbar = (J0/J)^(1/3) F and J/J0, with J0 at the centroid (xi = eta = 0)."""
+    F = at.deformation(u)
+    ratio = material.determinant(F) / material.determinant(centre.deformation(u))
+    return [mp.cbrt(1 / ratio) * entry for entry in F], ratio
+
+
+def residual_fbar(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Vector:
+    """Forces of P_eff = (J/J0)^(2/3) P(Fbar)."""
+    centre, total = point(X, mpf(0), mpf(0)), [mpf(0)] * 8
+    for at in gauss_points(X):
+        Fbar, ratio = modified_gradient(at, centre, u)
+        factor = mp.cbrt(ratio) ** 2
+        stress = [factor * entry for entry in material.first_piola(Fbar, *parameters)]
+        forces = at.work(stress)
+        total = [t + at.volume * f for t, f in zip(total, forces, strict=True)]
+    return total
+
+
+def tangent_fbar(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Matrix:
+    """Differences of the residual."""
+    return jacobian(lambda v: residual_fbar(X, v, parameters), u)
+
+
+def taylor_points(X: Coordinates) -> tuple[list[Point], Point]:
+    """Gauss points whose gradients and shape functions are first-order expansions at the centre.
+
+    The hoop term keeps the exact radius of the point, the weight the Jacobian of the centre.
+    """
+    centre, points = point(X, mpf(0), mpf(0)), []
+    ahead, behind = point(X, STEP, mpf(0)), point(X, -STEP, mpf(0))
+    above, below = point(X, mpf(0), STEP), point(X, mpf(0), -STEP)
+    for xi, eta in gauss_places():
+        gradients = [
+            tuple(
+                centre.gradients[a][k]
+                + xi * (ahead.gradients[a][k] - behind.gradients[a][k]) / (2 * STEP)
+                + eta * (above.gradients[a][k] - below.gradients[a][k]) / (2 * STEP)
+                for k in (0, 1)
+            )
+            for a in range(4)
+        ]
+        shapes = [(1 + a * xi + b * eta) / 4 for a, b in CORNERS]
+        points.append(Point(shapes, gradients, point(X, xi, eta).radius, centre.area))
+    return points, centre
+
+
+def energy_taylor(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+    """Isochoric part at the expanded Gauss points, volumetric part at the centre only."""
+    return _energy_taylor(taylor_points(X), u, parameters)
+
+
+def _energy_taylor(
+    geometry: tuple[list[Point], Point], u: Sequence[Number], parameters: Sequence[Number]
+) -> Number:
+    points, centre = geometry
+    mu_1, mu_2, kappa = parameters
+    shear = mp.fsum(at.volume * material.isochoric(at.deformation(u), mu_1, mu_2) for at in points)
+    I3 = material.third_invariant(centre.deformation(u))
+    return shear + 4 * centre.volume * material.volumetric(I3, kappa)
+
+
+def residual_taylor(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Vector:
+    """Gradient of the energy."""
+    geometry = taylor_points(X)
+    return differences(lambda v: _energy_taylor(geometry, v, parameters), u)
+
+
+def tangent_taylor(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Matrix:
+    """Second differences of the energy."""
+    geometry = taylor_points(X)
+    return hessian(lambda v: _energy_taylor(geometry, v, parameters), u)
+
+
+def fields_q4(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
+    """z, r, J and the Cauchy stress zz, rr, tt, zr at the Gauss points of the plain element."""
+    return [_row(X, u, at, at.deformation(u), parameters) for at in gauss_points(X)]
+
+
+def fields_fbar(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
+    """The same of Fbar: J is that of the centroid, the stress is P_eff F^T / J."""
+    centre = point(X, mpf(0), mpf(0))
+    return [
+        _row(X, u, at, modified_gradient(at, centre, u)[0], parameters) for at in gauss_points(X)
+    ]
+
+
+def fields_taylor(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
+    """J of the centre; Cauchy stress = isochoric Kirchhoff stress of the point / J + dW_v/dJ."""
+    rows, (expanded, centre) = [], taylor_points(X)
+    mu_1, mu_2, kappa = parameters
+    J = material.determinant(centre.deformation(u))
+    mean = differences(lambda x: material.volumetric(x[0] ** 2, kappa), [J])[0]
+    for at, exact in zip(expanded, gauss_points(X), strict=True):
+        zz, zr, rz, rr, tt = F = at.deformation(u)
+        P = differences(lambda G: material.isochoric(G, mu_1, mu_2), F)
+        stress = [
+            (P[0] * zz + P[1] * zr) / J + mean,
+            (P[2] * rz + P[3] * rr) / J + mean,
+            P[4] * tt / J + mean,
+            (P[0] * rz + P[1] * rr) / J,
+        ]
+        rows.append([*_place(X, u, exact), J, *stress])
+    return rows
+
+
+def _row(
+    X: Coordinates, u: Sequence[Number], at: Point, F: Vector, parameters: Sequence[Number]
+) -> Vector:
+    return [*_place(X, u, at), material.determinant(F), *material.cauchy(F, *parameters)]
+
+
+def _place(X: Coordinates, u: Sequence[Number], at: Point) -> Vector:
+    return [
+        mp.fsum(s * (X[2 * a + k] + u[2 * a + k]) for a, s in enumerate(at.shapes)) for k in (0, 1)
+    ]

@@ -1,0 +1,171 @@
+"""Random admissible states of every kernel family (seeded: the same in every run)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+SOLIDS = ("solid_q4", "solid_fbar", "solid_taylor")
+ORDERS = (1, 2, 3, 4, 5, 7)
+UNIT = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) / 2
+
+
+@dataclass(frozen=True)
+class State:
+    """Arguments of one element, as doubles; `kind` and `count` name the film's rule."""
+
+    family: str
+    label: str
+    coordinates: tuple[float, ...]
+    dofs: tuple[float, ...]
+    parameters: tuple[float, ...]
+    data: tuple[float, ...] = ()
+    kind: str = ""
+    count: int = 0
+
+    @property
+    def id(self) -> str:
+        """Name of the test case."""
+        return f"{self.family}-{self.label}"
+
+
+def _tuple(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(value) for value in np.ravel(values))
+
+
+def jacobians(coordinates: np.ndarray, dofs: np.ndarray) -> np.ndarray:
+    """J = det F of the bilinear element at the 2x2 Gauss points and the centre."""
+    X, u = coordinates.reshape(4, 2), dofs.reshape(4, 2)
+    places = [*(2 * UNIT / np.sqrt(3)), np.zeros(2)]
+    values = []
+    for xi, eta in places:
+        shapes = (1 + 2 * UNIT[:, 0] * xi) * (1 + 2 * UNIT[:, 1] * eta) / 4
+        slopes = np.stack(
+            [UNIT[:, 0] * (1 + 2 * UNIT[:, 1] * eta), UNIT[:, 1] * (1 + 2 * UNIT[:, 0] * xi)]
+        )
+        in_plane = np.linalg.det(slopes @ (X + u)) / np.linalg.det(slopes @ X)
+        values.append(in_plane * (shapes @ (X + u)[:, 1]) / (shapes @ X[:, 1]))
+    return np.array(values)
+
+
+def quad(
+    rng: np.random.Generator, radius: float, size: float, distortion: float = 0.15
+) -> np.ndarray:
+    """A distorted, turned quad (8,) around (0.3, radius)."""
+    angle = rng.uniform(0, 2 * np.pi)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    corners = UNIT + distortion * rng.uniform(-1, 1, (4, 2))
+    return np.ravel(size * corners @ turn.T + np.array([0.3, radius]))
+
+
+def displacement(
+    rng: np.random.Generator, coordinates: np.ndarray, strain: float, shift: float
+) -> np.ndarray:
+    """A random finite deformation (8,) with 0.6 < J < 1.6 at every point used by any solid."""
+    X = coordinates.reshape(4, 2)
+    size = np.ptp(X[:, 0])
+    for _ in range(1000):
+        gradient = strain * rng.uniform(-1, 1, (2, 2))
+        u = (X - X.mean(axis=0)) @ gradient.T + shift * rng.uniform(-1, 1, 2)
+        dofs = np.ravel(u + 0.3 * strain * size * rng.uniform(-1, 1, (4, 2)))
+        values = jacobians(coordinates, dofs)
+        if values.min() > 0.6 and values.max() < 1.6:
+            return dofs
+    raise RuntimeError("no admissible state found")
+
+
+def solid_states() -> Iterator[State]:
+    """Paper material and a stiffer one, far from and close to the axis, with rigid shifts."""
+    table = (
+        ("paper", 25.0, 0.1, 0.3, 0.5, (3.04, 0.62, 500.0)),
+        ("inner", 1.5, 0.8, 0.3, 0.2, (3.04, 0.62, 500.0)),
+        ("small-strain", 25.0, 0.05, 0.02, 0.02, (3.04, 0.62, 500.0)),
+        ("stiff", 5.0, 0.5, 0.3, 0.2, (1.0, 2.0, 5e4)),
+    )
+    for family in SOLIDS:
+        rng = np.random.default_rng(1997)
+        for label, radius, size, strain, shift, material in table:
+            X = quad(rng, radius, size)
+            u = displacement(rng, X, strain, shift)
+            yield State(family, label, _tuple(X), _tuple(u), material)
+
+
+def boundary_states() -> Iterator[State]:
+    """Follower pressure, and contact in both branches with full and partial force weight."""
+    rng = np.random.default_rng(1991)
+    X = np.array([-0.1, 25.2, 0.05, 25.1])
+    for label, pressure in (("push", 2.5), ("pull", -0.7)):
+        u = 0.1 * rng.uniform(-1, 1, 4)
+        yield State("follower_pressure", label, _tuple(X), _tuple(u), (pressure,))
+    for label, u_r, multiplier, weight in (
+        ("closed", -0.3, -4.0, 1.0),
+        ("closed-by-multiplier", 0.02, -40.0, 0.4),
+        ("closed-by-gap", -0.3, 3.0, 1.0),
+        ("open", 0.4, -3.0, 0.7),
+        ("open-tension", 0.1, 2.0, 1.0),
+    ):
+        yield State(
+            "contact",
+            label,
+            (0.2, 25.2),
+            (0.11, u_r, multiplier),
+            (0.0125, weight),
+            (0.28, 0.96, 24.25, 18.7, 130.0),
+        )
+
+
+def section_states() -> Iterator[State]:
+    """Mean rotation and axial spring on distorted quads."""
+    rng = np.random.default_rng(2009)
+    for label in ("first", "second"):
+        X, u = quad(rng, 26.9, 0.4), 0.3 * rng.uniform(-1, 1, 8)
+        moment = rng.uniform(-20, 20)
+        yield State(
+            "mean_rotation", label, _tuple(X), (*_tuple(u), moment), (0.013, 26.96, 7.62, 0.05)
+        )
+        yield State("axial_spring", label, _tuple(X), _tuple(u), (0.37,))
+
+
+def film_states(orders: tuple[int, ...] = ORDERS) -> Iterator[State]:
+    """Both rules, both strokes; p > 0, p < 0 and p crossing zero inside the segment; thin films."""
+    rng = np.random.default_rng(1986)
+    for order in orders:
+        for kind, extra in (("gauss", 1), ("lobatto", 2)):
+            for label, speed, level, spread in (
+                ("out-pressed", 400.0, 4.0, 0.3),
+                ("in-crossing", -100.0, 0.0, 2.0),
+                ("out-cavitated", 1600.0, -2.0, 0.3),
+            ):
+                # the second rule of each kind is finer: no count of points is special
+                count = order + extra + (2 if label == "in-crossing" else 0)
+                gaps = rng.uniform(0.003, 0.03, 2)
+                X = np.array([-0.1, 25.4, 0.02, 25.45])
+                # R - R_rod first: u keeps bits that the sum R + u would round away
+                u = np.array([0.01, (25.0 - 25.4) + gaps[0], -0.02, (25.0 - 25.45) + gaps[1]])
+                p = level + spread * rng.uniform(-1, 1, order + 1)
+                if label == "in-crossing":
+                    p[0], p[-1] = -1.5, 1.7
+                yield State(
+                    "film",
+                    f"m{order}-{kind}-{label}",
+                    _tuple(X),
+                    _tuple(np.concatenate([u, p])),
+                    (25.0, speed, 6.59e-8, 0.02, 1e4, 0.8, 0.9),
+                    kind=kind,
+                    count=count,
+                )
+
+
+def thin_film_states() -> Iterator[State]:
+    """A film of about 0.3 micrometres at a radius of 25 mm: h must not be lost in r - R_rod."""
+    for state in film_states((4,)):
+        dofs = list(state.dofs)
+        dofs[1], dofs[3] = -0.3996, -0.44975
+        yield replace(state, label="thin-" + state.label, dofs=tuple(dofs))
+
+
+def all_states() -> list[State]:
+    """Every state of every family."""
+    return [*solid_states(), *boundary_states(), *section_states(), *film_states()]
