@@ -19,7 +19,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 GENERATED = Path(__file__).resolve().parent.parent / "generated"
-FLAGS = ("-std=c11", "-O3", "-march=native", "-fno-math-errno", "-fPIC", "-shared")
+FLAGS = (
+    "-std=c11",
+    "-O3",
+    "-march=native",
+    "-fno-math-errno",
+    "-ffp-contract=fast",
+    "-fPIC",
+    "-shared",
+)
 STRICT = ("-Wall", "-Wextra", "-Werror")
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
 
@@ -38,7 +46,7 @@ def signature(directory: Path) -> str:
 
 def compiler() -> list[str]:
     """The C compiler as a command: $CC, or cc from the PATH."""
-    return shlex.split(os.environ.get("CC", "cc"))
+    return shlex.split(os.environ.get("CC") or "cc")
 
 
 def build(directory: Path = GENERATED, *, extra: Sequence[str] = STRICT) -> Path:

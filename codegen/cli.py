@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from codegen import pipeline
 from codegen.build import GENERATED
@@ -68,7 +68,8 @@ def _trace(family: str) -> int:
 def kernels() -> int:
     """Print the cost table of the manifest."""
     entries = json.loads((GENERATED / "manifest.json").read_text())["kernels"]
-    table = Table("kernel", "task", "operations", "once", "per point", "temporaries", "C bytes")
+    titles = ("task", "operations", "once", "per point", "temporaries", "C bytes")
+    table = Table(Column("kernel", no_wrap=True), *titles)
     for name, entry in entries.items():
         for task, cost in entry["tasks"].items():
             row = (cost["operations"], cost["operations_once"], cost["operations_per_point"])

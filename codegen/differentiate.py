@@ -58,6 +58,8 @@ def _derivative_of_call(g: Graph, n: Node, a: Node) -> Node:
             return g.mul(g.const(Fraction(1, 2)), g.recip(n))
         case Op.CBRT:
             return g.mul(g.const(Fraction(1, 3)), g.recip(g.mul(n, n)))
+        case Op.RCBRT:
+            return g.neg(g.mul(g.const(Fraction(1, 3)), g.mul(n, g.recip(a))))
         case Op.LOG:
             return g.recip(a)
         case Op.EXP:
@@ -101,13 +103,17 @@ def gradient(
     *,
     constant: Collection[Node] = (),
     given: Given | None = None,
+    named: Collection[Node] = (),
 ) -> dict[Node, Node]:
     """Adjoints of every node on the way from `wrt` to the scalar `root` (reverse mode).
+
+    The adjoints of `named` nodes get a name of their own, so that a second differentiation
+    meets them as they are and not merged into other expressions.
 
     For a node that varies with the quadrature point the adjoint is that of the summand: it is
     to be contracted with the node's own dependence and summed by the caller.
     """
-    sweep = _Reverse(g, Dependence(tuple(wrt), constant, given or {}))
+    sweep = _Reverse(g, Dependence(tuple(wrt), constant, given or {}), named=named)
     adjoint = sweep.run(root)
     return {**dict.fromkeys(wrt, g.zero), **adjoint}
 
@@ -118,20 +124,27 @@ class _Reverse:
     depends: Dependence
     flat: bool = False
     stop: Collection[Node] = ()
+    named: Collection[Node] = ()
     adjoint: dict[Node, Node] = field(default_factory=dict)
     summands: dict[Node, Node] = field(default_factory=dict)
 
     def run(self, root: Node) -> dict[Node, Node]:
         self.adjoint[root] = self.g.one
-        for n in reversed(reachable([root])):
+        for n in reversed(reachable([root, *self._hidden()])):
             if not self.depends(n):
                 continue
             if n in self.summands:
                 self._accumulate(self.adjoint, n, self.g.sum(self.summands.pop(n)))
             seed = self.adjoint.get(n)
+            if seed is not None and n in self.named and seed.op is not Op.NAME:
+                seed = self.adjoint[n] = self.g.name(f"d_{n.payload}", seed)
             if seed is not None and n not in self.stop and n not in self.depends.sources:
                 self._propagate(n, seed)
         return self.adjoint
+
+    def _hidden(self) -> list[Node]:
+        """Nodes that only a given derivative refers to."""
+        return [k for pairs in self.depends.given.values() for k in pairs]
 
     def _propagate(self, n: Node, seed: Node) -> None:
         if n.op is Op.SUM:
@@ -140,7 +153,7 @@ class _Reverse:
         for a, p in self._local(n):
             if self.depends(a):
                 into = self.summands if n.varying > a.varying and not self.flat else self.adjoint
-                self._accumulate(into, a, self.g.mul(seed, p))
+                self._accumulate(into, a, guarded(self.g, seed, p))
 
     def _local(self, n: Node) -> Partials:
         if n in self.depends.given:
@@ -154,7 +167,8 @@ class _Reverse:
         condition, then, otherwise = n.args
 
         def leaf(m: Node) -> bool:
-            return m is not n and (m.op in (Op.NAME, Op.INPUT, Op.SUM) or m in self.stop)
+            named = m.op in (Op.NAME, Op.INPUT, Op.SUM) or m in self.depends.sources
+            return m is not n and (named or m in self.stop)
 
         frontier = [m for m in reachable([then, otherwise], stop=leaf) if leaf(m)]
         frontier = [m for m in frontier if self.depends(m)]
@@ -169,7 +183,7 @@ class _Reverse:
         ]
 
     def _accumulate(self, into: dict[Node, Node], n: Node, value: Node) -> None:
-        into[n] = self.g.add(into[n], value) if n in into else value
+        into[n] = _plus(self.g, into[n], value) if n in into else value
 
 
 @dataclass
@@ -177,7 +191,10 @@ class Linearisation:
     """Forward derivatives with respect to `directions`, through the nodes of `waist`.
 
     `symmetric` maps the adjoint of a waist node (of one and the same potential) to that node:
-    mixed second derivatives are then taken once.
+    mixed second derivatives are then taken once.  `upper` holds further waists above the first,
+    lowest first; `gates` maps the adjoint of a node of `upper` to the number of its waist
+    (1, 2, ...): such a value is differentiated with respect to that waist and the chain rule then
+    leads down, so that a narrow waist is never crossed in full width.
     """
 
     g: Graph
@@ -186,18 +203,21 @@ class Linearisation:
     symmetric: Mapping[Node, Node] = field(default_factory=dict)
     constant: Collection[Node] = ()
     given: Given = field(default_factory=dict)
+    upper: Sequence[Collection[Node]] = ()
+    gates: Mapping[Node, int] = field(default_factory=dict)
     _totals: dict[tuple[Node, int], Node] = field(default_factory=dict)
-    _locals: dict[Node, dict[Node, Node]] = field(default_factory=dict)
+    _locals: dict[tuple[Node, int], dict[Node, Node]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._depends = Dependence(tuple(self.directions), self.constant, self.given)
         self._adjoint_of = {z: a for a, z in self.symmetric.items()}
         self._points = [j for j, d in enumerate(self.directions) if d.varying]
+        self._level = {n: k for k, w in enumerate((self.waist, *self.upper)) for n in w}
 
     def derivative(self, n: Node, j: int) -> Node:
         """dn/d(direction j).  Varies when `n` or the direction does (then: of the summand)."""
         if n.varying and n not in self.waist:
-            return self._lift(n, j)
+            return self._over(self.local(n), j)
         return self._total(n, j)
 
     def _total(self, n: Node, j: int) -> Node:
@@ -213,28 +233,24 @@ class Linearisation:
     def _compute_total(self, n: Node, j: int) -> Node:
         g = self.g
         if n.varying:  # a waist node: through the next waist below it
-            return self._over(self._below(n), j)
+            return self._over(self._below(n, 0), j)
         if n.op is Op.SUM:
-            inner = self._lift(n.args[0], j)
+            inner = self._over(self.local(n.args[0]), j)
             return inner if j in self._points else g.sum(inner)
         if n.op is Op.BRANCH:
             c, a, b = n.args
             return g.branch(c, self._total(a, j), self._total(b, j))
         result = g.zero
         for a, p in self._chain(n):
-            result = g.add(result, g.mul(p, self._total(a, j)))
+            result = _plus(g, result, guarded(g, p, self._total(a, j)))
         return result
 
-    def _lift(self, n: Node, j: int) -> Node:
-        """Chain rule over the waist: sum of d n/d z times d z/d(direction)."""
-        return self._over(self.local(n), j)
-
-    def _below(self, n: Node) -> dict[Node, Node]:
-        if n in self.given:
-            return dict(self.given[n])
-        return self.local(n.args[0])
+    def _below(self, n: Node, level: int) -> dict[Node, Node]:
+        """Derivatives of a named value with respect to what lies below it."""
+        return dict(self.given[n]) if n in self.given else self.local(n.args[0], level)
 
     def _over(self, local: Mapping[Node, Node], j: int) -> Node:
+        """Chain rule over the waist: sum of d n/d z times d z/d(direction)."""
         result = self.g.zero
         for z, p in local.items():
             if j in self._points and not z.varying and self._total(z, j) is not self.g.zero:
@@ -242,58 +258,98 @@ class Linearisation:
                     "a value summed over points may not enter a sum again when it depends on an "
                     "interpolated unknown"
                 )
-            result = self.g.add(result, self.g.mul(p, self._total(z, j)))
+            result = _plus(self.g, result, guarded(self.g, p, self._total(z, j)))
         return result
 
     def _chain(self, n: Node) -> Partials:
         pairs = list(self.given[n].items()) if n in self.given else partials(self.g, n)
         return [(a, p) for a, p in pairs if self._depends(a)]
 
-    def local(self, n: Node) -> dict[Node, Node]:
-        """Derivatives of a value at the point with respect to the waist below it."""
-        if n in self._locals:
-            return self._locals[n]
-        for m in reachable([n], stop=self._is_known):
-            if m not in self._locals:
-                self._locals[m] = self._compute_local(m)
-        return self._locals[n]
+    def local(self, n: Node, level: int = 0) -> dict[Node, Node]:
+        """Derivatives of a value at the point with respect to the waist `level` and those below."""
+        for m in reachable([n], stop=lambda m: self._ends(m, level)):
+            if (m, level) not in self._locals:
+                self._locals[m, level] = self._compute_local(m, level)
+        return self._locals[n, level]
 
-    def _is_known(self, n: Node) -> bool:
-        return n in self._locals or n in self.waist or not n.varying
+    def _ends(self, n: Node, level: int) -> bool:
+        gate = self.gates.get(n, 0) > level
+        return (n, level) in self._locals or gate or self._is_key(n, level)
 
-    def _compute_local(self, n: Node) -> dict[Node, Node]:
+    def _is_key(self, n: Node, level: int) -> bool:
+        waist = self._level.get(n)
+        return not n.varying or n in self.directions or (waist is not None and waist <= level)
+
+    def _compute_local(self, n: Node, level: int) -> dict[Node, Node]:
         g = self.g
         if not self._depends(n):
             return {}
-        if n in self.waist or n in self.directions or not n.varying:
+        if self._is_key(n, level):
             return {n: g.one}
+        gate = self.gates.get(n, 0)
+        if gate > level:
+            return self._mirrored(n, self._lowered(self.local(n, gate), level), level)
         if n.op is Op.BRANCH:
             c, a, b = n.args
-            keys = _merged(self.local(a), self.local(b))
+            keys = _merged(self.local(a, level), self.local(b, level))
             return {
-                z: g.branch(c, self.local(a).get(z, g.zero), self.local(b).get(z, g.zero))
+                z: g.branch(
+                    c, self.local(a, level).get(z, g.zero), self.local(b, level).get(z, g.zero)
+                )
                 for z in keys
             }
-        result: dict[Node, Node] = {}
-        for a, p in self._chain(n):
-            for z, q in self.local(a).items():
-                term = g.mul(p, q)
-                result[z] = g.add(result[z], term) if z in result else term
-        return self._mirrored(n, result)
+        pairs = [(p, self.local(a, level)) for a, p in self._chain(n)]
+        return self._mirrored(n, self._combined(pairs), level)
 
-    def _mirrored(self, n: Node, result: dict[Node, Node]) -> dict[Node, Node]:
+    def _lowered(self, above: Mapping[Node, Node], level: int) -> dict[Node, Node]:
+        """Derivatives with respect to an upper waist carried down to the waist `level`."""
+        pairs = []
+        for z, p in above.items():
+            down = {z: self.g.one} if self._is_key(z, level) else self._below(z, level)
+            pairs.append((p, down))
+        return self._combined(pairs)
+
+    def _combined(self, pairs: Iterable[tuple[Node, Mapping[Node, Node]]]) -> dict[Node, Node]:
+        result: dict[Node, Node] = {}
+        for p, derivatives in pairs:
+            for z, q in derivatives.items():
+                term = guarded(self.g, p, q)
+                result[z] = _plus(self.g, result[z], term) if z in result else term
+        return result
+
+    def _mirrored(self, n: Node, result: dict[Node, Node], level: int) -> dict[Node, Node]:
         """Schwarz: d(dW/dz_k)/dz_l is d(dW/dz_l)/dz_k, taken for the earlier of the two."""
         own = self.symmetric.get(n)
-        if own is None:
+        if own is None or self._level.get(own) != level:
             return result
         for z in list(result):
             other = self._adjoint_of.get(z)
-            if other is not None and z.id < own.id and self._same_potential(other):
-                result[z] = self.local(other).get(own, self.g.zero)
+            peers = self._level.get(z) == level and z.id < own.id
+            if other is not None and peers and self._depends(other):
+                result[z] = self.local(other, level).get(own, self.g.zero)
         return result
 
-    def _same_potential(self, adjoint: Node) -> bool:
-        return self.symmetric.get(adjoint) is not None and self._depends(adjoint)
+
+def guarded(g: Graph, a: Node, b: Node) -> Node:
+    """Product that goes inside a branch with a zero side: what is not taken is never evaluated."""
+    for x, y in ((a, b), (b, a)):
+        if x.op is Op.NEG and x.args[0].op is Op.BRANCH:
+            return g.neg(guarded(g, x.args[0], y))
+        if x.op is Op.BRANCH and g.zero in x.args[1:]:
+            c, then, otherwise = x.args
+            return g.branch(c, guarded(g, then, y), guarded(g, otherwise, y))
+    return g.mul(a, b)
+
+
+def _plus(g: Graph, a: Node, b: Node) -> Node:
+    """Sum that joins two branches with a zero on the same side of the same condition."""
+    if a.op is Op.BRANCH and b.op is Op.BRANCH and a.args[0] is b.args[0]:
+        for k in (1, 2):
+            if a.args[k] is g.zero and b.args[k] is g.zero:
+                return g.branch(
+                    a.args[0], _plus(g, a.args[1], b.args[1]), _plus(g, a.args[2], b.args[2])
+                )
+    return g.add(a, b)
 
 
 def _merged(a: Mapping[Node, Node], b: Mapping[Node, Node]) -> list[Node]:

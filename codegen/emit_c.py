@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from codegen import abi
+from codegen import abi, support_c
 from codegen.graph import BOOLEAN, Input, Node, Op
 from codegen.model import Definition
 from codegen.schedule import If, Loop, Schedule, Statement
@@ -38,6 +38,7 @@ _FORMATS: dict[Op, str] = {
     Op.RECIP: "1.0 / {}",
     Op.SQRT: "sqrt({})",
     Op.CBRT: "cbrt({})",
+    Op.RCBRT: "softehl_rcbrt({})",
     Op.LOG: "log({})",
     Op.EXP: "exp({})",
     Op.SIN: "sin({})",
@@ -66,7 +67,7 @@ def number(value: float) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-class _Printer:
+class Printer:
     """Lines of one function body."""
 
     def __init__(self, definition: Definition) -> None:
@@ -122,7 +123,7 @@ def function(
     definition: Definition, task: abi.Task, entries: Sequence[Entry], plan: Schedule
 ) -> tuple[str, int]:
     """C text of one kernel and the number of its temporaries."""
-    p = _Printer(definition)
+    p = Printer(definition)
     p.line(1, "for (ptrdiff_t e = 0; e < n; ++e) {")
     _pointers(p, task)
     scattered = [x for x in entries if _in_loop(x)]
@@ -131,10 +132,8 @@ def function(
     for stage in plan.stages:
         p.block(2, stage.before)
         if stage.loop is not None:
-            _loop(p, stage.loop, lambda: _store_in_loop(p, task, entries))
-    for x in entries:
-        if not _in_loop(x) and task is not abi.Task.FIELDS:
-            p.line(2, f"{_target(definition, task, x)} = {p.ref(x.node)};")
+            _loop(p, stage.loop, task, entries)
+    _store_after(p, task, entries)
     p.line(1, "}")
     body = "\n".join(_unused(p.lines) + p.lines)
     text = f"{abi.declaration(definition.name, task)}\n{{\n{body}\n}}\n"
@@ -145,33 +144,52 @@ def _in_loop(x: Entry) -> bool:
     return x.row.basis or (x.column is not None and x.column.basis) or x.node.varying
 
 
-def _dofs(d: Definition) -> str:
+def dofs_expression(d: Definition) -> str:
     direct = len(d.unknowns)
     return f"({direct} + modes)" if d.interpolated else str(direct)
 
 
-def _pointers(p: _Printer, task: abi.Task) -> None:
+def _pointers(p: Printer, task: abi.Task) -> None:
     d = p.d
     p.line(2, f"const double *restrict X = coordinates + {2 * d.nodes} * e;")
-    p.line(2, f"const double *restrict d = dofs + {_dofs(d)} * e;")
+    p.line(2, f"const double *restrict d = dofs + {dofs_expression(d)} * e;")
     if d.data:
         p.line(2, f"const double *restrict a = data + {len(d.data)} * e;")
     if task in (abi.Task.RESIDUAL, abi.Task.TANGENT):
-        p.line(2, f"double *restrict R = values + {_dofs(d)} * e;")
+        p.line(2, f"double *restrict R = values + {dofs_expression(d)} * e;")
     if task is abi.Task.TANGENT:
-        p.line(2, f"double *restrict K = tangent + {_dofs(d)} * {_dofs(d)} * e;")
+        p.line(
+            2, f"double *restrict K = tangent + {dofs_expression(d)} * {dofs_expression(d)} * e;"
+        )
     for name, arrays in (("X", "coordinates"), ("d", "dofs"), ("a", "data")):
         if name != "a" or d.data:
             p.line(2, f"(void){name};  /* {arrays} */")
 
 
-def _clear(p: _Printer, task: abi.Task) -> None:
-    p.line(2, f"for (ptrdiff_t i = 0; i < {_dofs(p.d)}; ++i) R[i] = 0.0;")
+def _clear(p: Printer, task: abi.Task) -> None:
+    p.line(2, f"for (ptrdiff_t i = 0; i < {dofs_expression(p.d)}; ++i) R[i] = 0.0;")
     if task is abi.Task.TANGENT:
-        p.line(2, f"for (ptrdiff_t i = 0; i < {_dofs(p.d)} * {_dofs(p.d)}; ++i) K[i] = 0.0;")
+        p.line(
+            2,
+            f"for (ptrdiff_t i = 0; i < {dofs_expression(p.d)} * {dofs_expression(p.d)}; ++i) K[i] = 0.0;",
+        )
 
 
-def _loop(p: _Printer, loop: Loop, store: Callable[[], None]) -> None:
+def _store_after(p: Printer, task: abi.Task, entries: Sequence[Entry]) -> None:
+    """Outputs that are complete when all loops are done."""
+    if task is not abi.Task.FIELDS:
+        for x in entries:
+            if not _in_loop(x):
+                p.line(2, f"{_target(p.d, task, x)} = {p.ref(x.node)};")
+        return
+    fixed = [x for x in entries if not x.node.varying]
+    if fixed:
+        p.line(2, "for (ptrdiff_t q = 0; q < points; ++q) {")
+        _store_fields(p, fixed)
+        p.line(2, "}")
+
+
+def _loop(p: Printer, loop: Loop, task: abi.Task, entries: Sequence[Entry]) -> None:
     for s in loop.sums:
         p.line(2, f"double {p.fresh(s, 's')} = 0.0;")
     p.line(2, "for (ptrdiff_t q = 0; q < points; ++q) {")
@@ -187,34 +205,37 @@ def _loop(p: _Printer, loop: Loop, store: Callable[[], None]) -> None:
     p.block(3, loop.body)
     for s in loop.sums:
         p.line(3, f"{p.ref(s)} += {p.ref(s.args[0])};")
-    if loop.outputs:
-        store()
+    here = [x for x in entries if x.node in loop.outputs]
+    if here and task is abi.Task.FIELDS:
+        _store_fields(p, here)
+    elif here:
+        _scatter(p, task, here)
     p.line(2, "}")
 
 
-def _store_in_loop(p: _Printer, task: abi.Task, entries: Sequence[Entry]) -> None:
-    if task is abi.Task.FIELDS:
-        width = len(p.d.fields)
-        p.line(3, f"double *restrict out = values + {width} * (points * e + q);")
-        for x in entries:
-            p.line(3, f"out[{x.row.position}] = {p.ref(x.node)};")
-        return
+def _store_fields(p: Printer, entries: Sequence[Entry]) -> None:
+    p.line(3, f"double *restrict out = values + {len(p.d.fields)} * (points * e + q);")
+    for x in entries:
+        p.line(3, f"out[{x.row.position}] = {p.ref(x.node)};")
+
+
+def _scatter(p: Printer, task: abi.Task, entries: Sequence[Entry]) -> None:
     direct = len(p.d.unknowns)
-    at = {(x.row, x.column): p.ref(x.node) for x in entries if _in_loop(x)}
+    at = {(x.row, x.column): p.ref(x.node) for x in entries}
     p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
     p.line(4, "const double N = B[2 * i], D = B[2 * i + 1];")
     for column, target in _scatter_targets(p.d, task):
         left = _combination([at.get(k) for k in column])
         if left:
             p.line(4, f"{target} += {left};")
-    if task is abi.Task.TANGENT:
-        for c in (0, 1):
-            pair = [at.get((Slot(True, r), Slot(True, c))) for r in (0, 1)]
+    blocks = [[at.get((Slot(True, r), Slot(True, c))) for r in (0, 1)] for c in (0, 1)]
+    if any(value is not None for pair in blocks for value in pair):
+        for c, pair in enumerate(blocks):
             p.line(4, f"const double r{c} = {_combination(pair) or '0.0'};")
         p.line(4, "for (ptrdiff_t j = 0; j < modes; ++j)")
         p.line(
             5,
-            f"K[({direct} + i) * {_dofs(p.d)} + {direct} + j] "
+            f"K[({direct} + i) * {dofs_expression(p.d)} + {direct} + j] "
             "+= r0 * B[2 * j] + r1 * B[2 * j + 1];",
         )
     p.line(3, "}")
@@ -225,7 +246,7 @@ Key = tuple[Slot, Slot | None]
 
 def _scatter_targets(d: Definition, task: abi.Task) -> list[tuple[list[Key], str]]:
     """Pairs (value and derivative component of an output, its place for basis function i)."""
-    direct, dofs = len(d.unknowns), _dofs(d)
+    direct, dofs = len(d.unknowns), dofs_expression(d)
     both = [Slot(True, 0), Slot(True, 1)]
     out: list[tuple[list[Key], str]] = [([(s, None) for s in both], f"R[{direct} + i]")]
     if task is abi.Task.TANGENT:
@@ -245,7 +266,7 @@ def _target(d: Definition, task: abi.Task, x: Entry) -> str:
     if x.column is None:
         return f"R[{x.row.position}]"
     if d.interpolated:
-        return f"K[{x.row.position} * {_dofs(d)} + {x.column.position}]"
+        return f"K[{x.row.position} * {dofs_expression(d)} + {x.column.position}]"
     return f"K[{x.row.position * len(d.unknowns) + x.column.position}]"
 
 
@@ -265,18 +286,14 @@ def _banner(d: Definition) -> str:
     def rows(label: str, entries: Iterable[str]) -> list[str]:
         return [f" * {label}[{k}]  {text}" for k, text in enumerate(entries)]
 
-    lines = [
-        "/* Generated by softehl from a model page; do not edit.",
-        " *",
-        f" * {d.name}: {d.doc}",
-    ]
-    lines += [" *", *rows("dofs", d.unknowns)]
+    lines = [" *", f" * {d.name}: {d.doc}", " *", *rows("dofs", d.unknowns)]
     if d.interpolated:
         lines.append(f" * dofs[{len(d.unknowns)} + i]  {d.interpolated}, i < modes")
     for label, arguments in (("parameters", d.parameters), ("data", d.data)):
         lines += rows(label, [f"{a.name}: {a.meaning}" for a in arguments])
     lines += rows("fields", [name for name, _ in d.fields])
-    return "\n".join([*lines, " */"])
+    text = "\n".join(lines).replace("*/", "* /")
+    return f"/* Generated by softehl from a model page; do not edit.\n{text}\n */"
 
 
 def header(declarations: Iterable[str]) -> str:
@@ -290,5 +307,10 @@ def header(declarations: Iterable[str]) -> str:
         "#include <math.h>",
         "#include <stddef.h>",
     ]
-    lines += ["", *(f"{d};" for d in declarations), "", "const char *softehl_signature(void);"]
+    lines += [
+        support_c.TEXT,
+        *(f"{d};" for d in declarations),
+        "",
+        "const char *softehl_signature(void);",
+    ]
     return "\n".join([*lines, "", "#endif", ""])

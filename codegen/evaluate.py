@@ -26,6 +26,7 @@ _UNARY: dict[Op, Callable[[Number], Number]] = {
     Op.RECIP: lambda a: 1 / a,
     Op.SQRT: mpmath.sqrt,
     Op.CBRT: mpmath.cbrt,
+    Op.RCBRT: lambda a: 1 / mpmath.cbrt(a),
     Op.LOG: mpmath.log,
     Op.EXP: mpmath.exp,
     Op.SIN: mpmath.sin,

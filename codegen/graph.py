@@ -32,6 +32,7 @@ class Op(StrEnum):
     POW = "pow"
     SQRT = "sqrt"
     CBRT = "cbrt"
+    RCBRT = "rcbrt"
     LOG = "log"
     EXP = "exp"
     SIN = "sin"
@@ -225,12 +226,14 @@ class Graph:
         return self.node(Op.POW, (a,), e)
 
     def call(self, op: Op, a: Node) -> Node:
-        """A function of one argument (SQRT, CBRT, LOG, EXP, SIN, COS)."""
+        """A function of one argument (SQRT, CBRT, RCBRT = 1/CBRT, LOG, EXP, SIN, COS)."""
         if op is Op.LOG and a is self.one:
             return self.zero
         if op is Op.EXP and a is self.zero:
             return self.one
         if op in (Op.SQRT, Op.CBRT) and a in (self.zero, self.one):
+            return a
+        if op is Op.RCBRT and a is self.one:
             return a
         return self.node(op, (a,))
 
@@ -268,7 +271,7 @@ class Graph:
         maker = self._makers().get(op)
         if maker is not None:
             return maker(*args)
-        if op in (Op.SQRT, Op.CBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS):
+        if op in (Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS):
             return self.call(op, args[0])
         return self.node(op, tuple(args))
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 from codegen.abi import Task
 from codegen.differentiate import Linearisation, gradient
 from codegen.emit_c import Entry, Slot
-from codegen.graph import Node
+from codegen.graph import Graph, Node
 from codegen.model import Definition
+from codegen.waists import Waist, linear_waist, quadratic_waist, strip, substitute
 
 
 def tasks(d: Definition) -> list[Task]:
@@ -23,6 +27,9 @@ def outputs(d: Definition, task: Task) -> list[Entry]:
         return [Entry(Slot(False, 0), None, d.potential)]
     if task is Task.FIELDS:
         return [Entry(Slot(False, k), None, node) for k, (_, node) in enumerate(d.fields)]
+    modal = _modal(d)
+    if modal is not None:
+        return modal.residual() + (modal.tangent() if task is Task.TANGENT else [])
     adjoint = gradient(d.graph, d.potential, d.directions, constant=d.constant, given=d.given)
     slots = _slots(d)
     rows = [Entry(s, None, adjoint[u]) for s, u in zip(slots, d.directions, strict=True)]
@@ -54,3 +61,114 @@ def _tangent(
         for (i, j), n in entries.items()
         if not (slots[i].basis or slots[j].basis) or n is not d.graph.zero
     ]
+
+
+def _modal(d: Definition) -> _Modal | None:
+    """The model through its automatic waist; None where that does not apply."""
+    if d.interpolated or d.given:
+        return None
+    g = d.graph
+    (root,), kept = strip(g, [d.potential], d.constant)
+    waist = linear_waist(g, [root], d.directions)
+    if waist is None:
+        return None
+    forms = {z: g.name(f"z{k}", value) for k, (z, value) in enumerate(waist.rewritten.items())}
+    (root,), new = substitute(g, [root], forms)
+    constant = tuple(new[kept[c]] for c in d.constant)
+    squares = {
+        q: g.name(f"q{k}", q)
+        for k, q in enumerate(quadratic_waist([root], tuple(forms.values()), constant))
+    }
+    (root,), new = substitute(g, [root], squares)
+    constant = tuple(new[c] for c in constant)
+    return _Modal(d, root, constant, waist, tuple(forms.values()), tuple(squares.values()))
+
+
+@dataclass(frozen=True)
+class _Modal:
+    """Derivatives in modal coordinates, carried to the unknowns by their constant matrix."""
+
+    d: Definition
+    root: Node
+    constant: tuple[Node, ...]
+    waist: Waist
+    forms: tuple[Node, ...]
+    squares: tuple[Node, ...]
+
+    def _adjoint(self) -> dict[Node, Node]:
+        return gradient(
+            self.d.graph,
+            self.root,
+            self.waist.modes,
+            constant=self.constant,
+            named=(*self.waist.point, *self.forms, *self.squares),
+        )
+
+    def residual(self) -> list[Entry]:
+        """R_i = sum of V_ki dPi/dm_k."""
+        adjoint = self._adjoint()
+        rows = self._spread([adjoint[m] for m in self.waist.modes])
+        return [Entry(Slot(False, i), None, n) for i, n in enumerate(rows)]
+
+    def tangent(self) -> list[Entry]:
+        """K_ij = sum of V_ki (d2 Pi / dm_k dm_l) V_lj."""
+        modal = self._modal_tangent()
+        half = [self._spread(row) for row in modal]
+        full = [self._spread(column) for column in zip(*half, strict=True)]
+        size = range(len(full))
+        upper = self.d.conservative
+        return [
+            Entry(Slot(False, i), Slot(False, j), full[i][j] if upper and j < i else full[j][i])
+            for i in size
+            for j in size
+        ]
+
+    def _modal_tangent(self) -> list[list[Node]]:
+        """Symmetric part at fixed constants, plus what the constants contribute."""
+        g, modes, adjoint = self.d.graph, self.waist.modes, self._adjoint()
+        fixed = self._forward(adjoint, modes, self.constant)
+        size = range(len(modes))
+        rows: list[list[Node]] = [[] for _ in modes]
+        for k in size:
+            for j in size:
+                rows[k].append(rows[j][k] if j < k else fixed.derivative(adjoint[modes[k]], j))
+        if not self.constant:
+            return rows
+        by_constant = self._forward(adjoint, self.constant, modes)
+        moving = Linearisation(g, modes, self._levels()[0])
+        for i, c in enumerate(self.constant):
+            for k in size:
+                slope = by_constant.derivative(adjoint[modes[k]], i)
+                for j in size:
+                    term = g.mul(slope, moving.derivative(c, j))
+                    rows[k][j] = g.add(rows[k][j], g.sum(term) if c.varying else term)
+        return rows
+
+    def _levels(self) -> list[list[Node]]:
+        waists = (self.waist.point, self.forms, self.squares)
+        return [v for v in ([n for n in w if n.varying] for w in waists) if v] or [[]]
+
+    def _forward(
+        self, adjoint: dict[Node, Node], directions: Sequence[Node], constant: Sequence[Node]
+    ) -> Linearisation:
+        levels = self._levels()
+        return Linearisation(
+            self.d.graph,
+            directions,
+            levels[0],
+            symmetric={adjoint[z]: z for level in levels for z in level if z in adjoint},
+            constant=constant,
+            upper=levels[1:],
+            gates={adjoint[z]: k for k, level in enumerate(levels) for z in level if z in adjoint},
+        )
+
+    def _spread(self, modal: Sequence[Node]) -> list[Node]:
+        """Values at the unknowns of a linear functional of the modal coordinates."""
+        g: Graph = self.d.graph
+        at = {u.id: i for i, u in enumerate(self.d.directions)}
+        out = [g.zero for _ in self.d.directions]
+        for value, vector in zip(modal, self.waist.matrix, strict=True):
+            for source, c in vector:
+                i = at[source]
+                out[i] = g.add(out[i], g.mul(g.const(c), value))
+        return out

@@ -37,6 +37,7 @@ class Definition:
     parameters: tuple[Argument, ...]
     data: tuple[Argument, ...]
     rule: QuadratureRule
+    unroll: bool
     graph: Graph
     potential: Node
     constant: tuple[Node, ...]
@@ -52,10 +53,16 @@ class Definition:
 
 
 class Model:
-    """Builder of a `Definition`; every method declares or names something."""
+    """Builder of a `Definition`; every method declares or names something.
 
-    def __init__(self, name: str, *, nodes: int, rule: QuadratureRule, doc: str = "") -> None:
-        self.name, self.nodes, self.rule = name, nodes, rule
+    With `unroll` the loop over the points of `rule` is written out: faster, and the rule is then
+    part of the kernel.  Otherwise `rule` is the default of a kernel that takes any.
+    """
+
+    def __init__(
+        self, name: str, *, nodes: int, rule: QuadratureRule, unroll: bool = False, doc: str = ""
+    ) -> None:
+        self.name, self.nodes, self.rule, self.unroll = name, nodes, rule, unroll
         self.doc = " ".join(doc.split())
         self.graph = Graph()
         self._bound: dict[sp.Symbol, Node] = {}
@@ -99,6 +106,8 @@ class Model:
 
     def interpolated(self, name: str) -> tuple[sp.Symbol, sp.Symbol]:
         """Value and xi-derivative of a field with any number of element unknowns (`modes`)."""
+        if self._interpolated:
+            raise ModelError(f"{name}: the element interpolates {self._interpolated} already")
         self._interpolated = name
         pair = [
             self._input(label, "interpolated", k, varying=True)
@@ -141,6 +150,8 @@ class Model:
         the true derivative by given ones with respect to chosen symbols.
         """
         if isinstance(expression, sp.MatrixBase):
+            if derivative is not None:
+                raise ModelError(f"{name}: give the derivative of each entry, not of the matrix")
             rows, columns = expression.shape
             return sp.Matrix(
                 rows,
@@ -160,8 +171,12 @@ class Model:
 
     def potential(self, expression: Any, *, constant: Iterable[Any] = ()) -> None:
         """The residual is the gradient of `expression` with the `constant` symbols frozen."""
-        self._constant = [self._bound[s] for s in constant]
+        self._constant = [self._lower(s) for s in constant]
         self._potential = self._lower(expression)
+        if self._potential.varying:
+            raise ModelError(
+                f"the potential of {self.name} varies with the point: wrap it in integral(...)"
+            )
 
     def weak_form(self, terms: Sequence[tuple[Any, Any]]) -> None:
         """Residual = integral of sum(factor * variation of varied) over (factor, varied)."""
@@ -189,6 +204,7 @@ class Model:
             parameters=tuple(self._arguments["parameters"]),
             data=tuple(self._arguments["data"]),
             rule=self.rule,
+            unroll=self.unroll,
             graph=self.graph,
             potential=self._potential,
             constant=tuple(self._constant),

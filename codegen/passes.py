@@ -13,7 +13,8 @@ from fractions import Fraction
 
 import mpmath
 
-from codegen.graph import BOOLEAN, Graph, Node, Op, operations, reachable
+from codegen.graph import BOOLEAN, Graph, Input, Node, Op, operations, reachable
+from codegen.sums import common_sums
 
 Roots = list[Node]
 
@@ -78,11 +79,20 @@ def powers(g: Graph, roots: Roots) -> Roots:
 
 
 def _power(g: Graph, a: Node, e: Fraction) -> Node:
-    root = {1: a, 2: Op.SQRT, 3: Op.CBRT}.get(e.denominator)
-    if root is None:
-        return g.power(a, e)
-    base = g.call(root, a) if isinstance(root, Op) else a
-    return _integer_power(g, g.recip(base) if e < 0 else base, abs(e.numerator))
+    n = abs(e.numerator)
+    match e.denominator, e < 0:
+        case 1, negative:
+            base = g.recip(a) if negative else a
+        case 2, negative:
+            base = g.call(Op.SQRT, g.recip(a) if negative else a)
+        case 3, True:
+            base = g.call(Op.RCBRT, a)
+        case 3, False:  # a r^2 with r = a^(-1/3): one kind of root for both signs
+            r = g.call(Op.RCBRT, a)
+            base = g.mul(a, g.mul(r, r))
+        case _:
+            return g.power(a, e)
+    return _integer_power(g, base, n)
 
 
 def _integer_power(g: Graph, a: Node, n: int) -> Node:
@@ -91,20 +101,6 @@ def _integer_power(g: Graph, a: Node, n: int) -> Node:
     half = _integer_power(g, a, n // 2)
     square = g.mul(half, half)
     return g.mul(square, a) if n % 2 else square
-
-
-def signs(g: Graph, roots: Roots) -> Roots:
-    """Value numbering up to sign: a - b and b - a become one value."""
-    seen = {n for n in reachable(roots) if n.op is Op.SUB}
-
-    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
-        if n.op is Op.SUB:
-            mirrored = g.node(Op.SUB, (n.args[1], n.args[0]))
-            if mirrored in seen and mirrored.id < n.id:
-                return g.neg(g.sub(args[1], args[0]))
-        return g.rebuild(n.op, args, n.payload)
-
-    return rewrite(g, roots, rule)
 
 
 def _uses(roots: Roots) -> Counter[Node]:
@@ -244,24 +240,21 @@ def literals(g: Graph, roots: Roots) -> Roots:
     value: dict[Node, mpmath.mpf] = {}
 
     def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
-        built = g.rebuild(n.op, args, n.payload)
-        if built.op in (Op.CONST, Op.SUM, Op.BRANCH) or built.op in BOOLEAN:
-            return built
-        if built.op is not Op.PI and not (
-            built.args and all(a.op is Op.CONST or a in value for a in built.args)
-        ):
-            return built
+        known = all(a.op is Op.CONST for a in args) and (bool(args) or n.op is Op.PI)
+        if not known or n.op in (Op.SUM, Op.BRANCH) or n.op in BOOLEAN:
+            return g.rebuild(n.op, args, n.payload)
         with mpmath.workdps(50):
-            number = _number(built, [_exact(a, value) for a in built.args])
-            literal = g.const(Fraction(float(number)))
-            value[literal] = number
-        return literal
+            number = _number(
+                n, [value.get(o, _exact(a)) for o, a in zip(n.args, args, strict=True)]
+            )
+            value[n] = number
+            return g.const(Fraction(float(number)))
 
     return rewrite(g, roots, rule)
 
 
-def _exact(n: Node, value: dict[Node, mpmath.mpf]) -> mpmath.mpf:
-    return value.get(n, mpmath.mpf(n.value.numerator) / n.value.denominator)
+def _exact(n: Node) -> mpmath.mpf:
+    return mpmath.mpf(n.value.numerator) / n.value.denominator
 
 
 def _number(n: Node, args: list[mpmath.mpf]) -> mpmath.mpf:
@@ -278,6 +271,7 @@ def _number(n: Node, args: list[mpmath.mpf]) -> mpmath.mpf:
         Op.RECIP: lambda a: 1 / a,
         Op.SQRT: mpmath.sqrt,
         Op.CBRT: mpmath.cbrt,
+        Op.RCBRT: lambda a: 1 / mpmath.cbrt(a),
         Op.LOG: mpmath.log,
         Op.EXP: mpmath.exp,
         Op.SIN: mpmath.sin,
@@ -286,13 +280,61 @@ def _number(n: Node, args: list[mpmath.mpf]) -> mpmath.mpf:
     return functions[n.op](*args)
 
 
+def unrolled(points: Sequence[Sequence[Fraction]]) -> Pass:
+    """Loops over the points written out; `points` holds (coordinates..., weight) of each.
+
+    The coordinates are rationals good to far more digits than a double holds.
+    """
+
+    def apply(g: Graph, roots: Roots) -> Roots:
+        new: dict[Node, Node] = {}
+        copies: list[dict[Node, Node]] = [{} for _ in points]
+
+        def at(n: Node, q: int) -> Node:
+            return copies[q][n] if n.varying else new[n]
+
+        for n in reachable(roots):
+            if n.op is Op.SUM:
+                new[n] = g.zero
+                for q in range(len(points)):
+                    new[n] = g.add(new[n], at(n.args[0], q))
+            elif not n.varying:
+                new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+            else:
+                for q, point in enumerate(points):
+                    if isinstance(n.payload, Input):
+                        copies[q][n] = g.const(point[n.payload.index])
+                    else:
+                        args = tuple(at(a, q) for a in n.args)
+                        copies[q][n] = g.rebuild(n.op, args, n.payload)
+        return [new[r] for r in roots]
+
+    return Pass("unroll", apply)
+
+
 STANDARD = (
     Pass("fold", fold),
     Pass("assume", assume),
     Pass("powers", powers),
-    Pass("signs", signs),
     Pass("invariants first", invariants_first),
     Pass("common factors", factor),
+    Pass("common sums", common_sums),
     Pass("common factors again", factor),
     Pass("literals", literals),
 )
+
+
+def straight_line(points: Sequence[Sequence[Fraction]]) -> tuple[Pass, ...]:
+    """The passes of a kernel whose loop over the points is written out."""
+    return (
+        Pass("fold", fold),
+        Pass("assume", assume),
+        Pass("powers", powers),
+        Pass("common factors", factor),
+        unrolled(points),
+        Pass("invariants first", invariants_first),
+        Pass("common sums", common_sums),
+        Pass("common factors again", factor),
+        Pass("common sums again", common_sums),
+        Pass("literals", literals),
+    )

@@ -6,9 +6,10 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
-from codegen import abi, emit_c, linearise, passes
+from codegen import abi, emit_c, emit_simd, linearise, passes
 from codegen.model import Definition
 from codegen.schedule import Schedule, schedule
 
@@ -42,11 +43,21 @@ def compile_model(definition: Definition) -> KernelSource:
 def compile_task(definition: Definition, task: abi.Task) -> Function:
     """One kernel, all stages in order."""
     entries = linearise.outputs(definition, task)
-    roots, trace = passes.run(definition.graph, [x.node for x in entries], passes.STANDARD)
+    written_out = definition.unroll and task is not abi.Task.FIELDS
+    chosen = passes.straight_line(_points(definition)) if written_out else passes.STANDARD
+    roots, trace = passes.run(definition.graph, [x.node for x in entries], chosen)
     entries = [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
     plan = schedule(roots)
-    text, temporaries = emit_c.function(definition, task, entries, plan)
+    printer = emit_simd if emit_simd.suits(plan) else emit_c
+    text, temporaries = printer.function(definition, task, entries, plan)
     return Function(text, plan, temporaries, trace)
+
+
+def _points(definition: Definition) -> list[list[Fraction]]:
+    """Rows (coordinates..., weight) of the model's rule, to 60 digits."""
+    scale = 10**60
+    rows = zip(definition.rule.points, definition.rule.weights, strict=True)
+    return [[Fraction(int(x.evalf(70) * scale), scale) for x in (*p, w)] for p, w in rows]
 
 
 def files(kernels: Iterable[KernelSource]) -> dict[str, str]:
@@ -86,6 +97,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "parameters": {a.name: a.meaning for a in d.parameters},
         "data": {a.name: a.meaning for a in d.data},
         "fields": [name for name, _ in d.fields],
+        "unrolled": d.unroll,
         "rule": {"points": points, "weights": [float(w.evalf(30)) for w in d.rule.weights]},
         "tasks": {t: _cost(f, len(points)) for t, f in kernel.functions.items()},
         "bytes": len(kernel.text.encode()),

@@ -62,7 +62,7 @@ def schedule(roots: Sequence[Node]) -> Schedule:
     stages, once, looped = [], 0, 0
     for k in range(top + 1):
         fixed = [n for n in nodes if not n.varying and level[n] == k and _computed(n)]
-        before = place(fixed, fixed_roots(fixed, nodes, roots))
+        before = place(depth_first(fixed, roots), fixed_roots(fixed, nodes, roots))
         feeds = tuple(s for s in sums if level[s] == k + 1)
         outputs = tuple(r for r in varying if level[r] == k)
         ends = [*(s.args[0] for s in feeds), *outputs]
@@ -70,10 +70,40 @@ def schedule(roots: Sequence[Node]) -> Schedule:
         once += len(fixed)
         if ends:
             inside = [n for n in _in_loop(ends) if _computed(n)]
-            loop = Loop(place(inside, set(ends)), feeds, outputs)
+            loop = Loop(place(depth_first(inside, ends), set(ends)), feeds, outputs)
             looped += len(inside) + len(feeds)
         stages.append(Stage(before, loop))
     return Schedule(tuple(stages), once, looped)
+
+
+def depth_first(nodes: Sequence[Node], roots: Sequence[Node]) -> list[Node]:
+    """`nodes` in an order that finishes one result before it begins the next: few live values.
+
+    Of two operands the one that needs more values of its own goes first (Sethi and Ullman).
+    """
+    inside = set(nodes)
+    need: dict[Node, int] = {}
+    for n in nodes:
+        ranks = sorted((need[a] for a in n.args if a in inside), reverse=True)
+        need[n] = max([1, *(r + k for k, r in enumerate(ranks))])
+    order: list[Node] = []
+    seen: set[Node] = set()
+    rest = [n for n in reversed(nodes) if n not in set(roots)]
+    stack = [*rest, *(r for r in reversed(roots) if r in inside)]
+    opened: set[Node] = set()
+    while stack:
+        n = stack[-1]
+        if n in seen:
+            stack.pop()
+        elif n in opened:
+            stack.pop()
+            seen.add(n)
+            order.append(n)
+        else:
+            opened.add(n)
+            pending = [a for a in n.args if a in inside and a not in seen]
+            stack += sorted(pending, key=lambda a: (need[a], a.id))
+    return order
 
 
 def _computed(n: Node) -> bool:
@@ -109,7 +139,7 @@ class _Placement:
         self.group = group
         self.path: dict[Node, Path] = {}
         uses: dict[Node, list[Path]] = {n: [] for n in nodes}
-        for n in reversed(nodes):
+        for n in sorted(nodes, key=lambda n: -n.id):
             paths = [*uses[n], ()] if n in ends else uses[n]
             self.path[n] = _common(paths)
             for k, a in enumerate(n.args):
@@ -153,7 +183,7 @@ def _grouped(nodes: Sequence[Node]) -> dict[Node, int]:
     """Branch nodes on one condition share an `if` unless one needs the other's value."""
     group: dict[Node, int] = {}
     latest: dict[Node, list[Node]] = {}
-    for n in nodes:
+    for n in sorted(nodes, key=lambda n: n.id):
         if n.op is not Op.BRANCH:
             continue
         mates = latest.get(n.args[0], [])

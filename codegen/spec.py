@@ -9,7 +9,9 @@ from codegen.graph import BOOLEAN, Input, Node, Op, reachable
 
 ARITY: dict[Op, int] = {
     **dict.fromkeys((Op.CONST, Op.PI, Op.INPUT), 0),
-    **dict.fromkeys((Op.NAME, Op.NEG, Op.RECIP, Op.POW, Op.SQRT, Op.CBRT, Op.LOG, Op.EXP), 1),
+    **dict.fromkeys(
+        (Op.NAME, Op.NEG, Op.RECIP, Op.POW, Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP), 1
+    ),
     **dict.fromkeys((Op.SIN, Op.COS, Op.NOT, Op.SUM), 1),
     **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR), 2),
     Op.BRANCH: 3,

@@ -22,7 +22,9 @@ void softehl_contact_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
+    (void)points;
     (void)modes;
+    (void)rule;
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
@@ -33,45 +35,38 @@ void softehl_contact_residual(
         (void)X;  /* coordinates */
         (void)d;  /* dofs */
         (void)a;  /* data */
-        const double v1 = a[2] + parameters[0];
-        const double v2 = X[1] + d[1];
-        const double v3 = a[1] * v2;
-        const double v4 = v3 - v1;
-        const double v5 = X[0] + d[0];
-        const double v6 = a[0] * v5;
-        const double v7 = v4 + v6;
-        const double v8 = a[4] * v7;
-        const double v9 = d[2] + v8;
-        const int v10 = v9 <= 0.0;
-        double v11, v12;
-        if (v10) {
-            const double v13 = a[3] * parameters[1];
-            const double v14 = v13 * v9;
-            const double v15 = a[3] * v7;
-            v11 = v14;
-            v12 = v15;
+        const double v1 = d[0] * a[0];
+        const double v2 = X[0] * a[0];
+        const double v3 = v2 + v1;
+        const double v4 = d[1] * a[1];
+        const double v5 = v4 + v3;
+        const double v6 = X[1] * a[1];
+        const double v7 = a[2] + parameters[0];
+        const double v8 = v7 - v6;
+        const double v9 = v5 - v8;
+        const double v10 = a[4] * v9;
+        const double v11 = d[2] + v10;
+        const int v12 = v11 <= 0.0;
+        double v13, v14;
+        if (v12) {
+            const double v15 = a[3] * parameters[1];
+            const double v16 = v15 * v11;
+            const double v17 = a[3] * v9;
+            v13 = v16;
+            v14 = v17;
         } else {
-            const double v16 = d[2] * a[3];
-            const double v17 = 1.0 / a[4];
-            const double v18 = v16 * v17;
-            const double v19 = -v18;
-            v11 = 0.0;
-            v12 = v19;
+            const double v18 = 1.0 / a[4];
+            const double v19 = d[2] * a[3];
+            const double v20 = v19 * v18;
+            const double v21 = -v20;
+            v13 = 0.0;
+            v14 = v21;
         }
-        double s20 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q;
-            (void)w;
-            s20 += w[0];
-        }
-        const double v21 = s20 * v12;
-        const double v22 = a[1] * s20;
-        const double v23 = v11 * v22;
-        const double v24 = a[0] * s20;
-        const double v25 = v11 * v24;
-        R[0] = v25;
+        const double v22 = a[0] * v13;
+        const double v23 = a[1] * v13;
+        R[0] = v22;
         R[1] = v23;
-        R[2] = v21;
+        R[2] = v14;
     }
 }
 
@@ -82,7 +77,9 @@ void softehl_contact_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
+    (void)points;
     (void)modes;
+    (void)rule;
     (void)basis;
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 2 * e;
@@ -93,82 +90,89 @@ void softehl_contact_tangent(
         (void)X;  /* coordinates */
         (void)d;  /* dofs */
         (void)a;  /* data */
-        const double v1 = a[2] + parameters[0];
-        const double v2 = X[1] + d[1];
-        const double v3 = a[1] * v2;
-        const double v4 = v3 - v1;
-        const double v5 = X[0] + d[0];
-        const double v6 = a[0] * v5;
-        const double v7 = v4 + v6;
-        const double v8 = a[4] * v7;
-        const double v9 = d[2] + v8;
-        const int v10 = v9 <= 0.0;
-        double v11, v12, v13, v14, v15, v16, v17, v18;
-        if (v10) {
-            const double v19 = a[3] * parameters[1];
-            const double v20 = v19 * v9;
-            const double v21 = a[3] * v7;
-            const double v22 = a[0] * a[4];
-            const double v23 = v19 * v22;
-            const double v24 = a[1] * a[4];
-            const double v25 = v19 * v24;
-            const double v26 = a[0] * a[3];
-            const double v27 = a[1] * a[3];
-            v11 = v20;
-            v12 = v21;
-            v13 = v23;
-            v14 = v25;
-            v15 = v19;
-            v16 = v26;
-            v17 = v27;
-            v18 = 0.0;
+        const double v1 = a[1] * a[4];
+        const double v2 = a[0] * a[4];
+        const double v3 = X[0] * a[0];
+        const double v4 = X[1] * a[1];
+        const double v5 = v4 + v3;
+        const double v6 = a[4] * v5;
+        const double v7 = d[2] + v6;
+        const double v8 = a[2] + parameters[0];
+        const double v9 = a[4] * v8;
+        const double v10 = v9 - v7;
+        const double v11 = d[1] * v1;
+        const double v12 = d[0] * v2;
+        const double v13 = v12 + v11;
+        const double v14 = v13 - v10;
+        const int v15 = v14 <= 0.0;
+        double v16, v17, v18, v19, v20, v21, v22, v23, v24, v25, v26;
+        if (v15) {
+            const double v27 = a[3] * parameters[1];
+            const double v28 = v27 * v1;
+            const double v29 = d[1] * v28;
+            const double v30 = v27 * v2;
+            const double v31 = d[0] * v30;
+            const double v32 = v31 + v29;
+            const double v33 = v7 - v9;
+            const double v34 = v27 * v33;
+            const double v35 = v32 + v34;
+            const double v36 = a[1] * a[3];
+            const double v37 = d[1] * v36;
+            const double v38 = a[0] * a[3];
+            const double v39 = d[0] * v38;
+            const double v40 = v39 + v37;
+            const double v41 = v5 - a[2];
+            const double v42 = v41 - parameters[0];
+            const double v43 = a[3] * v42;
+            const double v44 = v43 + v40;
+            const double v45 = a[0] * v30;
+            const double v46 = a[0] * v28;
+            const double v47 = a[0] * v27;
+            const double v48 = a[1] * v30;
+            const double v49 = a[1] * v28;
+            const double v50 = a[1] * v27;
+            v16 = v35;
+            v17 = v44;
+            v18 = v45;
+            v19 = v46;
+            v20 = v47;
+            v21 = v48;
+            v22 = v49;
+            v23 = v50;
+            v24 = v38;
+            v25 = v36;
+            v26 = 0.0;
         } else {
-            const double v28 = d[2] * a[3];
-            const double v29 = 1.0 / a[4];
-            const double v30 = v28 * v29;
-            const double v31 = -v30;
-            const double v32 = a[3] * v29;
-            const double v33 = -v32;
-            v11 = 0.0;
-            v12 = v31;
-            v13 = 0.0;
-            v14 = 0.0;
-            v15 = 0.0;
+            const double v51 = 1.0 / a[4];
+            const double v52 = a[3] * v51;
+            const double v53 = d[2] * v52;
+            const double v54 = -v53;
+            const double v55 = -v52;
             v16 = 0.0;
-            v17 = 0.0;
-            v18 = v33;
+            v17 = v54;
+            v18 = 0.0;
+            v19 = 0.0;
+            v20 = 0.0;
+            v21 = 0.0;
+            v22 = 0.0;
+            v23 = 0.0;
+            v24 = 0.0;
+            v25 = 0.0;
+            v26 = v55;
         }
-        double s34 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q;
-            (void)w;
-            s34 += w[0];
-        }
-        const double v35 = s34 * v12;
-        const double v36 = a[1] * s34;
-        const double v37 = v11 * v36;
-        const double v38 = a[0] * s34;
-        const double v39 = v11 * v38;
-        const double v40 = s34 * v16;
-        const double v41 = s34 * v17;
-        const double v42 = s34 * v18;
-        const double v43 = v38 * v13;
-        const double v44 = v38 * v14;
-        const double v45 = v38 * v15;
-        const double v46 = v36 * v13;
-        const double v47 = v36 * v14;
-        const double v48 = v36 * v15;
-        R[0] = v39;
-        R[1] = v37;
-        R[2] = v35;
-        K[0] = v43;
-        K[1] = v44;
-        K[2] = v45;
-        K[3] = v46;
-        K[4] = v47;
-        K[5] = v48;
-        K[6] = v40;
-        K[7] = v41;
-        K[8] = v42;
+        const double v56 = a[0] * v16;
+        const double v57 = a[1] * v16;
+        R[0] = v56;
+        R[1] = v57;
+        R[2] = v17;
+        K[0] = v18;
+        K[1] = v19;
+        K[2] = v20;
+        K[3] = v21;
+        K[4] = v22;
+        K[5] = v23;
+        K[6] = v24;
+        K[7] = v25;
+        K[8] = v26;
     }
 }

@@ -10,6 +10,63 @@
  */
 #include "softehl_kernels.h"
 
+static void softehl_follower_pressure_residual_group(
+    const double *restrict X, const double *restrict d, const double *restrict a,
+    const double *restrict parameters, double *restrict R, double *restrict K)
+{
+    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    softehl_vec X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    softehl_vec d0, d1, d2, d3;
+    softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    const softehl_vec v1 = d1 - d3;
+    const softehl_vec v2 = 0.5773502691896257 * v1;
+    const softehl_vec v3 = d1 + d3;
+    const softehl_vec v4 = v3 - v2;
+    const double v5 = 6.283185307179586 * parameters[0];
+    const softehl_vec v6 = v4 * v5;
+    const softehl_vec v7 = X1 * v5;
+    const softehl_vec v8 = X3 * v5;
+    const softehl_vec v9 = v8 + v7;
+    const softehl_vec v10 = v9 + v6;
+    const softehl_vec v11 = v8 - v7;
+    const softehl_vec v12 = 0.5773502691896257 * v11;
+    const softehl_vec v13 = v12 + v10;
+    const softehl_vec v14 = 0.5 * v13;
+    const softehl_vec v15 = X3 - X1;
+    const softehl_vec v16 = v15 - v1;
+    const softehl_vec v17 = 0.5 * v16;
+    const softehl_vec v18 = v17 * v14;
+    const softehl_vec v19 = v3 + v2;
+    const softehl_vec v20 = v19 * v5;
+    const softehl_vec v21 = v9 + v20;
+    const softehl_vec v22 = v21 - v12;
+    const softehl_vec v23 = 0.5 * v22;
+    const softehl_vec v24 = v17 * v23;
+    const softehl_vec v25 = v18 - v24;
+    const softehl_vec v26 = 0.28867513459481287 * v25;
+    const softehl_vec v27 = v24 + v18;
+    const softehl_vec v28 = 0.5 * v27;
+    const softehl_vec v29 = v28 - v26;
+    const softehl_vec v30 = X2 + d2;
+    const softehl_vec v31 = v30 - X0;
+    const softehl_vec v32 = v31 - d0;
+    const softehl_vec v33 = 0.5 * v32;
+    const softehl_vec v34 = v33 * v14;
+    const softehl_vec v35 = v33 * v23;
+    const softehl_vec v36 = v34 - v35;
+    const softehl_vec v37 = 0.28867513459481287 * v36;
+    const softehl_vec v38 = v35 + v34;
+    const softehl_vec v39 = 0.5 * v38;
+    const softehl_vec v40 = v37 - v39;
+    const softehl_vec v41 = v28 + v26;
+    const softehl_vec v42 = v39 + v37;
+    const softehl_vec v43 = -v42;
+    softehl_store4(R + 0, 4, v29, v40, v41, v43);
+}
+
 void softehl_follower_pressure_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -17,60 +74,114 @@ void softehl_follower_pressure_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)modes;
-    (void)data;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + 4 * e;
-        double *restrict R = values + 4 * e;
-        (void)X;  /* coordinates */
-        (void)d;  /* dofs */
-        const double v1 = X[3] + d[3];
-        const double v2 = X[1] + d[1];
-        const double v3 = X[2] + d[2];
-        const double v4 = v3 - X[0];
-        const double v5 = v4 - d[0];
-        const double v6 = 0.5 * v5;
-        const double v7 = v1 - X[1];
-        const double v8 = v7 - d[1];
-        const double v9 = 0.5 * v8;
-        const double v10 = 6.283185307179586 * parameters[0];
-        double s11 = 0.0;
-        double s12 = 0.0;
-        double s13 = 0.0;
-        double s14 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double v15 = 0.5 * w[0];
-            const double v16 = 0.5 + v15;
-            const double v17 = v16 * v1;
-            const double v18 = 0.5 - v15;
-            const double v19 = v18 * v2;
-            const double v20 = v17 + v19;
-            const double v21 = w[1] * v6;
-            const double v22 = w[1] * v9;
-            const double v23 = v20 * v10;
-            const double v24 = v21 * v23;
-            const double v25 = v16 * v24;
-            const double v26 = v18 * v24;
-            const double v27 = v22 * v23;
-            const double v28 = v16 * v27;
-            const double v29 = v18 * v27;
-            s11 += v25;
-            s12 += v28;
-            s13 += v26;
-            s14 += v29;
-        }
-        const double v30 = -s11;
-        const double v31 = -s13;
-        R[0] = s14;
-        R[1] = v31;
-        R[2] = s12;
-        R[3] = v30;
-    }
+    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
+    (void)parameters;
+    ptrdiff_t e = 0;
+    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_follower_pressure_residual_group(coordinates + 4 * e, dofs + 4 * e, 0, parameters,
+            values + 4 * e, 0);
+    if (e == n) return;
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates + 4 * e, 4, n - e);
+    double d[SOFTEHL_LANES * 4];
+    softehl_pad(d, dofs + 4 * e, 4, n - e);
+    double a[SOFTEHL_LANES * 1];
+    a[0] = 0.0;
+    double R[SOFTEHL_LANES * 4], K[SOFTEHL_LANES * 1];
+    softehl_follower_pressure_residual_group(X, d, a, parameters, R, K);
+    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) values[4 * e + i] = R[i];
+}
+
+static void softehl_follower_pressure_tangent_group(
+    const double *restrict X, const double *restrict d, const double *restrict a,
+    const double *restrict parameters, double *restrict R, double *restrict K)
+{
+    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    softehl_vec X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    softehl_vec d0, d1, d2, d3;
+    softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    const double v1 = 6.283185307179586 * parameters[0];
+    const softehl_vec v2 = X1 * v1;
+    const softehl_vec v3 = X3 * v1;
+    const softehl_vec v4 = v3 + v2;
+    const softehl_vec v5 = 0.5 * v4;
+    const softehl_vec v6 = d1 - d3;
+    const softehl_vec v7 = 0.5773502691896257 * v6;
+    const softehl_vec v8 = d1 + d3;
+    const softehl_vec v9 = v8 - v7;
+    const double v10 = 3.141592653589793 * parameters[0];
+    const softehl_vec v11 = v9 * v10;
+    const softehl_vec v12 = v11 + v5;
+    const softehl_vec v13 = v3 - v2;
+    const softehl_vec v14 = 0.28867513459481287 * v13;
+    const softehl_vec v15 = v14 + v12;
+    const softehl_vec v16 = X3 - X1;
+    const softehl_vec v17 = v16 - v6;
+    const softehl_vec v18 = 0.5 * v17;
+    const softehl_vec v19 = v18 * v15;
+    const softehl_vec v20 = v8 + v7;
+    const softehl_vec v21 = v20 * v10;
+    const softehl_vec v22 = v21 + v5;
+    const softehl_vec v23 = v22 - v14;
+    const softehl_vec v24 = v18 * v23;
+    const softehl_vec v25 = v19 - v24;
+    const softehl_vec v26 = 0.28867513459481287 * v25;
+    const softehl_vec v27 = v24 + v19;
+    const softehl_vec v28 = 0.5 * v27;
+    const softehl_vec v29 = v28 - v26;
+    const softehl_vec v30 = X2 + d2;
+    const softehl_vec v31 = v30 - X0;
+    const softehl_vec v32 = v31 - d0;
+    const softehl_vec v33 = 0.5 * v32;
+    const softehl_vec v34 = v33 * v15;
+    const softehl_vec v35 = v33 * v23;
+    const softehl_vec v36 = v34 - v35;
+    const softehl_vec v37 = 0.28867513459481287 * v36;
+    const softehl_vec v38 = v35 + v34;
+    const softehl_vec v39 = 0.5 * v38;
+    const softehl_vec v40 = v37 - v39;
+    const softehl_vec v41 = v28 + v26;
+    const softehl_vec v42 = v39 + v37;
+    const softehl_vec v43 = -v42;
+    const softehl_vec v44 = 0.5 * v15;
+    const softehl_vec v45 = v18 * v10;
+    const softehl_vec v46 = 0.5773502691896257 * v45;
+    const softehl_vec v47 = v46 + v44;
+    const softehl_vec v48 = 0.5 * v23;
+    const softehl_vec v49 = v48 - v46;
+    const softehl_vec v50 = v49 + v47;
+    const softehl_vec v51 = 0.5 * v50;
+    const softehl_vec v52 = v45 - v51;
+    const softehl_vec v53 = v47 - v49;
+    const softehl_vec v54 = 0.28867513459481287 * v53;
+    const softehl_vec v55 = v54 + v52;
+    const softehl_vec v56 = v45 + v51;
+    const softehl_vec v57 = v56 - v54;
+    const softehl_vec v58 = v23 + v15;
+    const softehl_vec v59 = 0.25 * v58;
+    const softehl_vec v60 = v15 - v23;
+    const softehl_vec v61 = 0.14433756729740643 * v60;
+    const softehl_vec v62 = v59 - v61;
+    const softehl_vec v63 = v33 * v10;
+    const softehl_vec v64 = 1.3333333333333333 * v63;
+    const softehl_vec v65 = -v64;
+    const softehl_vec v66 = v61 - v59;
+    const softehl_vec v67 = 0.6666666666666666 * v63;
+    const softehl_vec v68 = -v67;
+    const softehl_vec v69 = v49 - v47;
+    const softehl_vec v70 = 0.28867513459481287 * v69;
+    const softehl_vec v71 = v52 + v70;
+    const softehl_vec v72 = v54 + v56;
+    const softehl_vec v73 = v61 + v59;
+    const softehl_vec v74 = -v73;
+    softehl_store4(R + 0, 4, v29, v40, v41, v43);
+    softehl_store4(K + 0, 16, softehl_splat(0.0), v55, softehl_splat(0.0), v57);
+    softehl_store4(K + 4, 16, v62, v65, v66, v68);
+    softehl_store4(K + 8, 16, softehl_splat(0.0), v71, softehl_splat(0.0), v72);
+    softehl_store4(K + 12, 16, v73, v68, v74, v65);
 }
 
 void softehl_follower_pressure_tangent(
@@ -80,121 +191,21 @@ void softehl_follower_pressure_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)modes;
-    (void)data;
-    (void)basis;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + 4 * e;
-        double *restrict R = values + 4 * e;
-        double *restrict K = tangent + 4 * 4 * e;
-        (void)X;  /* coordinates */
-        (void)d;  /* dofs */
-        const double v1 = X[3] + d[3];
-        const double v2 = X[1] + d[1];
-        const double v3 = X[2] + d[2];
-        const double v4 = v3 - X[0];
-        const double v5 = v4 - d[0];
-        const double v6 = 0.5 * v5;
-        const double v7 = v1 - X[1];
-        const double v8 = v7 - d[1];
-        const double v9 = 0.5 * v8;
-        const double v10 = 6.283185307179586 * parameters[0];
-        double s11 = 0.0;
-        double s12 = 0.0;
-        double s13 = 0.0;
-        double s14 = 0.0;
-        double s15 = 0.0;
-        double s16 = 0.0;
-        double s17 = 0.0;
-        double s18 = 0.0;
-        double s19 = 0.0;
-        double s20 = 0.0;
-        double s21 = 0.0;
-        double s22 = 0.0;
-        double s23 = 0.0;
-        double s24 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double v25 = 0.5 * w[0];
-            const double v26 = 0.5 + v25;
-            const double v27 = v26 * v1;
-            const double v28 = 0.5 - v25;
-            const double v29 = v28 * v2;
-            const double v30 = v27 + v29;
-            const double v31 = w[1] * v6;
-            const double v32 = w[1] * v9;
-            const double v33 = v30 * v10;
-            const double v34 = v31 * v33;
-            const double v35 = v26 * v34;
-            const double v36 = v28 * v34;
-            const double v37 = v32 * v33;
-            const double v38 = v26 * v37;
-            const double v39 = v28 * v37;
-            const double v40 = v28 * w[1];
-            const double v41 = v26 * w[1];
-            const double v42 = v26 * v10;
-            const double v43 = v28 * v10;
-            const double v44 = 0.5 * v33;
-            const double v45 = v40 * v44;
-            const double v46 = v41 * v44;
-            const double v47 = v9 * v42;
-            const double v48 = v9 * v43;
-            const double v49 = v48 - v44;
-            const double v50 = v40 * v49;
-            const double v51 = v44 + v47;
-            const double v52 = v40 * v51;
-            const double v53 = v6 * v42;
-            const double v54 = v6 * v43;
-            const double v55 = v40 * v54;
-            const double v56 = v40 * v53;
-            const double v57 = v41 * v49;
-            const double v58 = v41 * v51;
-            const double v59 = v41 * v54;
-            const double v60 = v41 * v53;
-            s11 += v35;
-            s12 += v38;
-            s13 += v36;
-            s14 += v39;
-            s15 += v45;
-            s16 += v46;
-            s17 += v50;
-            s18 += v52;
-            s19 += v55;
-            s20 += v56;
-            s21 += v57;
-            s22 += v58;
-            s23 += v59;
-            s24 += v60;
-        }
-        const double v61 = -s11;
-        const double v62 = -s13;
-        const double v63 = -s15;
-        const double v64 = -s16;
-        const double v65 = -s19;
-        const double v66 = -s20;
-        const double v67 = -s23;
-        const double v68 = -s24;
-        R[0] = s14;
-        R[1] = v62;
-        R[2] = s12;
-        R[3] = v61;
-        K[0] = 0.0;
-        K[1] = s17;
-        K[2] = 0.0;
-        K[3] = s18;
-        K[4] = s15;
-        K[5] = v65;
-        K[6] = v63;
-        K[7] = v66;
-        K[8] = 0.0;
-        K[9] = s21;
-        K[10] = 0.0;
-        K[11] = s22;
-        K[12] = s16;
-        K[13] = v67;
-        K[14] = v64;
-        K[15] = v68;
-    }
+    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
+    (void)parameters;
+    ptrdiff_t e = 0;
+    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_follower_pressure_tangent_group(coordinates + 4 * e, dofs + 4 * e, 0, parameters,
+            values + 4 * e, tangent + 16 * e);
+    if (e == n) return;
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates + 4 * e, 4, n - e);
+    double d[SOFTEHL_LANES * 4];
+    softehl_pad(d, dofs + 4 * e, 4, n - e);
+    double a[SOFTEHL_LANES * 1];
+    a[0] = 0.0;
+    double R[SOFTEHL_LANES * 4], K[SOFTEHL_LANES * 16];
+    softehl_follower_pressure_tangent_group(X, d, a, parameters, R, K);
+    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) values[4 * e + i] = R[i];
+    for (ptrdiff_t i = 0; i < 16 * (n - e); ++i) tangent[16 * e + i] = K[i];
 }

@@ -14,6 +14,7 @@ def follower_pressure() -> Definition:
         "follower_pressure",
         nodes=2,
         rule=quadrature.gauss(2, 1),
+        unroll=True,
         doc=follower_pressure.__doc__ or "",
     )
     X = m.coordinates("Z", "R")

@@ -15,7 +15,11 @@ def augmented_lagrangian() -> Definition:
     -lambda^2 / (2 rho), times the tributary area; `force_weight` scales the nodal force only.
     """
     m = Model(
-        "contact", nodes=1, rule=quadrature.point_rule(), doc=augmented_lagrangian.__doc__ or ""
+        "contact",
+        nodes=1,
+        rule=quadrature.point_rule(),
+        unroll=True,
+        doc=augmented_lagrangian.__doc__ or "",
     )
     (z,), (r,) = m.coordinates("Z", "R")
     (u_z,), (u_r,) = m.nodal_unknowns("u_z", "u_r")

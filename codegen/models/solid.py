@@ -16,7 +16,7 @@ from codegen.model import Definition, Model
 
 def _element(name: str, doc: str) -> tuple[Model, Any, Any, Any]:
     """Arguments that the three solids share: coordinates, displacements, material."""
-    m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), doc=doc)
+    m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), unroll=True, doc=doc)
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
     material = m.parameters(

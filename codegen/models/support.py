@@ -14,7 +14,11 @@ def mean_rotation() -> Definition:
     its polar moment: the moment M [N mm per radian of rotation] is work-conjugate to `angle`.
     """
     m = Model(
-        "mean_rotation", nodes=4, rule=quadrature.gauss(2, 2), doc=mean_rotation.__doc__ or ""
+        "mean_rotation",
+        nodes=4,
+        rule=quadrature.gauss(2, 2),
+        unroll=True,
+        doc=mean_rotation.__doc__ or "",
     )
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
@@ -37,7 +41,13 @@ def mean_rotation() -> Definition:
 
 def axial_spring() -> Definition:
     """Elastic bedding against axial motion: potential stiffness / 2 * integral of u_z^2 dA."""
-    m = Model("axial_spring", nodes=4, rule=quadrature.gauss(2, 2), doc=axial_spring.__doc__ or "")
+    m = Model(
+        "axial_spring",
+        nodes=4,
+        rule=quadrature.gauss(2, 2),
+        unroll=True,
+        doc=axial_spring.__doc__ or "",
+    )
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
     (stiffness,) = m.parameters(stiffness="bedding stiffness [N/mm^3]")

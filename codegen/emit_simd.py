@@ -1,0 +1,156 @@
+"""Printing for several elements at once: every value is a vector with one lane per element.
+
+Only straight-line kernels (loops written out, no branch) are printed this way.  A `group` function
+handles as many elements as a vector has lanes; the public function walks over the batch and
+repeats the last element to fill the last group.  Values that depend on parameters alone stay
+scalars.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from codegen import abi
+from codegen.emit_c import Entry, Printer, number
+from codegen.graph import Input, Node, Op
+from codegen.model import Definition
+from codegen.schedule import If, Schedule, Statement
+
+FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS})
+
+
+def suits(plan: Schedule) -> bool:
+    """True for a kernel without loops and branches."""
+    return (
+        len(plan.stages) == 1
+        and plan.stages[0].loop is None
+        and not any(isinstance(s, If) for s in plan.stages[0].before)
+    )
+
+
+class _LanePrinter(Printer):
+    """A printer that knows which values are vectors."""
+
+    def __init__(self, definition: Definition) -> None:
+        super().__init__(definition)
+        self.scalar: dict[Node, bool] = {}
+
+    def is_scalar(self, n: Node) -> bool:
+        """True when all lanes hold the same value."""
+        if n not in self.scalar:
+            if isinstance(n.payload, Input):
+                self.scalar[n] = n.payload.array == "parameters"
+            else:
+                self.scalar[n] = all(self.is_scalar(a) for a in n.args)
+        return self.scalar[n]
+
+    def ref(self, n: Node) -> str:
+        if isinstance(n.payload, Input) and n.payload.array != "parameters":
+            return {"coordinates": "X", "dofs": "d", "data": "a"}[n.payload.array] + str(
+                n.payload.index
+            )
+        return super().ref(n)
+
+    def statement(self, depth: int, s: Statement) -> None:
+        assert isinstance(s, Node)
+        if self.is_scalar(s):
+            super().block(depth, [s])
+            return
+        right = self.expression(s)
+        if s.op in FUNCTIONS:
+            right = f"softehl_v{s.op}({self.ref(s.args[0])})"
+        elif s.op is Op.POW:
+            right = f"softehl_vpow({self.ref(s.args[0])}, {number(float(s.payload))})"  # type: ignore[arg-type]
+        self.line(depth, f"const softehl_vec {self.fresh(s)} = {right};")
+
+    def as_vector(self, n: Node) -> str:
+        """Reference that is a vector in any case."""
+        return f"softehl_splat({self.ref(n)})" if self.is_scalar(n) else self.ref(n)
+
+
+def function(
+    definition: Definition, task: abi.Task, entries: Sequence[Entry], plan: Schedule
+) -> tuple[str, int]:
+    """C text of one kernel (group function and batch loop) and the number of its temporaries."""
+    p = _LanePrinter(definition)
+    _loads(p)
+    for s in plan.stages[0].before:
+        p.statement(1, s)
+    _stores(p, task, entries)
+    name = abi.function_name(definition.name, task)
+    body = "\n".join(p.lines)
+    group = f"static void {name}_group(\n    {_GROUP_ARGUMENTS})\n{{\n{_GROUP_UNUSED}\n{body}\n}}\n"
+    return f"{group}\n{_batch(definition, task)}", p.temporaries
+
+
+_GROUP_ARGUMENTS = """const double *restrict X, const double *restrict d, const double *restrict a,
+    const double *restrict parameters, double *restrict R, double *restrict K"""
+_GROUP_UNUSED = "    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;"
+
+
+def _loads(p: _LanePrinter) -> None:
+    widths = {"X": 2 * p.d.nodes, "d": len(p.d.unknowns), "a": len(p.d.data)}
+    for letter, width in widths.items():
+        for start in range(0, width, 4):
+            names = [f"{letter}{k}" for k in range(start, min(start + 4, width))]
+            p.line(1, f"softehl_vec {', '.join(names)};")
+            pointers = ", ".join(f"&{n}" for n in names)
+            p.line(1, f"softehl_load{len(names)}({letter} + {start}, {width}, {pointers});")
+            p.line(1, " ".join(f"(void){n};" for n in names))
+
+
+def _stores(p: _LanePrinter, task: abi.Task, entries: Sequence[Entry]) -> None:
+    size = 1 if task is abi.Task.ENERGY else len(p.d.unknowns)
+    flat: dict[str, dict[int, Node]] = {"R": {}, "K": {}}
+    for x in entries:
+        if x.column is None:
+            flat["R"][x.row.position] = x.node
+        else:
+            flat["K"][x.row.position * size + x.column.position] = x.node
+    for letter, values in flat.items():
+        width = len(values)
+        for start in range(0, width, 4):
+            chunk = [p.as_vector(values[k]) for k in range(start, min(start + 4, width))]
+            target = f"{letter} + {start}, {width}"
+            p.line(1, f"softehl_store{len(chunk)}({target}, {', '.join(chunk)});")
+
+
+def _batch(d: Definition, task: abi.Task) -> str:
+    """The public function: full groups, then one group padded with the last element."""
+    name = abi.function_name(d.name, task)
+    size = 1 if task is abi.Task.ENERGY else len(d.unknowns)
+    square = size * size if task is abi.Task.TANGENT else 0
+    widths = {"coordinates": 2 * d.nodes, "dofs": len(d.unknowns), "data": len(d.data)}
+    at = {k: f"{k} + {w} * e" if w else "0" for k, w in widths.items()}
+    tangent = f"tangent + {square} * e" if square else "0"
+    lines = [
+        abi.declaration(d.name, task),
+        "{",
+        "    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;",
+        "    (void)parameters;",
+        "    ptrdiff_t e = 0;",
+        "    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)",
+        f"        {name}_group({at['coordinates']}, {at['dofs']}, {at['data']}, parameters,",
+        f"            values + {size} * e, {tangent});",
+        "    if (e == n) return;",
+    ]
+    padded = {"X": "coordinates", "d": "dofs", "a": "data"}
+    for letter, array in padded.items():
+        lines.append(f"    double {letter}[SOFTEHL_LANES * {max(widths[array], 1)}];")
+        if widths[array]:
+            lines.append(
+                f"    softehl_pad({letter}, {array} + {widths[array]} * e, {widths[array]}, n - e);"
+            )
+        else:
+            lines.append(f"    {letter}[0] = 0.0;")
+    lines += [
+        f"    double R[SOFTEHL_LANES * {size}], K[SOFTEHL_LANES * {max(square, 1)}];",
+        f"    {name}_group(X, d, a, parameters, R, K);",
+        f"    for (ptrdiff_t i = 0; i < {size} * (n - e); ++i) values[{size} * e + i] = R[i];",
+    ]
+    if square:
+        lines.append(
+            f"    for (ptrdiff_t i = 0; i < {square} * (n - e); ++i)"
+            f" tangent[{square} * e + i] = K[i];"
+        )
+    return "\n".join([*lines, "}", ""])
