@@ -4,8 +4,8 @@ Every kernel of a family `NAME` is a function `softehl_NAME_TASK` of one type,
 
     void f(ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
            const double *coordinates, const double *dofs, const double *data,
-           const double *parameters, const double *rule, const double *basis,
-           double *values, double *tangent);
+           const double *parameters, const double *direction,
+           const double *rule, const double *basis, double *values, double *tangent);
 
 that handles `n` elements one after another.  Arrays are contiguous, row-major, of doubles, and do
 not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped ones).
@@ -20,6 +20,7 @@ not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped 
 |               |                      | unknowns of the interpolated field                       |
 | `data`        | n, ndata             | constants of each element, in the manifest's order       |
 | `parameters`  | nparameters          | constants of the call, in the manifest's order           |
+| `direction`   | n, ndof              | vector that task `product` multiplies by the tangent     |
 | `rule`        | points, dimension + 1| parent coordinates of each point, then its weight        |
 | `basis`       | points, modes, 2     | value and xi-derivative of the interpolating shapes      |
 | `values`      | see task             | written, never accumulated                               |
@@ -30,6 +31,9 @@ not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped 
 | `energy`   | n: the potential (only where the residual has one)  |
 | `residual` | n, ndof: internal minus external virtual work       |
 | `tangent`  | n, ndof: the same residual                          |
+| `product`  | n, ndof: tangent times `direction`                  |
+| `d_NAME`   | n, ndof: derivative of the residual with respect to |
+|            | the parameter, datum or coordinate NAME             |
 | `fields`   | n, points, nfields: values at the quadrature points |
 
 Pointers that a family does not use (no data, no basis, no parameters, no tangent) may be NULL.
@@ -49,6 +53,12 @@ class Task(StrEnum):
     RESIDUAL = "residual"
     TANGENT = "tangent"
     FIELDS = "fields"
+    PRODUCT = "product"
+
+
+def derivative_task(name: str) -> str:
+    """Task that differentiates the residual with respect to a named argument."""
+    return f"d_{name}"
 
 
 PREFIX = "softehl"
@@ -57,17 +67,18 @@ ARGUMENTS = (
     "ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,",
     "const double *restrict coordinates, const double *restrict dofs,",
     "const double *restrict data, const double *restrict parameters,",
+    "const double *restrict direction,",
     "const double *restrict rule, const double *restrict basis,",
     "double *restrict values, double *restrict tangent",
 )
 
 
-def function_name(family: str, task: Task) -> str:
+def function_name(family: str, task: str) -> str:
     """Name of the C function of a family and task."""
     return f"{PREFIX}_{family}_{task}"
 
 
-def declaration(family: str, task: Task) -> str:
+def declaration(family: str, task: str) -> str:
     """C prototype without the semicolon."""
     lines = "\n    ".join(ARGUMENTS)
     return f"void {function_name(family, task)}(\n    {lines})"

@@ -330,6 +330,29 @@ class Linearisation:
         return result
 
 
+def directional(
+    g: Graph, roots: Sequence[Node], seeds: Mapping[Node, Node], given: Given | None = None
+) -> list[Node]:
+    """Derivatives of `roots` when each key of `seeds` moves at the rate of its value (forward)."""
+    depends = Dependence(tuple(seeds), (), given or {})
+    rate: dict[Node, Node] = {}
+    for n in reachable([*roots, *(k for pairs in depends.given.values() for k in pairs)]):
+        if n in seeds:
+            rate[n] = seeds[n]
+        elif not depends(n):
+            rate[n] = g.zero
+        elif n.op is Op.SUM:
+            rate[n] = g.sum(rate[n.args[0]])
+        elif n.op is Op.BRANCH:
+            rate[n] = g.branch(n.args[0], rate[n.args[1]], rate[n.args[2]])
+        else:
+            rate[n] = g.zero
+            pairs = list(depends.given[n].items()) if n in depends.given else partials(g, n)
+            for a, p in pairs:
+                rate[n] = _plus(g, rate[n], guarded(g, p, rate[a]))
+    return [rate[r] for r in roots]
+
+
 def guarded(g: Graph, a: Node, b: Node) -> Node:
     """Product that goes inside a branch with a zero side: what is not taken is never evaluated."""
     for x, y in ((a, b), (b, a)):

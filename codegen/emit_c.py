@@ -54,10 +54,12 @@ _FORMATS: dict[Op, str] = {
 _ARRAYS = {
     "coordinates": "X[{}]",
     "dofs": "d[{}]",
+    "direction": "t[{}]",
     "data": "a[{}]",
     "parameters": "parameters[{}]",
     "rule": "w[{}]",
     "interpolated": "p{}",
+    "interpolated direction": "t{}",
 }
 
 
@@ -120,14 +122,14 @@ class Printer:
 
 
 def function(
-    definition: Definition, task: abi.Task, entries: Sequence[Entry], plan: Schedule
+    definition: Definition, task: str, entries: Sequence[Entry], plan: Schedule
 ) -> tuple[str, int]:
     """C text of one kernel and the number of its temporaries."""
     p = Printer(definition)
     p.line(1, "for (ptrdiff_t e = 0; e < n; ++e) {")
     _pointers(p, task)
     scattered = [x for x in entries if _in_loop(x)]
-    if scattered and task is not abi.Task.FIELDS:
+    if scattered and task != abi.Task.FIELDS:
         _clear(p, task)
     for stage in plan.stages:
         p.block(2, stage.before)
@@ -149,35 +151,34 @@ def dofs_expression(d: Definition) -> str:
     return f"({direct} + modes)" if d.interpolated else str(direct)
 
 
-def _pointers(p: Printer, task: abi.Task) -> None:
+def _pointers(p: Printer, task: str) -> None:
     d = p.d
     p.line(2, f"const double *restrict X = coordinates + {2 * d.nodes} * e;")
     p.line(2, f"const double *restrict d = dofs + {dofs_expression(d)} * e;")
     if d.data:
         p.line(2, f"const double *restrict a = data + {len(d.data)} * e;")
-    if task in (abi.Task.RESIDUAL, abi.Task.TANGENT):
+    if task == abi.Task.PRODUCT:
+        p.line(2, f"const double *restrict t = direction + {dofs_expression(d)} * e;")
+    if task not in (abi.Task.ENERGY, abi.Task.FIELDS):
         p.line(2, f"double *restrict R = values + {dofs_expression(d)} * e;")
-    if task is abi.Task.TANGENT:
+    if task == abi.Task.TANGENT:
         p.line(
             2, f"double *restrict K = tangent + {dofs_expression(d)} * {dofs_expression(d)} * e;"
         )
-    for name, arrays in (("X", "coordinates"), ("d", "dofs"), ("a", "data")):
-        if name != "a" or d.data:
-            p.line(2, f"(void){name};  /* {arrays} */")
+    used = ["X", "d", *(["a"] if d.data else []), *(["t"] if task == abi.Task.PRODUCT else [])]
+    p.line(2, " ".join(f"(void){name};" for name in used))
 
 
-def _clear(p: Printer, task: abi.Task) -> None:
-    p.line(2, f"for (ptrdiff_t i = 0; i < {dofs_expression(p.d)}; ++i) R[i] = 0.0;")
-    if task is abi.Task.TANGENT:
-        p.line(
-            2,
-            f"for (ptrdiff_t i = 0; i < {dofs_expression(p.d)} * {dofs_expression(p.d)}; ++i) K[i] = 0.0;",
-        )
+def _clear(p: Printer, task: str) -> None:
+    size = dofs_expression(p.d)
+    p.line(2, f"for (ptrdiff_t i = 0; i < {size}; ++i) R[i] = 0.0;")
+    if task == abi.Task.TANGENT:
+        p.line(2, f"for (ptrdiff_t i = 0; i < {size} * {size}; ++i) K[i] = 0.0;")
 
 
-def _store_after(p: Printer, task: abi.Task, entries: Sequence[Entry]) -> None:
+def _store_after(p: Printer, task: str, entries: Sequence[Entry]) -> None:
     """Outputs that are complete when all loops are done."""
-    if task is not abi.Task.FIELDS:
+    if task != abi.Task.FIELDS:
         for x in entries:
             if not _in_loop(x):
                 p.line(2, f"{_target(p.d, task, x)} = {p.ref(x.node)};")
@@ -189,7 +190,7 @@ def _store_after(p: Printer, task: abi.Task, entries: Sequence[Entry]) -> None:
         p.line(2, "}")
 
 
-def _loop(p: Printer, loop: Loop, task: abi.Task, entries: Sequence[Entry]) -> None:
+def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
     for s in loop.sums:
         p.line(2, f"double {p.fresh(s, 's')} = 0.0;")
     p.line(2, "for (ptrdiff_t q = 0; q < points; ++q) {")
@@ -197,20 +198,28 @@ def _loop(p: Printer, loop: Loop, task: abi.Task, entries: Sequence[Entry]) -> N
     p.line(3, "(void)w;")
     if p.d.interpolated:
         p.line(3, "const double *restrict B = basis + 2 * modes * q;")
-        p.line(3, "double p0 = 0.0, p1 = 0.0;")
-        p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
-        p.line(4, f"p0 += B[2 * i] * d[{len(p.d.unknowns)} + i];")
-        p.line(4, f"p1 += B[2 * i + 1] * d[{len(p.d.unknowns)} + i];")
-        p.line(3, "}")
+        _gather(p, "p", "d")
+        if task == abi.Task.PRODUCT:
+            _gather(p, "t", "t")
     p.block(3, loop.body)
     for s in loop.sums:
         p.line(3, f"{p.ref(s)} += {p.ref(s.args[0])};")
     here = [x for x in entries if x.node in loop.outputs]
-    if here and task is abi.Task.FIELDS:
+    if here and task == abi.Task.FIELDS:
         _store_fields(p, here)
     elif here:
         _scatter(p, task, here)
     p.line(2, "}")
+
+
+def _gather(p: Printer, value: str, array: str) -> None:
+    """Value and xi-derivative of an interpolated field at the point."""
+    p.line(3, f"double {value}0 = 0.0, {value}1 = 0.0;")
+    p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
+    for k, shape in enumerate(("B[2 * i]", "B[2 * i + 1]")):
+        p.line(4, f"{value}{k} += {shape} * {array}[{len(p.d.unknowns)} + i];")
+    p.line(3, "}")
+    p.line(3, f"(void){value}0, (void){value}1;")
 
 
 def _store_fields(p: Printer, entries: Sequence[Entry]) -> None:
@@ -219,11 +228,12 @@ def _store_fields(p: Printer, entries: Sequence[Entry]) -> None:
         p.line(3, f"out[{x.row.position}] = {p.ref(x.node)};")
 
 
-def _scatter(p: Printer, task: abi.Task, entries: Sequence[Entry]) -> None:
+def _scatter(p: Printer, task: str, entries: Sequence[Entry]) -> None:
     direct = len(p.d.unknowns)
     at = {(x.row, x.column): p.ref(x.node) for x in entries}
     p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
     p.line(4, "const double N = B[2 * i], D = B[2 * i + 1];")
+    p.line(4, "(void)N, (void)D;")
     for column, target in _scatter_targets(p.d, task):
         left = _combination([at.get(k) for k in column])
         if left:
@@ -244,12 +254,12 @@ def _scatter(p: Printer, task: abi.Task, entries: Sequence[Entry]) -> None:
 Key = tuple[Slot, Slot | None]
 
 
-def _scatter_targets(d: Definition, task: abi.Task) -> list[tuple[list[Key], str]]:
+def _scatter_targets(d: Definition, task: str) -> list[tuple[list[Key], str]]:
     """Pairs (value and derivative component of an output, its place for basis function i)."""
     direct, dofs = len(d.unknowns), dofs_expression(d)
     both = [Slot(True, 0), Slot(True, 1)]
     out: list[tuple[list[Key], str]] = [([(s, None) for s in both], f"R[{direct} + i]")]
-    if task is abi.Task.TANGENT:
+    if task == abi.Task.TANGENT:
         for k in range(direct):
             out.append(([(s, Slot(False, k)) for s in both], f"K[({direct} + i) * {dofs} + {k}]"))
             out.append(([(Slot(False, k), s) for s in both], f"K[{k} * {dofs} + {direct} + i]"))
@@ -260,8 +270,8 @@ def _combination(pair: Sequence[str | None]) -> str:
     return " + ".join(f"{b} * {v}" for b, v in zip("ND", pair, strict=True) if v is not None)
 
 
-def _target(d: Definition, task: abi.Task, x: Entry) -> str:
-    if task is abi.Task.ENERGY:
+def _target(d: Definition, task: str, x: Entry) -> str:
+    if task == abi.Task.ENERGY:
         return "values[e]"
     if x.column is None:
         return f"R[{x.row.position}]"
@@ -273,7 +283,7 @@ def _target(d: Definition, task: abi.Task, x: Entry) -> str:
 def _unused(lines: Sequence[str]) -> list[str]:
     """Silence arguments that a family has no use for."""
     text = "\n".join(lines)
-    names = ("points", "modes", "data", "parameters", "rule", "basis", "tangent")
+    names = ("points", "modes", "data", "parameters", "direction", "rule", "basis", "tangent")
     return [f"    (void){name};" for name in names if name not in text]
 
 

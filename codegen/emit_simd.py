@@ -16,6 +16,7 @@ from codegen.graph import Input, Node, Op
 from codegen.model import Definition
 from codegen.schedule import If, Schedule, Statement
 
+_LETTERS = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
 FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS})
 
 
@@ -46,9 +47,7 @@ class _LanePrinter(Printer):
 
     def ref(self, n: Node) -> str:
         if isinstance(n.payload, Input) and n.payload.array != "parameters":
-            return {"coordinates": "X", "dofs": "d", "data": "a"}[n.payload.array] + str(
-                n.payload.index
-            )
+            return _LETTERS[n.payload.array] + str(n.payload.index)
         return super().ref(n)
 
     def statement(self, depth: int, s: Statement) -> None:
@@ -69,11 +68,11 @@ class _LanePrinter(Printer):
 
 
 def function(
-    definition: Definition, task: abi.Task, entries: Sequence[Entry], plan: Schedule
+    definition: Definition, task: str, entries: Sequence[Entry], plan: Schedule
 ) -> tuple[str, int]:
     """C text of one kernel (group function and batch loop) and the number of its temporaries."""
     p = _LanePrinter(definition)
-    _loads(p)
+    _loads(p, task)
     for s in plan.stages[0].before:
         p.statement(1, s)
     _stores(p, task, entries)
@@ -84,13 +83,21 @@ def function(
 
 
 _GROUP_ARGUMENTS = """const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K"""
-_GROUP_UNUSED = "    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;"
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K"""
+_GROUP_UNUSED = "    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;"
 
 
-def _loads(p: _LanePrinter) -> None:
-    widths = {"X": 2 * p.d.nodes, "d": len(p.d.unknowns), "a": len(p.d.data)}
-    for letter, width in widths.items():
+def _widths(d: Definition, task: str) -> dict[str, int]:
+    """Values per element of each array that a task reads."""
+    size = len(d.unknowns)
+    along = size if task == abi.Task.PRODUCT else 0
+    return {"coordinates": 2 * d.nodes, "dofs": size, "data": len(d.data), "direction": along}
+
+
+def _loads(p: _LanePrinter, task: str) -> None:
+    for array, width in _widths(p.d, task).items():
+        letter = _LETTERS[array]
         for start in range(0, width, 4):
             names = [f"{letter}{k}" for k in range(start, min(start + 4, width))]
             p.line(1, f"softehl_vec {', '.join(names)};")
@@ -99,8 +106,8 @@ def _loads(p: _LanePrinter) -> None:
             p.line(1, " ".join(f"(void){n};" for n in names))
 
 
-def _stores(p: _LanePrinter, task: abi.Task, entries: Sequence[Entry]) -> None:
-    size = 1 if task is abi.Task.ENERGY else len(p.d.unknowns)
+def _stores(p: _LanePrinter, task: str, entries: Sequence[Entry]) -> None:
+    size = 1 if task == abi.Task.ENERGY else len(p.d.unknowns)
     flat: dict[str, dict[int, Node]] = {"R": {}, "K": {}}
     for x in entries:
         if x.column is None:
@@ -115,27 +122,26 @@ def _stores(p: _LanePrinter, task: abi.Task, entries: Sequence[Entry]) -> None:
             p.line(1, f"softehl_store{len(chunk)}({target}, {', '.join(chunk)});")
 
 
-def _batch(d: Definition, task: abi.Task) -> str:
+def _batch(d: Definition, task: str) -> str:
     """The public function: full groups, then one group padded with the last element."""
     name = abi.function_name(d.name, task)
-    size = 1 if task is abi.Task.ENERGY else len(d.unknowns)
-    square = size * size if task is abi.Task.TANGENT else 0
-    widths = {"coordinates": 2 * d.nodes, "dofs": len(d.unknowns), "data": len(d.data)}
+    size = 1 if task == abi.Task.ENERGY else len(d.unknowns)
+    square = size * size if task == abi.Task.TANGENT else 0
+    widths = _widths(d, task)
     at = {k: f"{k} + {w} * e" if w else "0" for k, w in widths.items()}
     tangent = f"tangent + {square} * e" if square else "0"
     lines = [
         abi.declaration(d.name, task),
         "{",
         "    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;",
-        "    (void)parameters;",
+        "    (void)parameters, (void)direction;",
         "    ptrdiff_t e = 0;",
         "    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)",
-        f"        {name}_group({at['coordinates']}, {at['dofs']}, {at['data']}, parameters,",
+        f"        {name}_group({', '.join(at.values())}, parameters,",
         f"            values + {size} * e, {tangent});",
         "    if (e == n) return;",
     ]
-    padded = {"X": "coordinates", "d": "dofs", "a": "data"}
-    for letter, array in padded.items():
+    for array, letter in _LETTERS.items():
         lines.append(f"    double {letter}[SOFTEHL_LANES * {max(widths[array], 1)}];")
         if widths[array]:
             lines.append(
@@ -145,7 +151,7 @@ def _batch(d: Definition, task: abi.Task) -> str:
             lines.append(f"    {letter}[0] = 0.0;")
     lines += [
         f"    double R[SOFTEHL_LANES * {size}], K[SOFTEHL_LANES * {max(square, 1)}];",
-        f"    {name}_group(X, d, a, parameters, R, K);",
+        f"    {name}_group(X, d, a, t, parameters, R, K);",
         f"    for (ptrdiff_t i = 0; i < {size} * (n - e); ++i) values[{size} * e + i] = R[i];",
     ]
     if square:

@@ -5,37 +5,61 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from codegen.abi import Task
-from codegen.differentiate import Linearisation, gradient
+from codegen.abi import Task, derivative_task
+from codegen.differentiate import Linearisation, directional, gradient
 from codegen.emit_c import Entry, Slot
-from codegen.graph import Graph, Node
+from codegen.graph import Graph, Input, Node
 from codegen.model import Definition
 from codegen.waists import Waist, linear_waist, quadratic_waist, strip, substitute
 
 
-def tasks(d: Definition) -> list[Task]:
+def tasks(d: Definition) -> list[str]:
     """What a model offers: an energy only where the residual is its gradient."""
-    offered = [Task.RESIDUAL, Task.TANGENT]
+    offered: list[str] = [Task.RESIDUAL, Task.TANGENT]
     if d.conservative:
         offered.insert(0, Task.ENERGY)
-    return [*offered, Task.FIELDS] if d.fields else offered
+    if d.fields:
+        offered.append(Task.FIELDS)
+    if d.product:
+        offered.append(Task.PRODUCT)
+    return offered + [derivative_task(name) for name, _ in d.derivatives]
 
 
-def outputs(d: Definition, task: Task) -> list[Entry]:
+def outputs(d: Definition, task: str) -> list[Entry]:
     """Output nodes of a task, before any pass."""
-    if task is Task.ENERGY:
+    if task == Task.ENERGY:
         return [Entry(Slot(False, 0), None, d.potential)]
-    if task is Task.FIELDS:
+    if task == Task.FIELDS:
         return [Entry(Slot(False, k), None, node) for k, (_, node) in enumerate(d.fields)]
+    if task not in (Task.RESIDUAL, Task.TANGENT):
+        return _rates(d, task)
     modal = _modal(d)
     if modal is not None:
-        return modal.residual() + (modal.tangent() if task is Task.TANGENT else [])
+        return modal.residual() + (modal.tangent() if task == Task.TANGENT else [])
     adjoint = gradient(d.graph, d.potential, d.directions, constant=d.constant, given=d.given)
     slots = _slots(d)
     rows = [Entry(s, None, adjoint[u]) for s, u in zip(slots, d.directions, strict=True)]
-    if task is Task.RESIDUAL:
+    if task == Task.RESIDUAL:
         return rows
     return rows + _tangent(d, rows, slots, adjoint)
+
+
+def _rates(d: Definition, task: str) -> list[Entry]:
+    """The residual's derivative along `direction` or with respect to one argument."""
+    g = d.graph
+    rows = outputs(d, Task.RESIDUAL)
+    if task == Task.PRODUCT:
+        array = {"dofs": "direction", "interpolated": "interpolated direction"}
+        seeds = {
+            u: g.input(array[u.payload.array], u.payload.index, varying=u.varying)
+            for u in d.directions
+            if isinstance(u.payload, Input)
+        }
+    else:
+        by_task = {derivative_task(name): node for name, node in d.derivatives}
+        seeds = {by_task[task]: g.one}
+    rates = directional(g, [x.node for x in rows], seeds, d.given)
+    return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
 
 
 def _slots(d: Definition) -> list[Slot]:

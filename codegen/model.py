@@ -45,6 +45,8 @@ class Definition:
     directions: tuple[Node, ...]
     waist: tuple[Node, ...]
     fields: tuple[tuple[str, Node], ...]
+    product: bool = False
+    derivatives: tuple[tuple[str, Node], ...] = ()
 
     @property
     def conservative(self) -> bool:
@@ -76,6 +78,8 @@ class Model:
         self._constant: list[Node] = []
         self._fields: list[tuple[str, Node]] = []
         self._potential: Node | None = None
+        self._product = False
+        self._derivatives: list[tuple[str, Node]] = []
 
     # declarations -------------------------------------------------------------------------------
 
@@ -191,6 +195,14 @@ class Model:
         """Quantities to be evaluated at the quadrature points for post-processing."""
         self._fields = [(name, self._lower(value)) for name, value in values.items()]
 
+    def offer(self, *, product: bool = False, derivatives: Sequence[Any] = ()) -> None:
+        """Further tasks: the tangent times a vector, derivatives of the residual by argument.
+
+        `derivatives` lists symbols of parameters, data or coordinates.
+        """
+        self._product = product
+        self._derivatives = [(str(s), self._lower(s)) for s in derivatives]
+
     def finish(self) -> Definition:
         """The frozen definition of the model."""
         if self._potential is None:
@@ -212,6 +224,8 @@ class Model:
             directions=tuple(self._directions),
             waist=tuple(self._waist),
             fields=tuple(self._fields),
+            product=self._product,
+            derivatives=tuple(self._derivatives),
         )
 
     # binding ------------------------------------------------------------------------------------

@@ -13,7 +13,9 @@ from fractions import Fraction
 
 import mpmath
 
+from codegen.arithmetic import number
 from codegen.graph import BOOLEAN, Graph, Input, Node, Op, operations, reachable
+from codegen.signatures import merge_equal
 from codegen.sums import common_sums
 
 Roots = list[Node]
@@ -244,40 +246,15 @@ def literals(g: Graph, roots: Roots) -> Roots:
         if not known or n.op in (Op.SUM, Op.BRANCH) or n.op in BOOLEAN:
             return g.rebuild(n.op, args, n.payload)
         with mpmath.workdps(50):
-            number = _number(
-                n, [value.get(o, _exact(a)) for o, a in zip(n.args, args, strict=True)]
-            )
-            value[n] = number
-            return g.const(Fraction(float(number)))
+            result = number(n, [value.get(o, _exact(a)) for o, a in zip(n.args, args, strict=True)])
+            value[n] = result
+            return g.const(Fraction(float(result)))
 
     return rewrite(g, roots, rule)
 
 
 def _exact(n: Node) -> mpmath.mpf:
     return mpmath.mpf(n.value.numerator) / n.value.denominator
-
-
-def _number(n: Node, args: list[mpmath.mpf]) -> mpmath.mpf:
-    if n.op is Op.PI:
-        return mpmath.pi + 0
-    if n.op is Op.POW:
-        assert isinstance(n.payload, Fraction)
-        return args[0] ** (mpmath.mpf(n.payload.numerator) / n.payload.denominator)
-    functions: dict[Op, Callable[..., mpmath.mpf]] = {
-        Op.ADD: lambda a, b: a + b,
-        Op.SUB: lambda a, b: a - b,
-        Op.MUL: lambda a, b: a * b,
-        Op.NEG: lambda a: -a,
-        Op.RECIP: lambda a: 1 / a,
-        Op.SQRT: mpmath.sqrt,
-        Op.CBRT: mpmath.cbrt,
-        Op.RCBRT: lambda a: 1 / mpmath.cbrt(a),
-        Op.LOG: mpmath.log,
-        Op.EXP: mpmath.exp,
-        Op.SIN: mpmath.sin,
-        Op.COS: mpmath.cos,
-    }
-    return functions[n.op](*args)
 
 
 def unrolled(points: Sequence[Sequence[Fraction]]) -> Pass:
@@ -332,6 +309,7 @@ def straight_line(points: Sequence[Sequence[Fraction]]) -> tuple[Pass, ...]:
         Pass("powers", powers),
         Pass("common factors", factor),
         unrolled(points),
+        Pass("equal values", merge_equal),
         Pass("invariants first", invariants_first),
         Pass("common sums", common_sums),
         Pass("common factors again", factor),

@@ -30,7 +30,7 @@ class KernelSource:
 
     definition: Definition
     text: str
-    functions: Mapping[abi.Task, Function]
+    functions: Mapping[str, Function]
 
 
 def compile_model(definition: Definition) -> KernelSource:
@@ -40,15 +40,16 @@ def compile_model(definition: Definition) -> KernelSource:
     return KernelSource(definition, text, functions)
 
 
-def compile_task(definition: Definition, task: abi.Task) -> Function:
+def compile_task(definition: Definition, task: str) -> Function:
     """One kernel, all stages in order."""
     entries = linearise.outputs(definition, task)
-    written_out = definition.unroll and task is not abi.Task.FIELDS
+    written_out = definition.unroll and task != abi.Task.FIELDS
     chosen = passes.straight_line(_points(definition)) if written_out else passes.STANDARD
     roots, trace = passes.run(definition.graph, [x.node for x in entries], chosen)
     entries = [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
     plan = schedule(roots)
-    printer = emit_simd if emit_simd.suits(plan) else emit_c
+    lanes = task != abi.Task.FIELDS and emit_simd.suits(plan)
+    printer = emit_simd if lanes else emit_c
     text, temporaries = printer.function(definition, task, entries, plan)
     return Function(text, plan, temporaries, trace)
 

@@ -59,7 +59,8 @@ static inline softehl_vec softehl_vrcbrt(softehl_vec a)
     return (softehl_vec)((valid & (softehl_bits)y) | (~valid & (softehl_bits)softehl_splat(NAN)));
 }
 
-static inline void softehl_transpose(softehl_vec *a, softehl_vec *b, softehl_vec *c, softehl_vec *d)
+static inline void softehl_transpose(
+    softehl_vec *a, softehl_vec *b, softehl_vec *c, softehl_vec *d)
 {
     const softehl_vec p = __builtin_shufflevector(*a, *b, 0, 4, 2, 6);
     const softehl_vec q = __builtin_shufflevector(*a, *b, 1, 5, 3, 7);
@@ -77,7 +78,8 @@ static inline softehl_vec softehl_column(const double *p, ptrdiff_t width)
 }
 
 static inline void softehl_load4(
-    const double *p, ptrdiff_t width, softehl_vec *a, softehl_vec *b, softehl_vec *c, softehl_vec *d)
+    const double *p, ptrdiff_t width, softehl_vec *a, softehl_vec *b, softehl_vec *c,
+    softehl_vec *d)
 {
     *a = *(const softehl_row *)p;
     *b = *(const softehl_row *)(p + width);

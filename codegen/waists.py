@@ -84,9 +84,9 @@ class _Expansion:
             case Op.ADD | Op.SUB:
                 a, b = (self.linear(x) for x in n.args)
                 return _combined(a, b, 1, 1 if n.op is Op.ADD else -1)
-        a, b = n.args if self.degree[n.args[0]] == 0 else reversed(n.args)
-        p = self.polynomial(a)
-        return {k: self._product(p, q) for k, q in self.linear(b).items()}
+        factor, form = n.args if self.degree[n.args[0]] == 0 else tuple(reversed(n.args))
+        p = self.polynomial(factor)
+        return {k: self._product(p, q) for k, q in self.linear(form).items()}
 
     def polynomial(self, n: Node) -> Polynomial:
         """A value of degree 0 as a polynomial in atoms."""

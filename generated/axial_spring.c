@@ -16,9 +16,10 @@
 
 static void softehl_axial_spring_energy_group(
     const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K)
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
     softehl_vec X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -119,14 +120,15 @@ void softehl_axial_spring_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters;
+    (void)parameters, (void)direction;
     ptrdiff_t e = 0;
     for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_energy_group(coordinates + 8 * e, dofs + 8 * e, 0, parameters,
+        softehl_axial_spring_energy_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
             values + 1 * e, 0);
     if (e == n) return;
     double X[SOFTEHL_LANES * 8];
@@ -135,16 +137,19 @@ void softehl_axial_spring_energy(
     softehl_pad(d, dofs + 8 * e, 8, n - e);
     double a[SOFTEHL_LANES * 1];
     a[0] = 0.0;
+    double t[SOFTEHL_LANES * 1];
+    t[0] = 0.0;
     double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_axial_spring_energy_group(X, d, a, parameters, R, K);
+    softehl_axial_spring_energy_group(X, d, a, t, parameters, R, K);
     for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
 }
 
 static void softehl_axial_spring_residual_group(
     const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K)
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
     softehl_vec X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -258,14 +263,15 @@ void softehl_axial_spring_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters;
+    (void)parameters, (void)direction;
     ptrdiff_t e = 0;
     for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_residual_group(coordinates + 8 * e, dofs + 8 * e, 0, parameters,
+        softehl_axial_spring_residual_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
             values + 8 * e, 0);
     if (e == n) return;
     double X[SOFTEHL_LANES * 8];
@@ -274,16 +280,19 @@ void softehl_axial_spring_residual(
     softehl_pad(d, dofs + 8 * e, 8, n - e);
     double a[SOFTEHL_LANES * 1];
     a[0] = 0.0;
+    double t[SOFTEHL_LANES * 1];
+    t[0] = 0.0;
     double R[SOFTEHL_LANES * 8], K[SOFTEHL_LANES * 1];
-    softehl_axial_spring_residual_group(X, d, a, parameters, R, K);
+    softehl_axial_spring_residual_group(X, d, a, t, parameters, R, K);
     for (ptrdiff_t i = 0; i < 8 * (n - e); ++i) values[8 * e + i] = R[i];
 }
 
 static void softehl_axial_spring_tangent_group(
     const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K)
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
     softehl_vec X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -396,97 +405,80 @@ static void softehl_axial_spring_tangent_group(
     const softehl_vec v98 = v74 + v65;
     const softehl_vec v99 = v51 + v25;
     const softehl_vec v100 = v99 + v98;
-    const softehl_vec v101 = 0.041666666666666664 * v100;
+    const softehl_vec v101 = 0.16666666666666666 * v100;
     const softehl_vec v102 = v98 - v99;
-    const softehl_vec v103 = 0.07216878364870322 * v102;
+    const softehl_vec v103 = 0.14433756729740643 * v102;
     const softehl_vec v104 = v101 - v103;
-    const softehl_vec v105 = 0.125 * v100;
-    const softehl_vec v106 = v105 - v103;
-    const softehl_vec v107 = v106 + v104;
-    const softehl_vec v108 = v74 - v65;
-    const softehl_vec v109 = v51 - v25;
-    const softehl_vec v110 = v109 - v108;
-    const softehl_vec v111 = 0.041666666666666664 * v110;
-    const softehl_vec v112 = v109 + v108;
-    const softehl_vec v113 = 0.07216878364870322 * v112;
-    const softehl_vec v114 = v113 + v111;
-    const softehl_vec v115 = v114 + v107;
-    const softehl_vec v116 = 0.024056261216234408 * v112;
-    const softehl_vec v117 = v111 + v116;
-    const softehl_vec v118 = v117 + v115;
-    const softehl_vec v119 = 0.05555555555555555 * v100;
-    const softehl_vec v120 = 0.08333333333333333 * v110;
-    const softehl_vec v121 = v120 + v119;
-    const softehl_vec v122 = 0.09622504486493763 * v112;
-    const softehl_vec v123 = v122 + v121;
-    const softehl_vec v124 = 0.048112522432468816 * v102;
-    const softehl_vec v125 = v123 - v124;
-    const softehl_vec v126 = v118 + v125;
-    const softehl_vec v127 = v111 - v116;
-    const softehl_vec v128 = 2.0 * v127;
-    const softehl_vec v129 = 0.024056261216234408 * v102;
-    const softehl_vec v130 = v128 - v129;
-    const softehl_vec v131 = v103 + v101;
-    const softehl_vec v132 = v130 - v131;
-    const softehl_vec v133 = v113 - v111;
-    const softehl_vec v134 = v105 + v103;
-    const softehl_vec v135 = v134 + v133;
-    const softehl_vec v136 = v101 + v129;
-    const softehl_vec v137 = v136 + v135;
-    const softehl_vec v138 = v111 - v113;
-    const softehl_vec v139 = v137 - v138;
-    const softehl_vec v140 = v139 + v132;
-    const softehl_vec v141 = 0.013888888888888888 * v100;
-    const softehl_vec v142 = v140 - v141;
-    const softehl_vec v143 = v129 + v141;
-    const softehl_vec v144 = v127 + v143;
-    const softehl_vec v145 = v134 - v133;
-    const softehl_vec v146 = v145 + v144;
-    const softehl_vec v147 = v131 + v127;
-    const softehl_vec v148 = v146 - v147;
-    const softehl_vec v149 = v138 + v136;
-    const softehl_vec v150 = v148 - v149;
-    const softehl_vec v151 = v129 + v117;
-    const softehl_vec v152 = v151 - v141;
-    const softehl_vec v153 = v129 + v114;
-    const softehl_vec v154 = v153 - v101;
-    const softehl_vec v155 = v154 + v152;
-    const softehl_vec v156 = v104 - v111;
-    const softehl_vec v157 = v156 - v116;
-    const softehl_vec v158 = v106 - v113;
-    const softehl_vec v159 = v158 - v111;
-    const softehl_vec v160 = v159 + v157;
-    const softehl_vec v161 = v160 + v155;
-    const softehl_vec v162 = v139 - v132;
-    const softehl_vec v163 = v141 + v162;
-    const softehl_vec v164 = v149 + v144;
-    const softehl_vec v165 = v145 + v147;
-    const softehl_vec v166 = v165 - v164;
-    const softehl_vec v167 = v141 - v151;
-    const softehl_vec v168 = v154 + v167;
-    const softehl_vec v169 = v159 - v157;
-    const softehl_vec v170 = v169 + v168;
-    const softehl_vec v171 = v165 + v164;
-    const softehl_vec v172 = v152 + v169;
-    const softehl_vec v173 = v172 - v154;
-    const softehl_vec v174 = v167 + v160;
-    const softehl_vec v175 = v174 - v154;
+    const softehl_vec v105 = 0.05555555555555555 * v100;
+    const softehl_vec v106 = v105 + v104;
+    const softehl_vec v107 = v51 + v74;
+    const softehl_vec v108 = v107 - v25;
+    const softehl_vec v109 = v108 - v65;
+    const softehl_vec v110 = 0.19245008972987526 * v109;
+    const softehl_vec v111 = v110 + v106;
+    const softehl_vec v112 = 0.048112522432468816 * v102;
+    const softehl_vec v113 = v111 - v112;
+    const softehl_vec v114 = v102 + v109;
+    const softehl_vec v115 = 0.024056261216234408 * v114;
+    const softehl_vec v116 = 0.013888888888888888 * v100;
+    const softehl_vec v117 = v116 + v115;
+    const softehl_vec v118 = 0.041666666666666664 * v100;
+    const softehl_vec v119 = 0.07216878364870322 * v102;
+    const softehl_vec v120 = v119 + v118;
+    const softehl_vec v121 = 0.024056261216234408 * v109;
+    const softehl_vec v122 = v120 + v121;
+    const softehl_vec v123 = v122 + v117;
+    const softehl_vec v124 = 0.024056261216234408 * v102;
+    const softehl_vec v125 = v118 + v124;
+    const softehl_vec v126 = 0.125 * v100;
+    const softehl_vec v127 = v126 + v119;
+    const softehl_vec v128 = v127 + v125;
+    const softehl_vec v129 = 0.14433756729740643 * v109;
+    const softehl_vec v130 = v128 + v129;
+    const softehl_vec v131 = v130 - v123;
+    const softehl_vec v132 = v120 - v121;
+    const softehl_vec v133 = 0.07216878364870322 * v109;
+    const softehl_vec v134 = v127 - v133;
+    const softehl_vec v135 = v134 - v132;
+    const softehl_vec v136 = v102 - v109;
+    const softehl_vec v137 = 0.024056261216234408 * v136;
+    const softehl_vec v138 = v116 + v137;
+    const softehl_vec v139 = v138 + v135;
+    const softehl_vec v140 = v118 - v133;
+    const softehl_vec v141 = v124 + v140;
+    const softehl_vec v142 = v139 - v141;
+    const softehl_vec v143 = v115 - v116;
+    const softehl_vec v144 = v124 - v140;
+    const softehl_vec v145 = v144 + v143;
+    const softehl_vec v146 = 0.09622504486493763 * v109;
+    const softehl_vec v147 = v104 - v146;
+    const softehl_vec v148 = v147 + v145;
+    const softehl_vec v149 = v130 + v123;
+    const softehl_vec v150 = v138 + v141;
+    const softehl_vec v151 = v134 + v132;
+    const softehl_vec v152 = v151 - v150;
+    const softehl_vec v153 = v151 + v150;
+    const softehl_vec v154 = v143 + v135;
+    const softehl_vec v155 = v154 - v144;
+    const softehl_vec v156 = v147 - v144;
+    const softehl_vec v157 = v116 - v115;
+    const softehl_vec v158 = v156 + v157;
     softehl_store4(R + 0, 8, v92, softehl_splat(0.0), v95, softehl_splat(0.0));
     softehl_store4(R + 4, 8, v96, softehl_splat(0.0), v97, softehl_splat(0.0));
-    softehl_store4(K + 0, 64, v126, softehl_splat(0.0), v142, softehl_splat(0.0));
-    softehl_store4(K + 4, 64, v150, softehl_splat(0.0), v161, softehl_splat(0.0));
+    softehl_store4(K + 0, 64, v113, softehl_splat(0.0), v131, softehl_splat(0.0));
+    softehl_store4(K + 4, 64, v142, softehl_splat(0.0), v148, softehl_splat(0.0));
     softehl_store4(K + 8, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 12, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 16, 64, v142, softehl_splat(0.0), v163, softehl_splat(0.0));
-    softehl_store4(K + 20, 64, v166, softehl_splat(0.0), v170, softehl_splat(0.0));
+    softehl_store4(K + 16, 64, v131, softehl_splat(0.0), v149, softehl_splat(0.0));
+    softehl_store4(K + 20, 64, v152, softehl_splat(0.0), v142, softehl_splat(0.0));
     softehl_store4(K + 24, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 28, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 32, 64, v150, softehl_splat(0.0), v166, softehl_splat(0.0));
-    softehl_store4(K + 36, 64, v171, softehl_splat(0.0), v173, softehl_splat(0.0));
+    softehl_store4(K + 32, 64, v142, softehl_splat(0.0), v152, softehl_splat(0.0));
+    softehl_store4(K + 36, 64, v153, softehl_splat(0.0), v155, softehl_splat(0.0));
     softehl_store4(K + 40, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 44, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 48, 64, v161, softehl_splat(0.0), v170, softehl_splat(0.0));
-    softehl_store4(K + 52, 64, v173, softehl_splat(0.0), v175, softehl_splat(0.0));
+    softehl_store4(K + 48, 64, v148, softehl_splat(0.0), v142, softehl_splat(0.0));
+    softehl_store4(K + 52, 64, v155, softehl_splat(0.0), v158, softehl_splat(0.0));
     softehl_store4(K + 56, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 60, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
 }
@@ -495,14 +487,15 @@ void softehl_axial_spring_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters;
+    (void)parameters, (void)direction;
     ptrdiff_t e = 0;
     for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_tangent_group(coordinates + 8 * e, dofs + 8 * e, 0, parameters,
+        softehl_axial_spring_tangent_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
             values + 8 * e, tangent + 64 * e);
     if (e == n) return;
     double X[SOFTEHL_LANES * 8];
@@ -511,8 +504,10 @@ void softehl_axial_spring_tangent(
     softehl_pad(d, dofs + 8 * e, 8, n - e);
     double a[SOFTEHL_LANES * 1];
     a[0] = 0.0;
+    double t[SOFTEHL_LANES * 1];
+    t[0] = 0.0;
     double R[SOFTEHL_LANES * 8], K[SOFTEHL_LANES * 64];
-    softehl_axial_spring_tangent_group(X, d, a, parameters, R, K);
+    softehl_axial_spring_tangent_group(X, d, a, t, parameters, R, K);
     for (ptrdiff_t i = 0; i < 8 * (n - e); ++i) values[8 * e + i] = R[i];
     for (ptrdiff_t i = 0; i < 64 * (n - e); ++i) tangent[64 * e + i] = K[i];
 }

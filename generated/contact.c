@@ -19,11 +19,13 @@ void softehl_contact_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points;
     (void)modes;
+    (void)direction;
     (void)rule;
     (void)basis;
     (void)tangent;
@@ -32,9 +34,7 @@ void softehl_contact_residual(
         const double *restrict d = dofs + 3 * e;
         const double *restrict a = data + 5 * e;
         double *restrict R = values + 3 * e;
-        (void)X;  /* coordinates */
-        (void)d;  /* dofs */
-        (void)a;  /* data */
+        (void)X; (void)d; (void)a;
         const double v1 = d[0] * a[0];
         const double v2 = X[0] * a[0];
         const double v3 = v2 + v1;
@@ -74,11 +74,13 @@ void softehl_contact_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points;
     (void)modes;
+    (void)direction;
     (void)rule;
     (void)basis;
     for (ptrdiff_t e = 0; e < n; ++e) {
@@ -87,92 +89,83 @@ void softehl_contact_tangent(
         const double *restrict a = data + 5 * e;
         double *restrict R = values + 3 * e;
         double *restrict K = tangent + 3 * 3 * e;
-        (void)X;  /* coordinates */
-        (void)d;  /* dofs */
-        (void)a;  /* data */
+        (void)X; (void)d; (void)a;
         const double v1 = a[1] * a[4];
         const double v2 = a[0] * a[4];
         const double v3 = X[0] * a[0];
         const double v4 = X[1] * a[1];
         const double v5 = v4 + v3;
-        const double v6 = a[4] * v5;
-        const double v7 = d[2] + v6;
-        const double v8 = a[2] + parameters[0];
-        const double v9 = a[4] * v8;
-        const double v10 = v9 - v7;
-        const double v11 = d[1] * v1;
-        const double v12 = d[0] * v2;
-        const double v13 = v12 + v11;
-        const double v14 = v13 - v10;
-        const int v15 = v14 <= 0.0;
-        double v16, v17, v18, v19, v20, v21, v22, v23, v24, v25, v26;
-        if (v15) {
-            const double v27 = a[3] * parameters[1];
-            const double v28 = v27 * v1;
-            const double v29 = d[1] * v28;
-            const double v30 = v27 * v2;
-            const double v31 = d[0] * v30;
-            const double v32 = v31 + v29;
-            const double v33 = v7 - v9;
-            const double v34 = v27 * v33;
-            const double v35 = v32 + v34;
-            const double v36 = a[1] * a[3];
-            const double v37 = d[1] * v36;
-            const double v38 = a[0] * a[3];
-            const double v39 = d[0] * v38;
-            const double v40 = v39 + v37;
-            const double v41 = v5 - a[2];
-            const double v42 = v41 - parameters[0];
-            const double v43 = a[3] * v42;
-            const double v44 = v43 + v40;
-            const double v45 = a[0] * v30;
-            const double v46 = a[0] * v28;
-            const double v47 = a[0] * v27;
-            const double v48 = a[1] * v30;
-            const double v49 = a[1] * v28;
-            const double v50 = a[1] * v27;
-            v16 = v35;
-            v17 = v44;
-            v18 = v45;
-            v19 = v46;
-            v20 = v47;
-            v21 = v48;
-            v22 = v49;
-            v23 = v50;
-            v24 = v38;
-            v25 = v36;
-            v26 = 0.0;
+        const double v6 = v5 - a[2];
+        const double v7 = v6 - parameters[0];
+        const double v8 = a[4] * v7;
+        const double v9 = d[2] + v8;
+        const double v10 = d[1] * v1;
+        const double v11 = d[0] * v2;
+        const double v12 = v11 + v10;
+        const double v13 = v12 + v9;
+        const int v14 = v13 <= 0.0;
+        double v15, v16, v17, v18, v19, v20, v21, v22, v23, v24;
+        if (v14) {
+            const double v25 = a[3] * parameters[1];
+            const double v26 = v25 * v1;
+            const double v27 = d[1] * v26;
+            const double v28 = v25 * v2;
+            const double v29 = d[0] * v28;
+            const double v30 = v29 + v27;
+            const double v31 = v25 * v9;
+            const double v32 = v30 + v31;
+            const double v33 = a[1] * a[3];
+            const double v34 = d[1] * v33;
+            const double v35 = a[0] * a[3];
+            const double v36 = d[0] * v35;
+            const double v37 = v36 + v34;
+            const double v38 = a[3] * v7;
+            const double v39 = v38 + v37;
+            const double v40 = a[0] * v28;
+            const double v41 = a[0] * v26;
+            const double v42 = a[0] * v25;
+            const double v43 = a[1] * v26;
+            const double v44 = a[1] * v25;
+            v15 = v32;
+            v16 = v39;
+            v17 = v40;
+            v18 = v41;
+            v19 = v42;
+            v20 = v43;
+            v21 = v44;
+            v22 = v35;
+            v23 = v33;
+            v24 = 0.0;
         } else {
-            const double v51 = 1.0 / a[4];
-            const double v52 = a[3] * v51;
-            const double v53 = d[2] * v52;
-            const double v54 = -v53;
-            const double v55 = -v52;
-            v16 = 0.0;
-            v17 = v54;
+            const double v45 = 1.0 / a[4];
+            const double v46 = a[3] * v45;
+            const double v47 = d[2] * v46;
+            const double v48 = -v47;
+            const double v49 = -v46;
+            v15 = 0.0;
+            v16 = v48;
+            v17 = 0.0;
             v18 = 0.0;
             v19 = 0.0;
             v20 = 0.0;
             v21 = 0.0;
             v22 = 0.0;
             v23 = 0.0;
-            v24 = 0.0;
-            v25 = 0.0;
-            v26 = v55;
+            v24 = v49;
         }
-        const double v56 = a[0] * v16;
-        const double v57 = a[1] * v16;
-        R[0] = v56;
-        R[1] = v57;
-        R[2] = v17;
-        K[0] = v18;
-        K[1] = v19;
-        K[2] = v20;
-        K[3] = v21;
-        K[4] = v22;
-        K[5] = v23;
-        K[6] = v24;
-        K[7] = v25;
-        K[8] = v26;
+        const double v50 = a[0] * v15;
+        const double v51 = a[1] * v15;
+        R[0] = v50;
+        R[1] = v51;
+        R[2] = v16;
+        K[0] = v17;
+        K[1] = v18;
+        K[2] = v19;
+        K[3] = v18;
+        K[4] = v20;
+        K[5] = v21;
+        K[6] = v22;
+        K[7] = v23;
+        K[8] = v24;
     }
 }

@@ -29,17 +29,18 @@ void softehl_film_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)data;
+    (void)direction;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
         double *restrict R = values + (4 + modes) * e;
-        (void)X;  /* coordinates */
-        (void)d;  /* dofs */
+        (void)X; (void)d;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
         const double v1 = X[1] - parameters[0];
         const double v2 = X[3] - parameters[0];
@@ -74,6 +75,7 @@ void softehl_film_residual(
                 p0 += B[2 * i] * d[4 + i];
                 p1 += B[2 * i + 1] * d[4 + i];
             }
+            (void)p0, (void)p1;
             const double v25 = 0.5 * w[0];
             const double v26 = 0.5 + v25;
             const double v27 = v26 * v5;
@@ -129,6 +131,7 @@ void softehl_film_residual(
             s24 += v54;
             for (ptrdiff_t i = 0; i < modes; ++i) {
                 const double N = B[2 * i], D = B[2 * i + 1];
+                (void)N, (void)D;
                 R[4 + i] += N * v59 + D * v68;
             }
         }
@@ -145,17 +148,18 @@ void softehl_film_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)data;
+    (void)direction;
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
         double *restrict R = values + (4 + modes) * e;
         double *restrict K = tangent + (4 + modes) * (4 + modes) * e;
-        (void)X;  /* coordinates */
-        (void)d;  /* dofs */
+        (void)X; (void)d;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
         for (ptrdiff_t i = 0; i < (4 + modes) * (4 + modes); ++i) K[i] = 0.0;
         const double v1 = X[1] - parameters[0];
@@ -223,6 +227,7 @@ void softehl_film_tangent(
                 p0 += B[2 * i] * d[4 + i];
                 p1 += B[2 * i + 1] * d[4 + i];
             }
+            (void)p0, (void)p1;
             const double v57 = 0.5 * w[0];
             const double v58 = 0.5 + v57;
             const double v59 = v58 * v5;
@@ -380,6 +385,7 @@ void softehl_film_tangent(
             s56 += v128;
             for (ptrdiff_t i = 0; i < modes; ++i) {
                 const double N = B[2 * i], D = B[2 * i + 1];
+                (void)N, (void)D;
                 R[4 + i] += N * v141 + D * v150;
                 K[(4 + i) * (4 + modes) + 0] += N * v132 + D * v171;
                 K[0 * (4 + modes) + 4 + i] += N * v156 + D * v159;
@@ -430,16 +436,17 @@ void softehl_film_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)data;
+    (void)direction;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
-        (void)X;  /* coordinates */
-        (void)d;  /* dofs */
+        (void)X; (void)d;
         const double v1 = X[1] - parameters[0];
         const double v2 = X[3] - parameters[0];
         const double v3 = X[2] + d[2];
@@ -459,6 +466,7 @@ void softehl_film_fields(
                 p0 += B[2 * i] * d[4 + i];
                 p1 += B[2 * i + 1] * d[4 + i];
             }
+            (void)p0, (void)p1;
             const double v11 = 0.5 * w[0];
             const double v12 = 0.5 - v11;
             const double v13 = v12 * v4;

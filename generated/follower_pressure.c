@@ -12,9 +12,10 @@
 
 static void softehl_follower_pressure_residual_group(
     const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K)
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
     softehl_vec X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -71,14 +72,15 @@ void softehl_follower_pressure_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters;
+    (void)parameters, (void)direction;
     ptrdiff_t e = 0;
     for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_follower_pressure_residual_group(coordinates + 4 * e, dofs + 4 * e, 0, parameters,
+        softehl_follower_pressure_residual_group(coordinates + 4 * e, dofs + 4 * e, 0, 0, parameters,
             values + 4 * e, 0);
     if (e == n) return;
     double X[SOFTEHL_LANES * 4];
@@ -87,16 +89,19 @@ void softehl_follower_pressure_residual(
     softehl_pad(d, dofs + 4 * e, 4, n - e);
     double a[SOFTEHL_LANES * 1];
     a[0] = 0.0;
+    double t[SOFTEHL_LANES * 1];
+    t[0] = 0.0;
     double R[SOFTEHL_LANES * 4], K[SOFTEHL_LANES * 1];
-    softehl_follower_pressure_residual_group(X, d, a, parameters, R, K);
+    softehl_follower_pressure_residual_group(X, d, a, t, parameters, R, K);
     for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) values[4 * e + i] = R[i];
 }
 
 static void softehl_follower_pressure_tangent_group(
     const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K)
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
     softehl_vec X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -152,50 +157,44 @@ static void softehl_follower_pressure_tangent_group(
     const softehl_vec v47 = v46 + v44;
     const softehl_vec v48 = 0.5 * v23;
     const softehl_vec v49 = v48 - v46;
-    const softehl_vec v50 = v49 + v47;
-    const softehl_vec v51 = 0.5 * v50;
-    const softehl_vec v52 = v45 - v51;
-    const softehl_vec v53 = v47 - v49;
-    const softehl_vec v54 = 0.28867513459481287 * v53;
-    const softehl_vec v55 = v54 + v52;
-    const softehl_vec v56 = v45 + v51;
-    const softehl_vec v57 = v56 - v54;
-    const softehl_vec v58 = v23 + v15;
-    const softehl_vec v59 = 0.25 * v58;
-    const softehl_vec v60 = v15 - v23;
-    const softehl_vec v61 = 0.14433756729740643 * v60;
-    const softehl_vec v62 = v59 - v61;
-    const softehl_vec v63 = v33 * v10;
-    const softehl_vec v64 = 1.3333333333333333 * v63;
+    const softehl_vec v50 = v47 - v49;
+    const softehl_vec v51 = 0.28867513459481287 * v50;
+    const softehl_vec v52 = v45 + v51;
+    const softehl_vec v53 = v49 + v47;
+    const softehl_vec v54 = 0.5 * v53;
+    const softehl_vec v55 = v52 - v54;
+    const softehl_vec v56 = v15 - v23;
+    const softehl_vec v57 = 0.14433756729740643 * v56;
+    const softehl_vec v58 = v57 + v54;
+    const softehl_vec v59 = v54 - v57;
+    const softehl_vec v60 = v33 * v10;
+    const softehl_vec v61 = 1.3333333333333333 * v60;
+    const softehl_vec v62 = -v61;
+    const softehl_vec v63 = v57 - v54;
+    const softehl_vec v64 = 0.6666666666666666 * v60;
     const softehl_vec v65 = -v64;
-    const softehl_vec v66 = v61 - v59;
-    const softehl_vec v67 = 0.6666666666666666 * v63;
-    const softehl_vec v68 = -v67;
-    const softehl_vec v69 = v49 - v47;
-    const softehl_vec v70 = 0.28867513459481287 * v69;
-    const softehl_vec v71 = v52 + v70;
-    const softehl_vec v72 = v54 + v56;
-    const softehl_vec v73 = v61 + v59;
-    const softehl_vec v74 = -v73;
+    const softehl_vec v66 = v54 + v52;
+    const softehl_vec v67 = -v58;
     softehl_store4(R + 0, 4, v29, v40, v41, v43);
-    softehl_store4(K + 0, 16, softehl_splat(0.0), v55, softehl_splat(0.0), v57);
-    softehl_store4(K + 4, 16, v62, v65, v66, v68);
-    softehl_store4(K + 8, 16, softehl_splat(0.0), v71, softehl_splat(0.0), v72);
-    softehl_store4(K + 12, 16, v73, v68, v74, v65);
+    softehl_store4(K + 0, 16, softehl_splat(0.0), v55, softehl_splat(0.0), v58);
+    softehl_store4(K + 4, 16, v59, v62, v63, v65);
+    softehl_store4(K + 8, 16, softehl_splat(0.0), v63, softehl_splat(0.0), v66);
+    softehl_store4(K + 12, 16, v58, v65, v67, v62);
 }
 
 void softehl_follower_pressure_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters;
+    (void)parameters, (void)direction;
     ptrdiff_t e = 0;
     for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_follower_pressure_tangent_group(coordinates + 4 * e, dofs + 4 * e, 0, parameters,
+        softehl_follower_pressure_tangent_group(coordinates + 4 * e, dofs + 4 * e, 0, 0, parameters,
             values + 4 * e, tangent + 16 * e);
     if (e == n) return;
     double X[SOFTEHL_LANES * 4];
@@ -204,8 +203,10 @@ void softehl_follower_pressure_tangent(
     softehl_pad(d, dofs + 4 * e, 4, n - e);
     double a[SOFTEHL_LANES * 1];
     a[0] = 0.0;
+    double t[SOFTEHL_LANES * 1];
+    t[0] = 0.0;
     double R[SOFTEHL_LANES * 4], K[SOFTEHL_LANES * 16];
-    softehl_follower_pressure_tangent_group(X, d, a, parameters, R, K);
+    softehl_follower_pressure_tangent_group(X, d, a, t, parameters, R, K);
     for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) values[4 * e + i] = R[i];
     for (ptrdiff_t i = 0; i < 16 * (n - e); ++i) tangent[16 * e + i] = K[i];
 }

@@ -20,9 +20,10 @@
 
 static void softehl_mean_rotation_energy_group(
     const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K)
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
     softehl_vec X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -215,14 +216,15 @@ void softehl_mean_rotation_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters;
+    (void)parameters, (void)direction;
     ptrdiff_t e = 0;
     for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_energy_group(coordinates + 8 * e, dofs + 9 * e, 0, parameters,
+        softehl_mean_rotation_energy_group(coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters,
             values + 1 * e, 0);
     if (e == n) return;
     double X[SOFTEHL_LANES * 8];
@@ -231,16 +233,19 @@ void softehl_mean_rotation_energy(
     softehl_pad(d, dofs + 9 * e, 9, n - e);
     double a[SOFTEHL_LANES * 1];
     a[0] = 0.0;
+    double t[SOFTEHL_LANES * 1];
+    t[0] = 0.0;
     double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_mean_rotation_energy_group(X, d, a, parameters, R, K);
+    softehl_mean_rotation_energy_group(X, d, a, t, parameters, R, K);
     for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
 }
 
 static void softehl_mean_rotation_residual_group(
     const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K)
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
     softehl_vec X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -491,14 +496,15 @@ void softehl_mean_rotation_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters;
+    (void)parameters, (void)direction;
     ptrdiff_t e = 0;
     for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_residual_group(coordinates + 8 * e, dofs + 9 * e, 0, parameters,
+        softehl_mean_rotation_residual_group(coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters,
             values + 9 * e, 0);
     if (e == n) return;
     double X[SOFTEHL_LANES * 8];
@@ -507,16 +513,19 @@ void softehl_mean_rotation_residual(
     softehl_pad(d, dofs + 9 * e, 9, n - e);
     double a[SOFTEHL_LANES * 1];
     a[0] = 0.0;
+    double t[SOFTEHL_LANES * 1];
+    t[0] = 0.0;
     double R[SOFTEHL_LANES * 9], K[SOFTEHL_LANES * 1];
-    softehl_mean_rotation_residual_group(X, d, a, parameters, R, K);
+    softehl_mean_rotation_residual_group(X, d, a, t, parameters, R, K);
     for (ptrdiff_t i = 0; i < 9 * (n - e); ++i) values[9 * e + i] = R[i];
 }
 
 static void softehl_mean_rotation_tangent_group(
     const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict parameters, double *restrict R, double *restrict K)
+    const double *restrict t, const double *restrict parameters,
+    double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)parameters, (void)R, (void)K;
+    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
     softehl_vec X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -843,14 +852,15 @@ void softehl_mean_rotation_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
     (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters;
+    (void)parameters, (void)direction;
     ptrdiff_t e = 0;
     for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_tangent_group(coordinates + 8 * e, dofs + 9 * e, 0, parameters,
+        softehl_mean_rotation_tangent_group(coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters,
             values + 9 * e, tangent + 81 * e);
     if (e == n) return;
     double X[SOFTEHL_LANES * 8];
@@ -859,8 +869,10 @@ void softehl_mean_rotation_tangent(
     softehl_pad(d, dofs + 9 * e, 9, n - e);
     double a[SOFTEHL_LANES * 1];
     a[0] = 0.0;
+    double t[SOFTEHL_LANES * 1];
+    t[0] = 0.0;
     double R[SOFTEHL_LANES * 9], K[SOFTEHL_LANES * 81];
-    softehl_mean_rotation_tangent_group(X, d, a, parameters, R, K);
+    softehl_mean_rotation_tangent_group(X, d, a, t, parameters, R, K);
     for (ptrdiff_t i = 0; i < 9 * (n - e); ++i) values[9 * e + i] = R[i];
     for (ptrdiff_t i = 0; i < 81 * (n - e); ++i) tangent[81 * e + i] = K[i];
 }

@@ -26,11 +26,10 @@ Array = npt.NDArray[np.float64]
 GENERATED = Path(__file__).resolve().parent.parent / "generated"
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
 REMEDY = "run `python -m codegen.build` (make does it)"
-TASKS = ("energy", "residual", "tangent", "fields")
 
 _SIGNATURE = (
     "(ptrdiff_t, ptrdiff_t, ptrdiff_t, const double *, const double *, const double *,"
-    " const double *, const double *, const double *, double *, double *);"
+    " const double *, const double *, const double *, const double *, double *, double *);"
 )
 
 
@@ -87,6 +86,16 @@ class Kernel:
         tangent = np.empty((call.n, call.ndof, call.ndof))
         return call.run(np.empty((call.n, call.ndof)), tangent), tangent
 
+    def product(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+        """Tangent times `direction` (n, ndof), without forming the tangent: (n, ndof)."""
+        call = _Call(self, "product", coordinates, dofs, direction=direction, **given)
+        return call.run(np.empty((call.n, call.ndof)))
+
+    def derivative(self, name: str, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Derivative of the residual by the parameter, datum or coordinate `name`: (n, ndof)."""
+        call = _Call(self, f"d_{name}", coordinates, dofs, **given)
+        return call.run(np.empty((call.n, call.ndof)))
+
     def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Post-processing values at the quadrature points, (n, points, len(fields))."""
         call = _Call(self, "fields", coordinates, dofs, **given)
@@ -104,6 +113,7 @@ class _Call:
         dofs: Array,
         *,
         data: Array | None = None,
+        direction: Array | None = None,
         parameters: Array | Mapping[str, float] = (),  # type: ignore[assignment]
         rule: Rule | None = None,
     ) -> None:
@@ -128,11 +138,16 @@ class _Call:
             "parameters", self._ordered(parameters), (len(kernel.parameters),)
         )
         points = np.asarray(self.rule.points, dtype=np.float64).reshape(len(self.rule.weights), -1)
+        self.direction = np.empty(0)
+        if direction is not None:
+            self.direction = self._array("direction", direction, (self.n, self.ndof))
         self.table = np.column_stack([points, self.rule.weights])
-        columns = kernel.default_rule.points.reshape(len(kernel.default_rule.weights), -1).shape[1]
-        if points.shape[1] != columns:
+        default = kernel.default_rule
+        dimension = default.points.reshape(len(default.weights), -1).shape[1]
+        if points.shape[1] != dimension:
             raise ArgumentError(
-                f"{kernel.name}: the rule has {points.shape[1]} coordinates a point, must be {columns}"
+                f"{kernel.name}: points of the rule are {points.shape[1]}-dimensional, "
+                f"must be {dimension}-dimensional"
             )
         self.basis = np.ascontiguousarray(
             np.empty(0) if self.rule.basis is None else self.rule.basis, dtype=np.float64
@@ -176,7 +191,15 @@ class _Call:
 
     def run(self, values: Array, tangent: Array | None = None) -> Array:
         """Call the C function; `values` and `tangent` are written in place."""
-        read = (self.coordinates, self.dofs, self.data, self.parameters, self.table, self.basis)
+        read = (
+            self.coordinates,
+            self.dofs,
+            self.data,
+            self.parameters,
+            self.direction,
+            self.table,
+            self.basis,
+        )
         self.function(
             self.n,
             len(self.rule.weights),

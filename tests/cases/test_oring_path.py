@@ -66,7 +66,7 @@ def test_every_requested_state_converges_and_is_told(default: tuple[Outcome, Rec
 
 def test_cost(default: tuple[Outcome, Recorder]) -> None:
     outcome, _ = default
-    assert sum(stage.factorisations for stage in outcome.stages) < 400
+    assert sum(stage.factorisations or 0 for stage in outcome.stages) < 400
 
 
 def test_newton_ends_quadratically_in_every_stage(default: tuple[Outcome, Recorder]) -> None:
@@ -92,10 +92,10 @@ def test_flux_is_constant_outside_cavitation(default: tuple[Outcome, Recorder]) 
 
 def test_film_thickness_against_a_fine_mesh(default: tuple[Outcome, Recorder]) -> None:
     outcome, _ = default
-    fine = {1600: 3.1815, 400: 1.3723, 100: 0.5913, -1600: 2.628, -400: 1.131, -100: 0.489}
+    fine = {1600: 3.1836, 400: 1.3748, 100: 0.5945, -1600: 2.6314, -400: 1.1363, -100: 0.4913}
     for state in outcome.states:
         if state.rod_speed in fine:
-            assert state.h_star_um == pytest.approx(fine[int(state.rod_speed)], rel=0.035)
+            assert state.h_star_um == pytest.approx(fine[int(state.rod_speed)], rel=0.03)
         assert 0.0 < state.h_min_um < state.h_star_um
 
 
@@ -151,6 +151,20 @@ def test_a_collapsed_film_is_labelled_and_the_end_of_the_path_named() -> None:
         assert "stroke in" in outcome.message
         assert "finer mesh" in outcome.message
     assert slowest.rod_speed == -1600.0 or slowest.verdict == COLLAPSED
+
+
+def test_a_free_section_rolls_until_no_moment_holds_it() -> None:
+    # without shear stress hardly anything turns it, so that the path is not cut short
+    parameters = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (6400.0,)}
+    free, fixed = (
+        run(oring(rotation=rotation, shear_traction=False, **parameters), Recorder())
+        for rotation in ("free", "fixed")
+    )
+    assert free.converged, free.message
+    assert "release" in [stage.name for stage in free.stages]
+    assert abs(free.states[0].moment_N_mm) < 1e-9
+    assert abs(fixed.states[0].moment_N_mm) > 1e-3
+    assert free.states[0].h_star_um == pytest.approx(fixed.states[0].h_star_um, rel=0.05)
 
 
 def test_shear_stress_can_be_switched_off() -> None:

@@ -88,9 +88,12 @@ def test_tangent_of_the_whole_problem(solid: str, stroke: str, rng: np.random.Ge
     assert r == pytest.approx(problem.residual(x), rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("rotation", ["fixed", "free"])
-def test_the_film_acts_on_a_held_or_on_a_free_section(rotation: str) -> None:
-    section = build_section(oring(density=1, rotation=rotation))
-    problem = film_problem(section, PathSettings(), Film(1.0, "out", 400.0, np.zeros(28)))
-    moment = section.layout.dofs("rotation")[0]
-    assert (moment in problem.fixed) == (rotation == "free")
+@pytest.mark.parametrize("moment", [None, 0.0, 2.5])
+def test_the_film_acts_on_a_held_section_or_on_one_with_a_given_moment(
+    moment: float | None,
+) -> None:
+    section = build_section(oring(density=1))
+    film = Film(1.0, "out", 400.0, np.zeros(28), moment=moment)
+    problem = film_problem(section, PathSettings(), film)
+    prescribed = dict(zip(problem.fixed.tolist(), problem.values.tolist(), strict=True))
+    assert prescribed.get(int(section.layout.dofs("rotation")[0])) == moment

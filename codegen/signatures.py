@@ -1,0 +1,101 @@
+"""Equality by numeric signature: values that are equal but written differently become one.
+
+Every value is evaluated at random points in many digits.  Values that agree there, up to sign,
+are merged after they have agreed again at fresh points: the chance of a false merge is that of
+two different functions agreeing to 30 digits at four random points.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import Any
+
+import mpmath
+
+from codegen.arithmetic import number
+from codegen.graph import BOOLEAN, Graph, Node, Op, reachable
+
+DIGITS = 50
+AGREE = 30
+POINTS = 2
+"""Points of the signature; as many fresh ones confirm each merge."""
+
+
+def merge_equal(g: Graph, roots: list[Node]) -> list[Node]:
+    """Roots in which equal values are computed once (the first one written wins)."""
+    nodes = reachable(roots)
+    rng = random.Random(0)
+    with mpmath.workdps(DIGITS):
+        samples = [_sample(nodes, rng) for _ in range(2 * POINTS)]
+        first: dict[tuple[str, ...], Node] = {}
+        same: dict[Node, tuple[Node, int]] = {}
+        for n in nodes:
+            if n.op in BOOLEAN or n.op in (Op.CONST, Op.PI, Op.INPUT, Op.SUM, Op.BRANCH):
+                continue
+            key, sign = _signature([s[n] for s in samples[:POINTS]])
+            if not key:
+                continue
+            leader = first.setdefault((str(n.varying), *key), n)
+            if leader is not n:
+                relative = sign * _signature([s[leader] for s in samples[:POINTS]])[1]
+                if _confirmed(samples[POINTS:], leader, n, relative):
+                    same[n] = (leader, relative)
+    return _rebuilt(g, roots, same)
+
+
+def _rebuilt(g: Graph, roots: Sequence[Node], same: dict[Node, tuple[Node, int]]) -> list[Node]:
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        if n in same:
+            leader, sign = same[n]
+            new[n] = new[leader] if sign > 0 else g.neg(new[leader])
+        else:
+            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+    return [new[r] for r in roots]
+
+
+Value = Any
+"""An mpmath number, a truth value, or None where there is no value."""
+
+
+def _sample(nodes: Sequence[Node], rng: random.Random) -> dict[Node, Value]:
+    """Values at one random point; None where there is none (a branch on complex numbers)."""
+    values: dict[Node, Value] = {}
+    for n in nodes:
+        if n.op in (Op.INPUT, Op.SUM, Op.BRANCH):
+            # Sums and branches stand for themselves: a sample would see one side only.
+            values[n] = _random(rng)
+        else:
+            args = [values[a] for a in n.args]
+            values[n] = None if any(a is None for a in args) else _computed(n, args)
+    return values
+
+
+def _random(rng: random.Random) -> mpmath.mpf:
+    return mpmath.mpf(rng.getrandbits(160)) / 2**160 + mpmath.mpf(1) / 2
+
+
+def _computed(n: Node, args: list[Value]) -> Value:
+    try:
+        return number(n, args)
+    except (TypeError, ZeroDivisionError, ValueError):
+        return None
+
+
+def _signature(values: Sequence[Value]) -> tuple[tuple[str, ...], int]:
+    """Leading digits of the values with the first one's sign taken out; empty for no value."""
+    if any(v is None or isinstance(v, bool) or isinstance(v, mpmath.mpc) for v in values):
+        return (), 1
+    if any(v == 0 for v in values):
+        return (), 1
+    sign = 1 if values[0] > 0 else -1
+    return tuple(mpmath.nstr(sign * v, AGREE) for v in values), sign
+
+
+def _confirmed(samples: Sequence[dict[Node, Value]], a: Node, b: Node, sign: int) -> bool:
+    for s in samples:
+        x, y = s[a], s[b]
+        if x is None or y is None or abs(x - sign * y) > mpmath.mpf(10) ** -AGREE * abs(x):
+            return False
+    return True

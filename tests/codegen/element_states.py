@@ -1,0 +1,148 @@
+"""Random admissible states of one element of every shipped model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from codegen.evaluate import State
+from runtime.kernels import Kernel, load_kernel
+from runtime.rules import Kind, Rule, film_rule
+
+Array = npt.NDArray[np.float64]
+MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))
+
+
+@dataclass(frozen=True)
+class Case:
+    """Arguments of a kernel family for one element, as doubles (mm, MPa, N, s)."""
+
+    family: str
+    label: str
+    coordinates: Array
+    dofs: Array
+    data: Array
+    parameters: Array
+    rule: Rule | None = None
+
+    def arguments(self) -> tuple[tuple[Array, Array], dict[str, Any]]:
+        """Positional and named arguments of the kernel's methods."""
+        return (self.coordinates[None], self.dofs[None]), {
+            "data": self.data[None],
+            "parameters": self.parameters,
+            "rule": self.rule,
+        }
+
+    def exact(self, kernel: Kernel | None = None) -> State:
+        """The same doubles as arguments of the oracle."""
+        rule = self.rule or (kernel or load_kernel(self.family)).default_rule
+        table = np.column_stack([rule.points.reshape(len(rule.weights), -1), rule.weights])
+        basis = () if rule.basis is None else rule.basis.tolist()
+        return State(
+            self.coordinates.tolist(),
+            self.dofs.tolist(),
+            self.data.tolist(),
+            self.parameters.tolist(),
+            table.tolist(),
+            basis,
+        )
+
+
+def _case(family: str, label: str, X: Any, u: Any, parameters: Any, data: Any = ()) -> Case:
+    x, d, a, p = (np.array(v, dtype=np.float64).ravel() for v in (X, u, data, parameters))
+    return Case(family, label, x, d, a, p)
+
+
+def quad(rng: np.random.Generator, radius: float, size: float) -> Array:
+    """A distorted, turned quadrilateral (4, 2) at the given radius, counterclockwise."""
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    angle = rng.uniform(0, 2 * np.pi)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    X: Array = size * (square + rng.uniform(-0.15, 0.15, (4, 2))) @ turn.T + [0.2, radius]
+    return X
+
+
+def motion(rng: np.random.Generator, X: Array, strain: float) -> Array:
+    """Displacements (4, 2) of a random deformation with positive volume ratio, and a shift."""
+    F = np.eye(2) + rng.uniform(-strain, strain, (2, 2))
+    centre = X.mean(axis=0)
+    scatter = 0.2 * strain * np.ptp(X[:, 0]) * rng.uniform(-1, 1, (4, 2))
+    u: Array = (X - centre) @ F.T + centre - X + scatter + rng.uniform(-0.05, 0.05, 2)
+    return u
+
+
+def solids(rng: np.random.Generator) -> Iterator[Case]:
+    """All three solids on three materials: a seal-sized ring, near the axis, stiff."""
+    for family in ("solid_q4", "solid_fbar", "solid_taylor"):
+        for label, radius, size, strain, material in (
+            ("ring", 25.0, 0.1, 0.3, MATERIALS[0]),
+            ("near the axis", 1.5, 0.6, 0.2, MATERIALS[1]),
+            ("stiff", 10.0, 0.3, 0.15, MATERIALS[2]),
+        ):
+            X = quad(rng, radius, size)
+            yield _case(family, label, X, motion(rng, X, strain), material)
+
+
+def boundaries(rng: np.random.Generator) -> Iterator[Case]:
+    """Follower pressure of both signs and none; contact closed and open."""
+    for label, pressure in (("pressed", 2.5), ("pulled", -0.8), ("no pressure", 0.0)):
+        X = np.array([[-0.05, 25.1], [0.06, 25.0]]) + rng.uniform(-0.02, 0.02, (2, 2))
+        u = rng.uniform(-0.1, 0.1, (2, 2))
+        yield _case("follower_pressure", label, X, u, [pressure])
+    for label, gap, multiplier in (
+        ("closed", -0.02, -1.5),
+        ("closed by its multiplier", 0.01, -8.0),
+        ("closed by its gap", -0.05, 2.0),
+        ("open", 0.1, -3.0),
+        ("open under tension", 0.02, 1.0),
+    ):
+        angle, radius = rng.uniform(0, 2 * np.pi), rng.uniform(20, 30)
+        n, u = np.array([np.cos(angle), np.sin(angle)]), rng.uniform(-0.1, 0.1, 2)
+        X, offset = np.array([0.3, radius]), rng.uniform(0, 0.02)
+        c = n @ (X + u) - offset - gap
+        data = [*n, c, rng.uniform(1, 20), 200.0]
+        yield _case("contact", label, X, [*u, multiplier], [offset, rng.uniform(0.2, 1)], data)
+
+
+def supports(rng: np.random.Generator) -> Iterator[Case]:
+    """Mean rotation, axial spring."""
+    X = quad(rng, 26.9, 0.4)
+    u = [*rng.uniform(-0.3, 0.3, 8), -3.0]
+    yield _case("mean_rotation", "turned", X, u, [0.01, 26.96, 7.6, 0.05])
+    X = quad(rng, 26.9, 0.4)
+    yield _case("axial_spring", "bedded", X, rng.uniform(-0.3, 0.3, 8), [0.37])
+
+
+FILMS: tuple[tuple[str, float, Callable[[Array], Array]], ...] = (
+    ("pressed", 400.0, lambda p: 3.0 + p),
+    ("mixed", -100.0, lambda p: np.concatenate([[-1.0], p[1:-1], [1.3]])),
+    ("cavitated", 1600.0, lambda p: -1.2 + 0.5 * p),
+)
+
+
+def films(rng: np.random.Generator, m_p: int, kind: Kind) -> Iterator[Case]:
+    """Film of order `m_p`: pressed, cavitated and mixed; both strokes; weights off and on."""
+    for k, (label, speed, pressures) in enumerate(FILMS):
+        h = rng.uniform(0.004, 0.03, 2)
+        X = np.array([[-0.1, 25.4], [0.02, 25.45]]) + rng.uniform(-0.01, 0.01, (2, 2))
+        u = np.column_stack([rng.uniform(-0.02, 0.02, 2), 25.0 + h - X[:, 1]])
+        p = pressures(rng.uniform(-1, 1, m_p + 1))
+        parameters = [25.0, speed, 6.6e-8, (0.02, 0.0, 0.015)[k], 1.0e4, (1.0, 0.6, 0.3)[k], 0.9]
+        points = None if label == "pressed" else m_p + 3
+        plain = _case("film", f"m_p={m_p} {kind} {label}", X, [*u.ravel(), *p], parameters)
+        yield replace(plain, rule=film_rule(m_p, kind, points))
+
+
+def all_cases() -> list[Case]:
+    """Every case of every family: the same in every run."""
+    rng = np.random.default_rng(20251)
+    cases = [*solids(rng), *boundaries(rng), *supports(rng)]
+    kinds: tuple[Kind, ...] = ("gauss", "lobatto")
+    for m_p in range(1, 6):
+        for kind in kinds:
+            cases += films(rng, m_p, kind)
+    return cases

@@ -1,0 +1,506 @@
+"""Derivatives on the graph against central differences in 90 digits, and their exceptions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from codegen import linearise, quadrature
+from codegen.abi import Task
+from codegen.differentiate import DifferentiationError, Linearisation, gradient, partials
+from codegen.evaluate import Oracle, State, evaluate
+from codegen.graph import Graph, Node, Op, operations
+from codegen.model import Definition, Model
+from codegen.models import ALL
+from tests.codegen.workshop import (
+    close,
+    difference,
+    inputs,
+    linearised,
+    same_value,
+    unknowns,
+    value,
+)
+
+AT = inputs("1.3", "0.7", "2.9")
+
+
+def reverse(g: Graph, root: Node, wrt: list[Node]) -> list[Node]:
+    adjoint = gradient(g, root, wrt)
+    return [adjoint[u] for u in wrt]
+
+
+def forward(g: Graph, root: Node, wrt: list[Node]) -> list[Node]:
+    linear = Linearisation(g, wrt)
+    return [linear.derivative(root, j) for j in range(len(wrt))]
+
+
+Derivative = Callable[[Graph, Node, list[Node]], list[Node]]
+BOTH = pytest.mark.parametrize("derivative", [reverse, forward])
+
+
+def right(rows: list[Node], root: Node, at: Any) -> bool:
+    """The check all tests share: every derivative equals the central difference to 30 digits."""
+    return all(close(evaluate(d, at), difference(root, at, k)) for k, d in enumerate(rows))
+
+
+# ------------------------------------------------------------------------------- hand-made graphs
+
+
+def expressions(g: Graph, x: Node, y: Node, z: Node) -> dict[str, Node]:
+    """One expression for every rule, and some that mix them."""
+    positive = g.add(g.mul(x, x), g.one)
+    less = g.compare(Op.LT, x, y)
+    return {
+        "sum": g.sub(g.add(x, g.mul(g.const(3), y)), z),
+        "product": g.mul(g.mul(x, y), g.mul(y, z)),
+        "square": g.node(Op.MUL, (x, x)),
+        "sign": g.node(Op.NEG, (g.mul(x, y),)),
+        "quotient": g.div(g.add(x, y), g.add(z, g.const(2))),
+        "power": g.power(positive, Fraction(7, 5)),
+        "negative power": g.power(x, Fraction(-2, 3)),
+        "square root": g.call(Op.SQRT, g.add(positive, y)),
+        "cube root": g.call(Op.CBRT, g.mul(positive, z)),
+        "reciprocal cube root": g.call(Op.RCBRT, g.mul(positive, z)),
+        "logarithm": g.call(Op.LOG, g.mul(positive, y)),
+        "exponential": g.call(Op.EXP, g.mul(x, y)),
+        "sine": g.call(Op.SIN, g.mul(x, z)),
+        "cosine": g.call(Op.COS, g.mul(x, z)),
+        "named": g.mul(g.name("a", g.mul(x, y)), g.name("b", g.call(Op.SIN, x))),
+        "branch": g.branch(less, g.mul(x, x), g.call(Op.EXP, g.mul(y, x))),
+        "other branch": g.branch(g.compare(Op.LE, y, x), g.mul(x, z), g.recip(y)),
+        "nested": g.branch(less, z, g.branch(g.compare(Op.LT, z, y), x, g.power(z, 3))),
+        "used twice": g.mul(g.branch(less, x, y), g.call(Op.SIN, g.branch(less, z, x))),
+        "constant": g.pi(),
+    }
+
+
+NAMES = list(expressions(Graph(), *unknowns(Graph(), 3)))
+
+
+@BOTH
+@pytest.mark.parametrize("name", NAMES)
+def test_rules(derivative: Derivative, name: str) -> None:
+    g = Graph()
+    wrt = unknowns(g, 3)
+    root = expressions(g, *wrt)[name]
+    assert right(derivative(g, root, wrt), root, AT)
+
+
+@BOTH
+def test_second_derivatives(derivative: Derivative) -> None:
+    g = Graph()
+    wrt = unknowns(g, 3)
+    for root in expressions(g, *wrt).values():
+        rows = derivative(g, root, wrt)
+        hessian = [derivative(g, row, wrt) for row in rows]
+        for i in range(3):
+            assert right(hessian[i], rows[i], AT)
+            for j in range(i):
+                assert close(evaluate(hessian[i][j], AT), evaluate(hessian[j][i], AT), 1e-40)
+
+
+@BOTH
+def test_wrong_derivatives_are_detected(derivative: Derivative) -> None:
+    """The check refuses a sign, a dropped term, a factor, and one part in 10^20."""
+    g = Graph()
+    wrt = unknowns(g, 3)
+    x, y, _ = wrt
+    root = g.mul(g.call(Op.SIN, g.mul(x, y)), x)
+    good = derivative(g, root, wrt)
+    assert right(good, root, AT)
+    cosine = g.call(Op.COS, g.mul(x, y))
+    for wrong in (
+        g.neg(good[0]),
+        g.mul(g.mul(x, y), cosine),
+        g.mul(g.const(Fraction(1, 2)), good[0]),
+        g.mul(g.const(1 + Fraction(1, 10**20)), good[0]),
+    ):
+        assert not right([wrong, *good[1:]], root, AT)
+
+
+# -------------------------------------------------------------------------------- random graphs
+
+
+@dataclass(frozen=True)
+class Step:
+    """One random operation on two of the values that are there already."""
+
+    kind: str
+    first: int
+    second: int
+    exponent: Fraction
+
+
+def _positive(g: Graph, a: Node) -> Node:
+    return g.add(g.mul(a, a), g.const(Fraction(1, 3)))
+
+
+MAKERS: dict[str, Callable[[Graph, Node, Node, Fraction], Node]] = {
+    "add": lambda g, a, b, e: g.add(a, b),
+    "sub": lambda g, a, b, e: g.sub(a, b),
+    "mul": lambda g, a, b, e: g.mul(a, g.call(Op.COS, b)),
+    "div": lambda g, a, b, e: g.div(a, _positive(g, b)),
+    "pow": lambda g, a, b, e: g.power(_positive(g, a), e),
+    "sqrt": lambda g, a, b, e: g.call(Op.SQRT, _positive(g, a)),
+    "cbrt": lambda g, a, b, e: g.call(Op.CBRT, _positive(g, b)),
+    "log": lambda g, a, b, e: g.call(Op.LOG, _positive(g, a)),
+    "exp": lambda g, a, b, e: g.call(Op.EXP, g.call(Op.SIN, a)),
+    "name": lambda g, a, b, e: g.name(f"n{a.id}", a),
+    # the sides meet nowhere near 1/7, whatever the operands are
+    "branch": lambda g, a, b, e: g.branch(
+        g.compare(Op.LT, g.add(a, g.const(Fraction(1, 7))), b), g.mul(a, b), g.sub(b, a)
+    ),
+    "guard": lambda g, a, b, e: g.branch(
+        g.compare(Op.LT, g.zero, a), g.call(Op.LOG, a), g.power(b, 3)
+    ),
+}
+STEPS = st.builds(
+    Step,
+    st.sampled_from(sorted(MAKERS)),
+    st.integers(0, 11),
+    st.integers(0, 11),
+    st.builds(Fraction, st.integers(-7, 7), st.sampled_from([1, 2, 3, 5])),
+)
+VALUES = st.integers(-300, 300).filter(lambda v: v % 100 != 0)
+
+
+def grown(g: Graph, wrt: list[Node], steps: list[Step]) -> Node:
+    values = list(wrt)
+    for s in steps:
+        a, b = values[s.first % len(values)], values[s.second % len(values)]
+        values.append(MAKERS[s.kind](g, a, b, s.exponent))
+    root = values[-1]
+    for v in values[-3:-1]:
+        root = g.add(root, g.call(Op.SIN, v))
+    return root
+
+
+@BOTH
+@settings(max_examples=60, derandomize=True, deadline=None, database=None)
+@given(steps=st.lists(STEPS, min_size=3, max_size=9), at=st.tuples(VALUES, VALUES, VALUES))
+def test_random_graphs(derivative: Derivative, steps: list[Step], at: tuple[int, int, int]) -> None:
+    g = Graph()
+    wrt = unknowns(g, 3)
+    root = grown(g, wrt, steps)
+    with mpmath.workdps(100):
+        point = inputs(*(mpmath.mpf(v) / 101 for v in at))
+    assert right(derivative(g, root, wrt), root, point)
+
+
+# --------------------------------------------------------------------------------------- branches
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "undefined", [Op.LOG, Op.RECIP, Op.SQRT], ids=["logarithm", "quotient", "root"]
+)
+def test_the_side_that_is_not_taken_is_not_evaluated(derivative: Derivative, undefined: Op) -> None:
+    """At x <= 0 the other side has no value, real or at all; mpmath raises or turns complex."""
+    g = Graph()
+    (x,) = wrt = unknowns(g, 1)
+    root = g.branch(g.compare(Op.LT, g.zero, x), g.node(undefined, (x,)), g.mul(x, x))
+    (slope,) = derivative(g, root, wrt)
+    (curvature,) = derivative(g, slope, wrt)
+    for at in (0, -2):
+        for node, expected in ((root, at**2), (slope, 2 * at), (curvature, 2)):
+            found = evaluate(node, inputs(at))
+            assert isinstance(found, mpmath.mpf)
+            assert found == expected
+    assert right([slope], root, inputs("0.3"))
+    assert right([curvature], slope, inputs("0.3"))
+
+
+@BOTH
+def test_a_branch_stays_a_branch(derivative: Derivative) -> None:
+    g = Graph()
+    (x,) = wrt = unknowns(g, 1)
+    condition = g.compare(Op.LT, x, g.zero)
+    (slope,) = derivative(g, g.branch(condition, g.power(x, 3), g.call(Op.SIN, x)), wrt)
+    assert slope.op is Op.BRANCH
+    assert slope.args[0] is condition
+    assert derivative(g, g.branch(condition, g.one, g.const(2)), wrt) == [g.zero]
+
+
+@BOTH
+@pytest.mark.parametrize("twice", [False, True], ids=["once", "twice"])
+def test_a_named_value_used_in_one_side_only_is_not_evaluated_for_the_other(
+    derivative: Derivative, twice: bool
+) -> None:
+    g = Graph()
+    (x,) = wrt = unknowns(g, 1)
+    positive = g.compare(Op.LT, g.zero, x)
+    named = g.name("log_x", g.call(Op.LOG, x))
+    root = g.branch(positive, g.mul(named, named), g.mul(x, x))
+    if twice:
+        root = g.add(root, g.branch(positive, g.call(Op.SIN, named), g.neg(x)))
+    (slope,) = derivative(g, root, wrt)
+    assert right([slope], root, inputs("0.3"))
+    assert evaluate(slope, inputs(0)) == (-1 if twice else 0)
+
+
+def test_gradient_with_respect_to_a_value_inside_a_branch() -> None:
+    g = Graph()
+    (x,) = unknowns(g, 1)
+    inner = g.add(x, g.one)
+    root = g.branch(g.compare(Op.LT, x, g.const(5)), g.mul(inner, inner), inner)
+    assert same_value(gradient(g, root, [inner])[inner], g.mul(g.const(2), inner), AT)
+
+
+# ------------------------------------------------------------------------------------ exceptions
+
+
+def test_a_constant_is_not_differentiated() -> None:
+    g = Graph()
+    x, y, _ = wrt = unknowns(g, 3)
+    frozen = g.name("a", g.mul(x, y))
+    root = g.mul(frozen, g.call(Op.SIN, x))
+    expected = g.mul(frozen, g.call(Op.COS, x))
+    adjoint = gradient(g, root, wrt, constant=[frozen])
+    linear = Linearisation(g, wrt, constant=[frozen])
+    for found in (adjoint[x], linear.derivative(root, 0)):
+        assert same_value(found, expected, AT)
+        assert not close(evaluate(found, AT), difference(root, AT, 0)), "it is an exception"
+    assert adjoint[y] is linear.derivative(root, 1) is g.zero
+
+
+def test_a_constant_is_one_for_that_differentiation_only() -> None:
+    g = Graph()
+    x, y, _ = wrt = unknowns(g, 3)
+    frozen = g.name("a", g.mul(x, y))
+    row = gradient(g, g.mul(frozen, x), wrt, constant=[frozen])[x]
+    assert row is frozen
+    assert right(reverse(g, row, wrt), row, AT)
+    assert right(forward(g, row, wrt), row, AT)
+
+
+def test_a_given_derivative_replaces_the_true_one() -> None:
+    g = Graph()
+    x, y, _ = wrt = unknowns(g, 3)
+    special = g.name("s", g.call(Op.EXP, g.mul(x, y)))
+    slope = g.call(Op.SIN, y)
+    given_ = {special: {x: slope}}
+    root = g.add(g.mul(special, special), g.mul(x, y))
+    in_x = g.add(g.mul(g.const(2), g.mul(special, slope)), y)
+    adjoint = gradient(g, root, wrt, given=given_)
+    linear = Linearisation(g, wrt, given=given_)
+    for k, expected in ((0, in_x), (1, x), (2, g.zero)):
+        assert same_value(adjoint[wrt[k]], expected, AT)
+        assert same_value(linear.derivative(root, k), expected, AT)
+
+
+def test_a_given_derivative_can_be_the_chain_rule_by_hand() -> None:
+    """Given with respect to a named value, differentiation goes on below that."""
+    g = Graph()
+    x, y, _ = wrt = unknowns(g, 3)
+    inner = g.name("t", g.mul(x, y))
+    outer = g.name("e", g.call(Op.EXP, inner))
+    given_ = {outer: {inner: outer}}
+    root = g.mul(outer, y)
+    adjoint = gradient(g, root, wrt, given=given_)
+    linear = Linearisation(g, wrt, given=given_)
+    assert right([adjoint[u] for u in wrt], root, AT)
+    assert right([linear.derivative(root, j) for j in range(3)], root, AT)
+
+
+def test_a_given_derivative_with_respect_to_something_the_value_does_not_contain() -> None:
+    g = Graph()
+    (x,) = wrt = unknowns(g, 1)
+    other = g.name("v", g.call(Op.SIN, x))
+    special = g.name("s", g.mul(x, x))
+    given_ = {special: {other: g.const(3)}}
+    expected = g.mul(g.const(3), g.call(Op.COS, x))
+    assert same_value(Linearisation(g, wrt, given=given_).derivative(special, 0), expected, AT)
+    assert same_value(gradient(g, special, wrt, given=given_)[x], expected, AT)
+
+
+def test_conditions_have_no_derivative_and_sums_no_local_one() -> None:
+    g = Graph()
+    (x,) = unknowns(g, 1)
+    assert partials(g, g.compare(Op.LT, x, g.one)) == []
+    assert partials(g, x) == []
+    with pytest.raises(DifferentiationError, match="no derivative rule for sum"):
+        partials(g, g.sum(g.mul(x, g.input("rule", 0, varying=True))))
+
+
+# ------------------------------------------------------------------------- models: sums and waists
+
+RULE = [(mpmath.mpf(t), mpmath.mpf(w)) for t, w in (("-0.7", "0.6"), ("0.1", "0.9"), ("0.8", "1"))]
+
+
+def bar(*, waist: bool, summed: bool = False) -> Definition:
+    """Three unknowns, energy of two strains at points; `summed` puts a sum into a sum."""
+    m = Model("bar", nodes=1, rule=quadrature.gauss(2, 1))
+    u = [m.unknown(f"u{k}") for k in range(3)]
+    (mu,) = m.parameters(mu="stiffness")
+    (xi,) = m.point()
+    a = m.define("a", 1 + u[0] * xi + u[1] * u[2], waist=waist)
+    b = m.define("b", sp.exp(u[1] * xi / 3) + u[2] ** 2, waist=waist)
+    energy = mu * (a**2 * b + sp.log(a * b) + sp.Piecewise((a**3, a > b), (sp.sqrt(b), True)))
+    if summed:
+        mean = m.integral("mean", a * xi**2 + b)
+        energy = energy * mean + sp.sin(mean - b)
+    m.potential(m.integral("Pi", energy) + u[0] * u[2])
+    return m.finish()
+
+
+def bar_state() -> State:
+    return State((0, 0), ("0.13", "-0.2", "0.35"), (), ("2.5",), RULE)
+
+
+def matrices_agree(a: Any, b: Any, tolerance: float = 1e-28) -> bool:
+    (Ra, Ka), (Rb, Kb) = a, b
+    rows = [(Ra, Rb), *zip(Ka, Kb, strict=True)]
+    return all(close(x, y, tolerance) for p, q in rows for x, y in zip(p, q, strict=True))
+
+
+def exact(d: Definition, state: State) -> tuple[Any, Any]:
+    oracle = Oracle(d)
+    return oracle.residual(state), oracle.tangent(state)
+
+
+@pytest.mark.parametrize("waist", [False, True], ids=["direct", "waist"])
+@pytest.mark.parametrize("summed", [False, True], ids=["one sum", "sum in a sum"])
+def test_sums_over_points(waist: bool, summed: bool) -> None:
+    d, state = bar(waist=waist, summed=summed), bar_state()
+    assert matrices_agree(linearised(d, state), exact(d, state))
+
+
+def test_waist_and_direct_differentiation_agree() -> None:
+    """Forward mode through the waist, against forward mode straight to the unknowns."""
+    d, state = bar(waist=True, summed=True), bar_state()
+    g = d.graph
+    adjoint = gradient(g, d.potential, d.directions)
+    through = Linearisation(g, d.directions, [z for z in d.waist if z.varying])
+    direct = Linearisation(g, d.directions)
+    for u in d.directions:
+        for j in range(3):
+            a, b = (value(d, x.derivative(adjoint[u], j), state) for x in (through, direct))
+            assert close(a, b)
+            assert a != 0
+
+
+def test_the_mirrored_tangent_equals_the_unmirrored_one() -> None:
+    d, state = bar(waist=True), bar_state()
+    g = d.graph
+    adjoint = gradient(g, d.potential, d.directions)
+    mirror = {adjoint[z]: z for z in d.waist}
+    once = Linearisation(g, d.directions, d.waist, symmetric=mirror)
+    twice = Linearisation(g, d.directions, d.waist)
+    entries: dict[bool, list[Node]] = {True: [], False: []}
+    for u in d.directions:
+        for j in range(3):
+            pair = once.derivative(adjoint[u], j), twice.derivative(adjoint[u], j)
+            assert close(value(d, pair[0], state), value(d, pair[1], state))
+            entries[True].append(pair[0])
+            entries[False].append(pair[1])
+    assert operations(entries[True]) < operations(entries[False]), "that is what it is for"
+
+
+def pseudo(*, frozen: bool) -> Definition:
+    """A weak form with a factor that depends on the unknowns, or the same as a true potential."""
+    m = Model("pseudo", nodes=1, rule=quadrature.gauss(2, 1))
+    u, v = m.unknown("u"), m.unknown("v")
+    (xi,) = m.point()
+    a = m.define("a", sp.exp(u * xi) + v**2)
+    w = m.define("w", u * v + xi * u**2)
+    m.potential(m.integral("Pi", a * w), constant=[a] if frozen else [])
+    return m.finish()
+
+
+def test_pseudo_potentials_freeze_in_the_residual_and_not_in_the_tangent() -> None:
+    state = State((0, 0), ("0.4", "-0.3"), (), (), RULE)
+    free, frozen = pseudo(frozen=False), pseudo(frozen=True)
+    assert free.conservative
+    assert not frozen.conservative
+    for d in (free, frozen):
+        R, K = linearised(d, state)
+        assert matrices_agree((R, K), exact(d, state))
+        assert close(K[0][1], K[1][0]) == d.conservative
+    with mpmath.workdps(50):
+        u, v = (mpmath.mpf(s) for s in state.dofs)
+        by_hand = mpmath.fsum(w * (mpmath.exp(u * t) + v**2) * (v + 2 * t * u) for t, w in RULE)
+    assert close(linearised(frozen, state)[0][0], by_hand)
+    assert not close(linearised(free, state)[0][0], by_hand)
+
+
+def test_weak_forms_vary_only_what_is_varied() -> None:
+    m = Model("weak", nodes=1, rule=quadrature.gauss(2, 1))
+    u, v = m.unknown("u"), m.unknown("v")
+    (xi,) = m.point()
+    m.weak_form([(sp.sin(v) * xi**2, u), (u * v, v + xi * u)])
+    d = m.finish()
+    assert Task.ENERGY not in linearise.tasks(d)
+    state = State((0, 0), ("0.4", "-0.3"), (), (), RULE)
+    R, K = linearised(d, state)
+    assert matrices_agree((R, K), exact(d, state))
+    with mpmath.workdps(50):
+        x, y = (mpmath.mpf(s) for s in state.dofs)
+        assert close(R[1], x * y * mpmath.fsum(w for _, w in RULE))
+
+
+def line_model(term: str) -> Definition:
+    """An interpolated field p with one direct unknown u."""
+    m = Model("line", nodes=1, rule=quadrature.gauss(2, 1))
+    u = m.unknown("u")
+    p, p_xi = m.interpolated("p")
+    (xi,) = m.point()
+    if term == "local":
+        density = sp.exp(p * u) + p_xi**2 * sp.Max(-p, 0) + xi * p**3 * u**2
+        m.potential(m.integral("Pi", density))
+    else:
+        mean = m.integral("mean", p)
+        m.potential(m.integral("Pi", mean * p**2 * u) if term == "again" else mean * u**3)
+    return m.finish()
+
+
+def test_interpolated_unknowns() -> None:
+    nodes = [mpmath.mpf(t) for t in ("-1", "0.25", "1")]
+    basis = [[_lagrange(nodes, k, t) for k in range(3)] for t, _ in RULE]
+    state = State((0, 0), ("0.3", "0.6", "-0.4", "1.2"), (), (), RULE, basis)
+    for term in ("local", "mean"):
+        d = line_model(term)
+        assert matrices_agree(linearised(d, state), exact(d, state))
+
+
+def _lagrange(nodes: list[Any], k: int, t: Any) -> tuple[Any, Any]:
+    with mpmath.workdps(60):
+        others = [n for n in nodes if n is not nodes[k]]
+        scale = mpmath.fprod(nodes[k] - n for n in others)
+        return mpmath.fprod(t - n for n in others) / scale, mpmath.fsum(
+            t - n for n in others
+        ) / scale
+
+
+def test_a_mean_of_an_interpolated_field_may_not_enter_a_sum_again() -> None:
+    """It would couple every mode at one point with every mode at another: no kernel for that."""
+    d = line_model("again")
+    linearise.outputs(d, Task.RESIDUAL)
+    with pytest.raises(DifferentiationError, match="may not enter a sum again"):
+        linearise.outputs(d, Task.TANGENT)
+
+
+def test_a_wrong_tangent_graph_is_detected() -> None:
+    """The comparison that these tests rest on refuses one entry off by 1e-20, or transposed."""
+    d, state = pseudo(frozen=True), State((0, 0), ("0.4", "-0.3"), (), (), RULE)
+    R, K = exact(d, state)
+    assert matrices_agree((R, K), (R, K))
+    with mpmath.workdps(50):
+        slightly = [[K[0][0] * (1 + mpmath.mpf(10) ** -20), K[0][1]], K[1]]
+    transposed = [list(c) for c in zip(*K, strict=True)]
+    for wrong in (slightly, transposed):
+        assert not matrices_agree((R, wrong), (R, K))
+    assert not matrices_agree(([-r for r in R], K), (R, K))
+
+
+def test_shipped_conservative_models_are_those_with_an_energy() -> None:
+    found = {name for name, make in ALL.items() if make().conservative}
+    assert found == {"solid_q4", "solid_taylor", "mean_rotation", "axial_spring"}

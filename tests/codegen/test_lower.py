@@ -1,0 +1,248 @@
+"""SymPy to graph: sharing, exact numbers, branches; errors name what is wrong in the model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath
+import pytest
+import sympy as sp
+
+from codegen import quadrature
+from codegen.evaluate import evaluate
+from codegen.graph import Graph, Node, Op, operations, reachable
+from codegen.lower import Lowering, ModelError
+from codegen.model import Model
+from tests.codegen.workshop import close, inputs, unknowns
+
+x, y = sp.symbols("x y", real=True)
+
+
+def lowering() -> tuple[Graph, Lowering]:
+    g = Graph()
+    return g, Lowering(g, dict(zip((x, y), unknowns(g, 2), strict=True)))
+
+
+def lowered(expression: Any) -> Node:
+    return lowering()[1](expression)
+
+
+def value(expression: Any, *at: Any) -> Any:
+    return evaluate(lowered(expression), inputs(*at))
+
+
+def model(**kwargs: Any) -> Model:
+    return Model("throwaway", nodes=1, rule=quadrature.gauss(1, 1), **kwargs)
+
+
+# ------------------------------------------------------------------------------------- conversion
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        (x + y) ** 2 / (x - y) - 3 * x * y,
+        sp.sqrt(x) * sp.log(y) + sp.exp(-x / y) - sp.sin(x) * sp.cos(y),
+        x ** sp.Rational(-2, 3) + y ** sp.Rational(7, 5) + sp.cbrt(x * y),
+        x**y + sp.pi * x + sp.E + sp.exp(1 + x),
+        sp.Max(x, y, 2) - sp.Min(x, 3 * y, 7) + sp.Abs(x - y) + sp.Abs(y - x),
+        sp.Piecewise((x**2, x > y), (y**3, x >= 0), (sp.Integer(1), True)),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("at", [(2, 3), (5, 4), ("0.3", "1.7")], ids=str)
+def test_graph_and_sympy_have_one_value(expression: Any, at: tuple[Any, Any]) -> None:
+    point = {x: sp.Rational(str(at[0])), y: sp.Rational(str(at[1]))}
+    expected = mpmath.mpf(0)
+    with mpmath.workdps(60):
+        expected = mpmath.mpf(str(expression.subs(point).evalf(60)))
+        numbers = [mpmath.mpf(v.p) / v.q for v in point.values()]
+        assert close(value(expression, *numbers), expected, 1e-45)
+
+
+def test_equal_subexpressions_are_one_node() -> None:
+    g, lower = lowering()
+    root = lower(sp.sin(x * y) + sp.cos(x * y) + sp.log(x * y))
+    assert operations([root]) == 1 + 3 + 2  # x y, three functions of it, two sums
+    assert lower(x * y) is lower(y * x)
+    assert lower(x * y) in reachable([root])
+    size = len(g)
+    lower(sp.sin(x * y))
+    assert len(g) == size
+
+
+def test_nothing_is_expanded() -> None:
+    a, b = sp.symbols("a b", real=True)
+    assert operations([lowered((x + y) ** 9)]) == 2
+    g = Graph()
+    lower = Lowering(g, dict(zip((x, y, a, b), unknowns(g, 4), strict=True)))
+    assert operations([lower((x + y) * (a + b))]) == 3
+
+
+def test_numbers_are_exact() -> None:
+    tenth = lowered(sp.Rational(1, 10))
+    assert tenth.op is Op.CONST
+    assert tenth.value.denominator == 10
+    assert lowered(7).value == 7
+    assert lowered(sp.pi).op is Op.PI
+    assert lowered(sp.sqrt(2)).op is Op.POW
+    assert lowered(sp.Integer(10) ** 40).value == 10**40
+    assert lowered(sp.E).op is Op.EXP
+
+
+def test_quotients_share_one_reciprocal() -> None:
+    ops = [n.op for n in reachable([lowered(y / (x**2 * (x + y)))])]
+    assert ops.count(Op.RECIP) == 1
+    assert lowered(1 / x).op is Op.RECIP
+
+
+def test_functions_and_powers() -> None:
+    for function, op in ((sp.log, Op.LOG), (sp.exp, Op.EXP), (sp.sin, Op.SIN), (sp.cos, Op.COS)):
+        assert lowered(function(x)).op is op
+    root = lowered(x ** sp.Rational(2, 7))
+    assert (root.op, str(root.payload)) == (Op.POW, "2/7")
+    assert lowered(x**y).op is Op.EXP
+
+
+# --------------------------------------------------------------------------------------- branches
+
+
+def test_piecewise_is_a_chain_of_branches() -> None:
+    g, lower = lowering()
+    root = lower(sp.Piecewise((x, x > y), (y, sp.Ne(x, 0)), (x * y, True)))
+    assert root.op is Op.BRANCH
+    condition, then, otherwise = root.args
+    X, Y = lower(x), lower(y)
+    assert condition is g.compare(Op.LT, Y, X)
+    assert then is X
+    # Ne is NOT EQ, which the branch constructor turns round
+    assert otherwise is g.branch(g.compare(Op.EQ, X, g.zero), lower(x * y), Y)
+
+
+def test_piecewise_takes_the_first_side_that_holds() -> None:
+    steps = sp.Piecewise((sp.Integer(1), x < 0), (sp.Integer(2), x < 1), (sp.Integer(3), True))
+    assert [value(steps, v, 0) for v in (-1, 0, "0.5", 1, 2)] == [1, 2, 2, 3, 3]
+
+
+def test_untaken_sides_are_not_evaluated() -> None:
+    guarded = sp.Piecewise((sp.log(x) / x, x > 0), (x**2, True))
+    assert value(guarded, 0, 0) == 0
+    assert value(guarded, -2, 0) == 4
+
+
+@pytest.mark.parametrize(
+    ("relation", "expected"),
+    [
+        (x < y, [1, 0, 0]),
+        (x <= y, [1, 1, 0]),
+        (x > y, [0, 0, 1]),
+        (x >= y, [0, 1, 1]),
+        (sp.Eq(x, y), [0, 1, 0]),
+        (sp.Ne(x, y), [1, 0, 1]),
+        (sp.And(x <= y, x >= y), [0, 1, 0]),
+        (sp.Or(x < y, x > y, x > y + 5), [1, 0, 1]),
+        (sp.Not(sp.And(x <= y, y < 3)), [0, 0, 1]),
+    ],
+    ids=str,
+)
+def test_relations_and_logic(relation: Any, expected: list[int]) -> None:
+    indicator = sp.Piecewise((1, relation), (0, True))
+    assert [value(indicator, at, 2) for at in (1, 2, 3)] == expected
+
+
+def test_extrema_and_absolute_value() -> None:
+    for at in ((1, 2), (2, 1), (-3, -3), (0, -1)):
+        assert value(sp.Max(x, y), *at) == max(at)
+        assert value(sp.Min(x, y), *at) == min(at)
+        assert value(sp.Max(-x, 0, y), *at) == max(-at[0], 0, at[1])
+        assert value(sp.Abs(x - y), *at) == abs(at[0] - at[1])
+    assert lowered(sp.Max(x, y)).op is Op.BRANCH
+    assert lowered(sp.Abs(x)).op is Op.BRANCH
+
+
+# ----------------------------------------------------------------------------------------- errors
+
+
+@pytest.mark.parametrize(
+    ("expression", "message"),
+    [
+        (x * 0.1, "0.1.* is a rounded number; write an exact one"),
+        (x**0.5, "0.5.* is a rounded number"),
+        (x + sp.Symbol("stiffness", real=True), "symbol stiffness is not declared"),
+        (sp.Symbol("x"), "symbol x is not declared"),  # not the real one that was declared
+        (
+            sp.Piecewise((x, x > 0)),
+            r"a branch without a last condition: .*end it with \(.., True\)",
+        ),
+        (sp.gamma(x), r"gamma in gamma\(x\) has no kernel operation"),
+        (1 + sp.tan(y) ** 2, r"tan in tan\(y\)"),
+        (sp.Heaviside(x), "Heaviside in"),
+        (sp.Function("f")(x), r"f in f\(x\)"),
+        (sp.zoo, "zoo has no kernel operation"),
+        (sp.nan, "nan has no kernel operation"),
+        (sp.I * x, "I has no kernel operation"),
+        (sp.Integral(sp.sin(x), x), "Integral in"),
+    ],
+    ids=str,
+)
+def test_what_a_kernel_cannot_hold_is_named(expression: Any, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        lowered(expression)
+
+
+def test_a_name_stands_for_one_thing() -> None:
+    m = model()
+    u = m.unknown("u")
+    h = m.define("h", u + 1)
+    assert m.define("h", u + 1) == h, "the same definition again is the same node"
+    with pytest.raises(ModelError, match="the name h is used twice in model throwaway"):
+        m.define("h", u + 2)
+    with pytest.raises(ModelError, match="the name u is used twice"):
+        m.parameters(u="something else")
+    with pytest.raises(ModelError, match="the name u is used twice"):
+        m.unknown("u")
+    m.define("weight", u)
+    with pytest.raises(ModelError, match="the name weight is used twice"):
+        _ = m.weight
+
+
+def test_a_model_without_a_potential_is_refused() -> None:
+    m = model()
+    m.unknown("u")
+    with pytest.raises(ModelError, match="throwaway has neither a potential nor a weak form"):
+        m.finish()
+
+
+def test_unknowns_come_before_the_interpolated_field() -> None:
+    m = model()
+    m.interpolated("p")
+    with pytest.raises(ModelError, match="declare u before the interpolated p"):
+        m.unknown("u")
+
+
+def test_a_second_interpolated_field_is_refused() -> None:
+    m = model()
+    m.interpolated("p")
+    with pytest.raises(ModelError, match="q: the element interpolates p already"):
+        m.interpolated("q")
+
+
+def test_a_given_derivative_of_a_matrix_is_refused() -> None:
+    m = model()
+    u = m.unknown("u")
+    with pytest.raises(ModelError, match="derivative"):
+        m.define("M", sp.Matrix([[u]]), derivative={u: sp.Integer(7)})
+
+
+def test_a_potential_that_varies_with_the_point_is_refused() -> None:
+    m = model()
+    u, (xi,) = m.unknown("u"), m.point()
+    with pytest.raises(ModelError, match="integral"):
+        m.potential(u**2 * xi)
+
+
+def test_an_undeclared_constant_is_named() -> None:
+    m = model()
+    u = m.unknown("u")
+    with pytest.raises(ModelError, match="symbol a is not declared"):
+        m.potential(u**2, constant=[sp.Symbol("a", real=True)])
