@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,10 @@ FOLD = (
     "coarse: use a finer mesh (larger density)"
 )
 
+ROLLING = (
+    'with rotation = "free" hardly anything but the film turns or holds the section: use "fixed"'
+)
+
 
 class _Stopped(Exception):  # noqa: N818 (control flow inside this module)
     """A stage did not reach its end; carries its branch."""
@@ -57,6 +61,11 @@ class _Stopped(Exception):  # noqa: N818 (control flow inside this module)
     def advice(self) -> str:
         """What may help, for a path that ends on the way."""
         return FOLD if self.branch.points else self.branch.status.advice
+
+    def explain(self, where: str, rotation: str) -> tuple[Status, str]:
+        """Status and message of a run that ends here."""
+        advice = ROLLING if rotation == "free" else self.advice
+        return self.branch.status, f"{where}: {self.message}; {advice}"
 
 
 @dataclass
@@ -85,8 +94,6 @@ class _Run:
         x = self.walk(squeeze_stage(self.section, self.settings), self.section.at_rest())
         if p_s > 0.0:
             x = self.walk(load_stage(self.section, self.settings, p_s), x)
-        if self.section.parameters.rotation == "free":
-            x = self.walk(release_stage(self.section, self.settings, p_s, x), x)
         problem = contact_problem(self.section, self.settings, p_s)
         self.observer.contact_state(contact_state(self.section, problem, p_s, x))
         return x
@@ -102,6 +109,9 @@ class _Run:
             section, contact_problem(section, settings, p.sealed_pressure), p.sealed_pressure, x
         ).p_max_MPa
         x = self.walk(weight_stage(section, settings, film), x)
+        if p.rotation == "free":
+            x = self.walk(release_stage(section, settings, film, x), x)
+            film = replace(film, moment=0.0)
         if p.shear_traction:
             x = self.walk(shear_stage(section, settings, film), x)
         judge = _Judge(self, Verdict(reference))
@@ -146,18 +156,14 @@ def run(
     try:
         x = progress.contact()
     except _Stopped as stop:
-        progress.stopped.append(_explain(stop, "contact"))
+        progress.stopped.append(stop.explain("contact", parameters.rotation))
         return _outcome(progress)
     for stroke in wanted:
         try:
             progress.stroke(stroke, x)
         except _Stopped as stop:
-            progress.stopped.append(_explain(stop, f"stroke {stroke}"))
+            progress.stopped.append(stop.explain(f"stroke {stroke}", parameters.rotation))
     return _outcome(progress)
-
-
-def _explain(stop: _Stopped, where: str) -> tuple[Status, str]:
-    return stop.branch.status, f"{where}: {stop.message}; {stop.advice}"
 
 
 def _outcome(progress: _Run) -> Outcome:

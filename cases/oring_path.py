@@ -53,6 +53,7 @@ class Film:
 
     speed: |U|, mm/s. weight: of the film forces, 1 - weight of the contact forces. shear: weight of
     the shear stress. multipliers: (arc nodes,) rod multipliers of the contact stage, MPa.
+    moment: moment on the section (N mm) if it is free to roll, None if its rotation is held.
     """
 
     sealed_pressure: float
@@ -61,6 +62,7 @@ class Film:
     multipliers: Array
     weight: float = 1.0
     shear: float = 1.0
+    moment: float | None = None
 
     @property
     def rod_speed(self) -> float:
@@ -97,15 +99,6 @@ def contact_problem(
     )
 
 
-def released_problem(
-    section: OringSection, settings: PathSettings, sealed_pressure: float, moment: float
-) -> Problem:
-    """Contact problem in which the moment on the section is given, not its mean rotation."""
-    problem = contact_problem(section, settings, sealed_pressure)
-    layout = section.layout
-    return problem.with_fixed([layout.dofs("pressure"), layout.dofs("rotation")], [0.0, moment])
-
-
 def film_problem(section: OringSection, settings: PathSettings, film: Film) -> Problem:
     """Film forces (18) weighted by w, contact forces by 1 - w; Reynolds equation (25) in full.
 
@@ -128,9 +121,9 @@ def film_problem(section: OringSection, settings: PathSettings, film: Film) -> P
     )
     fixed = [section.film_ends, section.layout.dofs("rod")]
     values: list[Array | float] = [np.array([p_s, 0.0]), film.multipliers]
-    if section.parameters.rotation == "free":
+    if film.moment is not None:
         fixed.append(section.layout.dofs("rotation"))
-        values.append(0.0)
+        values.append(film.moment)
     return replace(
         problem.with_fixed(fixed, values),
         scales={**problem.scales, "pressure": film_scale(film.speed)},
@@ -165,22 +158,6 @@ def load_stage(section: OringSection, settings: PathSettings, sealed_pressure: f
     )
 
 
-def release_stage(
-    section: OringSection, settings: PathSettings, sealed_pressure: float, x: Array
-) -> Stage:
-    """First stage, rotation = "free": the moment that held the rotation fades to nothing."""
-    held = float(x[section.layout.part("rotation")][0])
-    return Stage(
-        name="release",
-        problem_at=lambda s: released_problem(section, settings, sealed_pressure, (1.0 - s) * held),
-        start=0.0,
-        stop=1.0,
-        steps=settings.release_steps,
-        sealed_pressure=sealed_pressure,
-        stroke="both",
-    )
-
-
 def weight_stage(section: OringSection, settings: PathSettings, film: Film) -> Stage:
     """Second stage: the film takes over from the contact at film.speed, without shear."""
     return Stage(
@@ -189,6 +166,22 @@ def weight_stage(section: OringSection, settings: PathSettings, film: Film) -> S
         start=0.0,
         stop=1.0,
         steps=settings.weight_steps,
+        sealed_pressure=film.sealed_pressure,
+        stroke=film.stroke,
+    )
+
+
+def release_stage(section: OringSection, settings: PathSettings, film: Film, x: Array) -> Stage:
+    """Second stage, rotation = "free": the moment that held the section fades, without shear."""
+    held = float(x[section.layout.part("rotation")][0])
+    return Stage(
+        name="release",
+        problem_at=lambda s: film_problem(
+            section, settings, replace(film, shear=0.0, moment=(1.0 - s) * held)
+        ),
+        start=0.0,
+        stop=1.0,
+        steps=settings.release_steps,
         sealed_pressure=film.sealed_pressure,
         stroke=film.stroke,
     )

@@ -85,7 +85,7 @@ def _computed(n: Node, args: list[Value]) -> Value:
 
 def _signature(values: Sequence[Value]) -> tuple[tuple[str, ...], int]:
     """Leading digits of the values with the first one's sign taken out; empty for no value."""
-    if any(v is None or isinstance(v, bool) or isinstance(v, mpmath.mpc) for v in values):
+    if any(v is None or isinstance(v, (bool, mpmath.mpc)) for v in values):
         return (), 1
     if any(v == 0 for v in values):
         return (), 1
