@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from codegen import abi
 from codegen.emit_c import Entry, Printer, number
-from codegen.graph import Input, Node, Op
+from codegen.graph import FREE, Input, Node, Op
 from codegen.model import Definition
 from codegen.schedule import If, Schedule, Statement
 
@@ -60,7 +60,7 @@ class _LanePrinter(Printer):
             right = f"softehl_v{s.op}({self.ref(s.args[0])})"
         elif s.op is Op.POW:
             right = f"softehl_vpow({self.ref(s.args[0])}, {number(float(s.payload))})"  # type: ignore[arg-type]
-        self.line(depth, f"const softehl_vec {self.fresh(s)} = {right};")
+        self.line(depth, f"const V {self.fresh(s)} = {right};")
 
     def as_vector(self, n: Node) -> str:
         """Reference that is a vector in any case."""
@@ -73,9 +73,10 @@ def function(
     """C text of one kernel (group function and batch loop) and the number of its temporaries."""
     p = _LanePrinter(definition)
     _loads(p, task)
+    outputs = _Stores(p, task, entries)
     for s in plan.stages[0].before:
         p.statement(1, s)
-    _stores(p, task, entries)
+        outputs.flush()
     name = abi.function_name(definition.name, task)
     body = "\n".join(p.lines)
     group = f"static void {name}_group(\n    {_GROUP_ARGUMENTS})\n{{\n{_GROUP_UNUSED}\n{body}\n}}\n"
@@ -100,26 +101,42 @@ def _loads(p: _LanePrinter, task: str) -> None:
         letter = _LETTERS[array]
         for start in range(0, width, 4):
             names = [f"{letter}{k}" for k in range(start, min(start + 4, width))]
-            p.line(1, f"softehl_vec {', '.join(names)};")
+            p.line(1, f"V {', '.join(names)};")
             pointers = ", ".join(f"&{n}" for n in names)
             p.line(1, f"softehl_load{len(names)}({letter} + {start}, {width}, {pointers});")
             p.line(1, " ".join(f"(void){n};" for n in names))
 
 
-def _stores(p: _LanePrinter, task: str, entries: Sequence[Entry]) -> None:
-    size = 1 if task == abi.Task.ENERGY else len(p.d.unknowns)
-    flat: dict[str, dict[int, Node]] = {"R": {}, "K": {}}
-    for x in entries:
-        if x.column is None:
-            flat["R"][x.row.position] = x.node
-        else:
-            flat["K"][x.row.position * size + x.column.position] = x.node
-    for letter, values in flat.items():
-        width = len(values)
-        for start in range(0, width, 4):
-            chunk = [p.as_vector(values[k]) for k in range(start, min(start + 4, width))]
-            target = f"{letter} + {start}, {width}"
-            p.line(1, f"softehl_store{len(chunk)}({target}, {', '.join(chunk)});")
+class _Stores:
+    """Outputs in groups of up to four neighbours, each stored as soon as it is complete."""
+
+    def __init__(self, p: _LanePrinter, task: str, entries: Sequence[Entry]) -> None:
+        size = 1 if task == abi.Task.ENERGY else len(p.d.unknowns)
+        flat: dict[str, dict[int, Node]] = {"R": {}, "K": {}}
+        for x in entries:
+            if x.column is None:
+                flat["R"][x.row.position] = x.node
+            else:
+                flat["K"][x.row.position * size + x.column.position] = x.node
+        self.p = p
+        self.groups = [
+            (f"{letter} + {start}, {len(values)}", [values[k] for k in range(start, stop)])
+            for letter, values in flat.items()
+            for start in range(0, len(values), 4)
+            for stop in [min(start + 4, len(values))]
+        ]
+        self.flush()
+
+    def flush(self) -> None:
+        """Print the groups whose values are all known by now."""
+        waiting = []
+        for target, nodes in self.groups:
+            if all(n in self.p.names or n.op in FREE for n in nodes):
+                chunk = ", ".join(self.p.as_vector(n) for n in nodes)
+                self.p.line(1, f"softehl_store{len(nodes)}({target}, {chunk});")
+            else:
+                waiting.append((target, nodes))
+        self.groups = waiting
 
 
 def _batch(d: Definition, task: str) -> str:

@@ -22,6 +22,8 @@ typedef double softehl_vec __attribute__((vector_size(32)));
 typedef long long softehl_bits __attribute__((vector_size(32)));
 typedef double softehl_row __attribute__((vector_size(32), aligned(8)));
 
+typedef softehl_vec V;
+
 static inline softehl_vec softehl_splat(double a)
 {
     return (softehl_vec){a, a, a, a};
@@ -103,7 +105,7 @@ static inline void softehl_store1(double *p, ptrdiff_t width, softehl_vec a)
     for (int l = 0; l < 4; ++l) p[l * width] = a[l];
 }
 #else
-typedef double softehl_vec;
+typedef double softehl_vec, V;
 #define softehl_splat(a) (a)
 #define softehl_vsqrt(a) sqrt(a)
 #define softehl_vlog(a) log(a)
