@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 from codegen.abi import Task, derivative_task
-from codegen.differentiate import Linearisation, directional, gradient
+from codegen.differentiate import Given, Linearisation, directional, gradient
 from codegen.emit_c import Entry, Slot
-from codegen.graph import Graph, Input, Node
+from codegen.graph import FREE, Graph, Input, Node, reachable
 from codegen.model import Definition
-from codegen.waists import Waist, linear_waist, quadratic_waist, strip, substitute
+from codegen.narrow import narrow, quadratic_waist
+from codegen.waists import Waist, linear_waist, strip, substitute
 
 
 def tasks(d: Definition) -> list[str]:
@@ -26,22 +27,32 @@ def tasks(d: Definition) -> list[str]:
 
 
 def outputs(d: Definition, task: str) -> list[Entry]:
-    """Output nodes of a task, before any pass."""
+    """Output nodes of a task, before any pass: the first of its `variants`."""
+    return next(variants(d, task))
+
+
+def variants(d: Definition, task: str) -> Iterator[list[Entry]]:
+    """The same outputs by different chain rules: which one is the cheapest, passes will tell."""
     if task == Task.ENERGY:
-        return [Entry(Slot(False, 0), None, d.potential)]
-    if task == Task.FIELDS:
-        return [Entry(Slot(False, k), None, node) for k, (_, node) in enumerate(d.fields)]
-    if task not in (Task.RESIDUAL, Task.TANGENT):
-        return _rates(d, task)
-    modal = _modal(d)
-    if modal is not None:
-        return modal.residual() + (modal.tangent() if task == Task.TANGENT else [])
+        yield [Entry(Slot(False, 0), None, d.potential)]
+    elif task == Task.FIELDS:
+        yield [Entry(Slot(False, k), None, node) for k, (_, node) in enumerate(d.fields)]
+    elif task not in (Task.RESIDUAL, Task.TANGENT):
+        yield _rates(d, task)
+    else:
+        waisted = list(_modal(d))
+        for modal in waisted:
+            yield modal.residual() + (modal.tangent() if task == Task.TANGENT else [])
+        if not waisted:
+            yield _plain(d, task)
+
+
+def _plain(d: Definition, task: str) -> list[Entry]:
+    """Reverse mode, and forward over it through the waists that the model names."""
     adjoint = gradient(d.graph, d.potential, d.directions, constant=d.constant, given=d.given)
     slots = _slots(d)
     rows = [Entry(s, None, adjoint[u]) for s, u in zip(slots, d.directions, strict=True)]
-    if task == Task.RESIDUAL:
-        return rows
-    return rows + _tangent(d, rows, slots, adjoint)
+    return rows + (_tangent(d, rows, slots, adjoint) if task == Task.TANGENT else [])
 
 
 def _rates(d: Definition, task: str) -> list[Entry]:
@@ -87,37 +98,70 @@ def _tangent(
     ]
 
 
-def _modal(d: Definition) -> _Modal | None:
-    """The model through its automatic waist; None where that does not apply."""
+def _modal(d: Definition) -> Iterator[_Modal]:
+    """The model through its automatic waists, in two ways; nothing where that does not apply."""
     if d.interpolated or d.given:
-        return None
+        return
     g = d.graph
     (root,), kept = strip(g, [d.potential], d.constant)
     waist = linear_waist(g, [root], d.directions)
     if waist is None:
-        return None
+        return
     forms = {z: g.name(f"z{k}", value) for k, (z, value) in enumerate(waist.rewritten.items())}
     (root,), new = substitute(g, [root], forms)
     constant = tuple(new[kept[c]] for c in d.constant)
+    root, constant, squares = _quadratic(g, root, tuple(forms.values()), constant)
+    yield _Modal(d, root, constant, waist, (tuple(forms.values()), squares))
+    above = reachable([root, *constant], stop=lambda n: n in squares or n in forms.values())
+    upper = tuple(n for n in above if n in squares or n in forms.values())
+    yield _Modal(d, root, constant, waist, (upper,), _slopes(g, waist, upper))
+
+
+def _quadratic(
+    g: Graph, root: Node, forms: tuple[Node, ...], constant: tuple[Node, ...]
+) -> tuple[Node, tuple[Node, ...], tuple[Node, ...]]:
+    """Root and constants through named quadratic values of the forms, and these."""
+    narrowed = narrow(g, [root], forms, constant)
+    if narrowed is not None:
+        return narrowed.roots[0], tuple(narrowed.images[c] for c in constant), narrowed.squares
     squares = {
-        q: g.name(f"q{k}", q)
-        for k, q in enumerate(quadratic_waist([root], tuple(forms.values()), constant))
+        q: g.name(f"q{k}", q) for k, q in enumerate(quadratic_waist([root], forms, constant))
     }
     (root,), new = substitute(g, [root], squares)
-    constant = tuple(new[c] for c in constant)
-    return _Modal(d, root, constant, waist, tuple(forms.values()), tuple(squares.values()))
+    return root, tuple(new[c] for c in constant), tuple(squares.values())
+
+
+def _slopes(g: Graph, waist: Waist, upper: Sequence[Node]) -> dict[Node, dict[Node, Node]]:
+    """Named derivatives of the upper waist with respect to the point waist.
+
+    The chain rule then never enters the forms in between: their congruence G^T H G becomes a sum
+    of products of few slopes.
+    """
+    local = Linearisation(g, waist.modes, waist.point)
+    return {
+        q: {
+            y: slope if slope.op in FREE else g.name(f"{q.payload}_{y.payload}", slope)
+            for y, slope in local.local(q.args[0]).items()
+        }
+        for q in upper
+        if q.varying
+    }
 
 
 @dataclass(frozen=True)
 class _Modal:
-    """Derivatives in modal coordinates, carried to the unknowns by their constant matrix."""
+    """Derivatives in modal coordinates, carried to the unknowns by their constant matrix.
+
+    `upper` holds the waists above the point values, lowest first; `slopes` the derivatives of
+    their values with respect to the point values, where these are taken at once.
+    """
 
     d: Definition
     root: Node
     constant: tuple[Node, ...]
     waist: Waist
-    forms: tuple[Node, ...]
-    squares: tuple[Node, ...]
+    upper: tuple[tuple[Node, ...], ...]
+    slopes: Given = field(default_factory=dict)
 
     def _adjoint(self) -> dict[Node, Node]:
         return gradient(
@@ -125,7 +169,8 @@ class _Modal:
             self.root,
             self.waist.modes,
             constant=self.constant,
-            named=(*self.waist.point, *self.forms, *self.squares),
+            given=self.slopes,
+            named=[*self.waist.point, *(n for level in self.upper for n in level)],
         )
 
     def residual(self) -> list[Entry]:
@@ -159,7 +204,8 @@ class _Modal:
         if not self.constant:
             return rows
         by_constant = self._forward(adjoint, self.constant, modes)
-        moving = Linearisation(g, modes, self._levels()[0])
+        levels = self._levels()
+        moving = Linearisation(g, modes, levels[0], upper=levels[1:], given=self.slopes)
         for i, c in enumerate(self.constant):
             for k in size:
                 slope = by_constant.derivative(adjoint[modes[k]], i)
@@ -169,7 +215,7 @@ class _Modal:
         return rows
 
     def _levels(self) -> list[list[Node]]:
-        waists = (self.waist.point, self.forms, self.squares)
+        waists = (self.waist.point, *self.upper)
         return [v for v in ([n for n in w if n.varying] for w in waists) if v] or [[]]
 
     def _forward(
@@ -182,6 +228,7 @@ class _Modal:
             levels[0],
             symmetric={adjoint[z]: z for level in levels for z in level if z in adjoint},
             constant=constant,
+            given=self.slopes,
             upper=levels[1:],
             gates={adjoint[z]: k for k, level in enumerate(levels) for z in level if z in adjoint},
         )

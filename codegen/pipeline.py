@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -41,17 +41,28 @@ def compile_model(definition: Definition) -> KernelSource:
 
 
 def compile_task(definition: Definition, task: str) -> Function:
-    """One kernel, all stages in order."""
-    entries = linearise.outputs(definition, task)
+    """One kernel, all stages in order; of several chain rules the one with fewest operations."""
     written_out = definition.unroll and task != abi.Task.FIELDS
     chosen = passes.straight_line(_points(definition)) if written_out else passes.STANDARD
-    roots, trace = passes.run(definition.graph, [x.node for x in entries], chosen)
-    entries = [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
-    plan = schedule(roots)
+    tried = [_rewritten(definition, e, chosen) for e in linearise.variants(definition, task)]
+    entries, plan, trace = min(tried, key=lambda t: _work(definition, t[1]))
     lanes = task != abi.Task.FIELDS and emit_simd.suits(plan)
     printer = emit_simd if lanes else emit_c
     text, temporaries = printer.function(definition, task, entries, plan)
     return Function(text, plan, temporaries, trace)
+
+
+def _rewritten(
+    definition: Definition, entries: list[emit_c.Entry], chosen: Sequence[passes.Pass]
+) -> tuple[list[emit_c.Entry], Schedule, list[passes.TraceRow]]:
+    roots, trace = passes.run(definition.graph, [x.node for x in entries], chosen)
+    entries = [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
+    return entries, schedule(roots), trace
+
+
+def _work(definition: Definition, plan: Schedule) -> int:
+    """Operations of one element."""
+    return plan.operations_once + len(definition.rule.points) * plan.operations_per_point
 
 
 def _points(definition: Definition) -> list[list[Fraction]]:

@@ -86,7 +86,7 @@ class _Expansion:
                 return _combined(a, b, 1, 1 if n.op is Op.ADD else -1)
         factor, form = n.args if self.degree[n.args[0]] == 0 else tuple(reversed(n.args))
         p = self.polynomial(factor)
-        return {k: self._product(p, q) for k, q in self.linear(form).items()}
+        return {k: product(p, q) for k, q in self.linear(form).items()}
 
     def polynomial(self, n: Node) -> Polynomial:
         """A value of degree 0 as a polynomial in atoms."""
@@ -102,7 +102,7 @@ class _Expansion:
             return {(n.id,): Fraction(1)}
         args = [self.polynomial(a) for a in n.args]
         if n.op is Op.MUL:
-            out = self._product(*args)
+            out = product(*args)
         else:
             sign = -1 if n.op in (Op.SUB, Op.NEG) else 1
             first, second = (args[0], args[1]) if len(args) == 2 else ({}, args[0])
@@ -118,13 +118,15 @@ class _Expansion:
             )
         return self.pure[n]
 
-    def _product(self, p: Polynomial, q: Polynomial) -> Polynomial:
-        out: Polynomial = {}
-        for a, x in p.items():
-            for b, y in q.items():
-                key = tuple(sorted((*a, *b)))
-                out[key] = out.get(key, Fraction(0)) + x * y
-        return {k: v for k, v in out.items() if v}
+
+def product(p: Polynomial, q: Polynomial) -> Polynomial:
+    """Product of two polynomials."""
+    out: Polynomial = {}
+    for a, x in p.items():
+        for b, y in q.items():
+            key = tuple(sorted((*a, *b)))
+            out[key] = out.get(key, Fraction(0)) + x * y
+    return {k: v for k, v in out.items() if v}
 
 
 def _added(p: Polynomial, q: Polynomial, sign: int) -> Polynomial:
@@ -303,38 +305,3 @@ def substitute(
         else:
             new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
     return [new[r] for r in roots], new
-
-
-def quadratic_waist(
-    roots: Sequence[Node], linear: Collection[Node], constant: Collection[Node]
-) -> list[Node]:
-    """Quadratic values of the forms `linear` that something of higher degree uses.
-
-    Strain measures (the entries of F F^T, minors of F) are such values: their own second
-    derivatives are constants, and what lies above them sees few of them.  Of two values where
-    one depends on the other, the lower one is taken.
-    """
-    degree: dict[Node, float] = {}
-    for n in reachable(roots):
-        inner = [degree[a] for a in n.args]
-        if n in linear:
-            degree[n] = 1
-        elif n in constant or not any(inner):
-            degree[n] = 0
-        elif n.op in (Op.ADD, Op.SUB, Op.NEG):
-            degree[n] = max(inner)
-        elif n.op is Op.MUL:
-            degree[n] = sum(inner)
-        elif n.op is Op.POW and isinstance(n.payload, Fraction) and n.payload == 2:
-            degree[n] = 2 * inner[0]
-        else:
-            degree[n] = float("inf")
-    frontier: dict[Node, None] = {}
-    for n in reachable(roots):
-        if degree[n] > 2 and n not in constant:
-            frontier.update(dict.fromkeys(a for a in n.args if degree[a] == 2))
-    return [
-        n
-        for n in sorted(frontier, key=lambda n: n.id)
-        if not any(m is not n and m in frontier for m in reachable(n.args))
-    ]
