@@ -11,7 +11,8 @@ from typing import Any
 
 from codegen import abi, emit_c, emit_simd, linearise, passes
 from codegen.model import Definition
-from codegen.schedule import Schedule, schedule
+from codegen.order import arranged
+from codegen.schedule import Schedule, schedule, straight_line
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,11 @@ def compile_task(definition: Definition, task: str) -> Function:
     chosen = passes.straight_line(_points(definition)) if written_out else passes.STANDARD
     tried = [_rewritten(definition, e, chosen) for e in linearise.variants(definition, task)]
     entries, plan, trace = min(tried, key=lambda t: _work(definition, t[1]))
-    lanes = task != abi.Task.FIELDS and emit_simd.suits(plan)
-    printer = emit_simd if lanes else emit_c
-    text, temporaries = printer.function(definition, task, entries, plan)
+    if task != abi.Task.FIELDS and emit_simd.suits(plan):
+        entries, plan = _arranged(definition, entries)
+        text, temporaries = emit_simd.function(definition, task, entries, plan)
+    else:
+        text, temporaries = emit_c.function(definition, task, entries, plan)
     return Function(text, plan, temporaries, trace)
 
 
@@ -58,6 +61,14 @@ def _rewritten(
     roots, trace = passes.run(definition.graph, [x.node for x in entries], chosen)
     entries = [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
     return entries, schedule(roots), trace
+
+
+def _arranged(
+    definition: Definition, entries: Sequence[emit_c.Entry]
+) -> tuple[list[emit_c.Entry], Schedule]:
+    roots, order = arranged(definition.graph, [x.node for x in entries])
+    entries = [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
+    return entries, straight_line(order)
 
 
 def _work(definition: Definition, plan: Schedule) -> int:

@@ -76,6 +76,11 @@ def schedule(roots: Sequence[Node]) -> Schedule:
     return Schedule(tuple(stages), once, looped)
 
 
+def straight_line(order: Sequence[Node]) -> Schedule:
+    """A kernel without loops and branches, in the given order."""
+    return Schedule((Stage(list(order), None),), len(order), 0)
+
+
 def depth_first(nodes: Sequence[Node], roots: Sequence[Node]) -> list[Node]:
     """`nodes` in an order that finishes one result before it begins the next: few live values.
 

@@ -33,7 +33,7 @@ def common_sums(g: Graph, roots: list[Node]) -> list[Node]:
     inner = _inner_sums(roots, uses)
     for layer in _layers(roots, inner):
         for n in layer:
-            if n.op in (Op.ADD, Op.SUB) and not _first_difference(n):
+            if n.op in (Op.ADD, Op.SUB) and not first_difference(n):
                 plan.add(n, _linear(n, inner, new))
             else:
                 new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
@@ -55,10 +55,10 @@ def _scaled(n: Node) -> bool:
 
 
 def _linear_node(n: Node) -> bool:
-    return (n.op in (Op.ADD, Op.SUB, Op.NEG) or _scaled(n)) and not _first_difference(n)
+    return (n.op in (Op.ADD, Op.SUB, Op.NEG) or _scaled(n)) and not first_difference(n)
 
 
-def _first_difference(n: Node) -> bool:
+def first_difference(n: Node) -> bool:
     """Two arguments of different kinds, e.g. the radius of a node minus that of the rod.
 
     It is taken first, as the model says: this is where digits would be lost.
@@ -73,7 +73,7 @@ def _layers(roots: Sequence[Node], inner: set[Node]) -> list[list[Node]]:
     layers: dict[int, list[Node]] = {}
     for n in reachable(roots):
         below = max((depth[a] for a in n.args), default=0)
-        outer = n not in inner and n.op in (Op.ADD, Op.SUB) and not _first_difference(n)
+        outer = n not in inner and n.op in (Op.ADD, Op.SUB) and not first_difference(n)
         depth[n] = below + (1 if outer else 0)
         if n not in inner:
             # A layer starts with what its sums need and ends with the sums themselves.
