@@ -1,0 +1,1 @@
+"""Benchmarks: our generator next to others, one element, one driver, one run."""

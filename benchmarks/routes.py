@@ -1,0 +1,55 @@
+"""Who takes part in which case, and by which routes."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass
+
+from benchmarks.problem import Case
+
+
+@dataclass(frozen=True)
+class Generator:
+    """A module of ours with `derive(case, route)`, the package it needs, its routes by case."""
+
+    title: str
+    module: str
+    package: str
+    routes: tuple[str, ...]
+    only_q4_tangent: tuple[str, ...] = ()
+    fbar: str = ""
+    """Why there is no route to F-bar; empty where there is one."""
+
+    def of(self, case: Case) -> tuple[str, ...]:
+        """The routes that apply."""
+        if case.fbar and self.fbar:
+            return ()
+        return self.routes + (self.only_q4_tangent if case is Case.Q4_B else ())
+
+    @property
+    def installed(self) -> bool:
+        """Whether the package can be imported."""
+        return importlib.util.find_spec(self.package) is not None
+
+
+OURS = Generator(
+    "softehl",
+    "benchmarks.softehl_route",
+    "codegen",
+    ("shipped page", "printed formula", "one lane"),
+)
+FFCX = Generator(
+    "FFCx",
+    "benchmarks.ffcx_route",
+    "ffcx",
+    ("printed", "J and F:F", "J, sum factorisation"),
+    fbar="cannot express it in one kernel: a UFL integrand knows no other point than its own",
+)
+CASADI = Generator(
+    "CasADi",
+    "benchmarks.casadi_route",
+    "casadi",
+    ("SX", "SX, cse", "SX through F", "MX of SX points"),
+    only_q4_tangent=("SX, Hessian",),
+)
+GENERATORS = (OURS, FFCX, CASADI)
