@@ -5,6 +5,7 @@ benchmarks/README.md says what is measured and how to read it.
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,11 +21,15 @@ from benchmarks.routes import GENERATORS, Generator
 from benchmarks.timing import Driver
 
 WIDTH = 148
+BUSY = 0.5
+"""Load above which a neighbour shares the core's caches and pipes with us."""
 
 
 @click.command()
 @click.option("--quick", is_flag=True, help="Few samples, one compiler, common flags only.")
-@click.option("--all-routes", is_flag=True, help="Print every route, not the fastest only.")
+@click.option(
+    "--all-routes", is_flag=True, help="Run and print every route, also those that never win."
+)
 @click.option(
     "--case",
     "names",
@@ -58,10 +63,13 @@ def main(
     found = compilers(all_found=not quick)
     rounds = rounds or (31 if quick else 101)
     console.print(f"compilers: {'; '.join(c.version for c in found)}")
+    busy = os.getloadavg()[0]
+    if busy > BUSY:
+        errors.print(f"the machine is busy (load {busy:.1f}): times and ratios will be off")
     console.print(f"common flags: {' '.join(COMMON_FLAGS)}; medians of {rounds} samples")
     measured: dict[str, Measured] = {}
     with tempfile.TemporaryDirectory() as scratch, errors.status("") as status:
-        settings = Settings(found, rounds, not quick, limit, status.update)
+        settings = Settings(found, rounds, not quick, all_routes, limit, status.update)
         driver = Driver(Path(scratch), found[0])
         for case in (c for c in Case if not names or c.name.lower() in names):
             m = measure(case, generators, driver, Path(scratch), settings)

@@ -17,16 +17,20 @@ from benchmarks.routes import OURS, Generator
 from benchmarks.timing import Driver, Loaded
 
 SHIPPED = OURS.routes[0]
+NOBODY = "-"
+"""In place of the compiler where a generator wrote no C."""
 
 
 @dataclass(frozen=True)
 class Settings:
     """How a run is made: compilers, samples of each kernel, whether also with each tool's own
-    flags, seconds that a derivation and a compilation may take, and whom to tell."""
+    flags, whether by every route, seconds that a derivation and a compilation may take, and whom
+    to tell."""
 
     compilers: Sequence[Compiler]
     rounds: int
     own: bool
+    every: bool
     limit: float
     say: Callable[[str], None]
 
@@ -36,9 +40,10 @@ class Row:
     """What was measured of one route with one compiler; None: not measured, `outcome` says why.
 
     `outcome` is empty for a verified kernel.  `error` is the largest relative deviation from the
-    50-digit reference (three elements) and from our kernel (all of them), `nanoseconds` are per
-    element.  `ratio` is the median over the rounds of this route's time over that of our shipped
-    page with the same compiler and the same kind of flags.
+    50-digit reference (three elements) and from our kernel (all of them).  `nanoseconds` are per
+    element, the median of the rounds, `least_nanoseconds` the smallest.  `ratio` is the median
+    over the rounds of this route's time over that of our shipped page with the same compiler and
+    the same kind of flags.
     """
 
     case: str
@@ -51,10 +56,12 @@ class Row:
     operations: int | None = None
     error: float | None = None
     nanoseconds: float | None = None
+    least_nanoseconds: float | None = None
     ratio: float | None = None
     own_flags: str = ""
     own_outcome: str = ""
     own_nanoseconds: float | None = None
+    own_least_nanoseconds: float | None = None
     own_ratio: float | None = None
 
 
@@ -70,6 +77,7 @@ class Best:
     flags: str
     operations: int | None
     nanoseconds: float
+    least_nanoseconds: float
     ratio: float
 
 
@@ -111,9 +119,10 @@ def measure(
     failed: list[Row] = []
     ours: Result | None = None
     for generator in generators:
-        if not generator.of(case):
-            failed.append(Row(case.title, generator.title, "-", "-", generator.fbar))
-        for route in generator.of(case):
+        routes = generator.of(case, every=settings.every)
+        if not routes:
+            failed.append(Row(case.title, generator.title, "any route", NOBODY, generator.fbar))
+        for route in routes:
             settings.say(f"{case.title}: {generator.title}, {route}")
             place = folder / f"{case.name}_{len(built)}_{len(failed)}"
             try:
@@ -121,7 +130,7 @@ def measure(
                     generator.module, case, route, place.with_suffix(".pickle"), settings.limit
                 )
             except (TimeLimitError, DerivationError) as error:
-                failed.append(Row(case.title, generator.title, route, "-", f"derive {error}"))
+                failed.append(Row(case.title, generator.title, route, NOBODY, f"derive {error}"))
                 continue
             for one in build(candidate, place, settings, ours):
                 if ours is None:
@@ -202,11 +211,11 @@ Times = Mapping[tuple[int, str], Array]
 def _row(k: int, b: Built, base: int, times: Times) -> Row:
     c = b.candidate
 
-    def of(label: str) -> tuple[float | None, float | None]:
+    def of(label: str) -> tuple[float | None, float | None, float | None]:
         own, ours = times.get((k, label)), times.get((base, label))
         if own is None:
-            return None, None
-        return _nanoseconds(own), None if ours is None else float(np.median(own / ours))
+            return None, None, None
+        return *_nanoseconds(own), None if ours is None else float(np.median(own / ours))
 
     return Row(
         c.case.title,
@@ -225,8 +234,10 @@ def _row(k: int, b: Built, base: int, times: Times) -> Row:
     )
 
 
-def _nanoseconds(seconds: Array) -> float:
-    return float(np.median(seconds)) * 1e9 / len(elements())
+def _nanoseconds(seconds: Array) -> tuple[float, float]:
+    """Median and least, of an element."""
+    scale = 1e9 / len(elements())
+    return float(np.median(seconds)) * scale, float(seconds.min()) * scale
 
 
 def _best(built: list[Built], times: Times) -> list[Best]:
@@ -245,5 +256,5 @@ def _best(built: list[Built], times: Times) -> list[Best]:
         flags = COMMON_FLAGS if label == "common" else c.own_flags
         names = (c.case.title, name, c.route, b.compiler.name, " ".join(flags))
         ratio = float(np.median(spent / ours))
-        found.append(Best(*names, b.operations, _nanoseconds(spent), ratio))
+        found.append(Best(*names, b.operations, *_nanoseconds(spent), ratio))
     return found

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from rich.table import Table
 
-from benchmarks.measure import Best, Measured, Row
+from benchmarks.measure import NOBODY, Best, Measured, Row
 from benchmarks.routes import OURS
 
 HEADINGS = (
     ("generator", "route", "compiler"),
-    ("derive s", "compile s", "operations", "error", "ns", "ratio", "% peak"),
-    ("own flags ns", "ratio"),
+    ("derive s", "compile s", "operations", "error", "ns", "least", "ratio", "% peak"),
+    ("own flags ns", "least", "ratio"),
 )
 
 
@@ -42,12 +42,16 @@ def percent_of_peak(operations: int | None, nanoseconds: float | None, peak: flo
 
 
 def table(title: str, rows: Sequence[Row], peak: float) -> Table:
-    """One case; `peak` in operations per ns."""
+    """One case; `peak` in operations per ns.  Who has no C at all stands below, with the reason."""
     words, numbers, own = HEADINGS
+    absent = [f"{r.generator}, {r.route}: {r.outcome}" for r in rows if r.compiler == NOBODY]
     out = Table(*words, title=f"{title}   (multiply-add peak {peak:.1f} GFLOP/s)")
+    out.caption = "\n".join(absent) or None
     for heading in (*numbers, *own):
         out.add_column(heading, justify="right")
     for r in rows:
+        if r.compiler == NOBODY:
+            continue
         used = percent_of_peak(r.operations, r.nanoseconds, peak)
         out.add_row(
             r.generator,
@@ -58,9 +62,11 @@ def table(title: str, rows: Sequence[Row], peak: float) -> Table:
             _number(r.operations, "d"),
             _number(r.error, ".0e"),
             r.outcome or _number(r.nanoseconds, ".1f"),
+            _number(r.least_nanoseconds, ".1f"),
             _number(r.ratio, ".2f"),
             _number(used, ".0f"),
             _number(r.own_nanoseconds, ".1f"),
+            _number(r.own_least_nanoseconds, ".1f"),
             _number(r.own_ratio, ".2f"),
         )
     return out
@@ -69,12 +75,13 @@ def table(title: str, rows: Sequence[Row], peak: float) -> Table:
 def best_table(best: Iterable[Best], peaks: Mapping[str, float]) -> Table:
     """Every generator at its best."""
     out = Table("case", "generator", "route", "compiler", "flags", title="each at its best")
-    for heading in ("ns", "ratio", "% peak"):
+    for heading in ("ns", "least", "ratio", "% peak"):
         out.add_column(heading, justify="right")
     for b in best:
         used = percent_of_peak(b.operations, b.nanoseconds, peaks[b.case])
         names = (b.case, b.generator, b.route, b.compiler, b.flags)
-        out.add_row(*names, f"{b.nanoseconds:.1f}", f"{b.ratio:.2f}", _number(used, ".0f"))
+        least = f"{b.least_nanoseconds:.1f}"
+        out.add_row(*names, f"{b.nanoseconds:.1f}", least, f"{b.ratio:.2f}", _number(used, ".0f"))
     return out
 
 
