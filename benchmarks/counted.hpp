@@ -2,7 +2,6 @@
 // Every operation counts one, also a division, a root, a power, a logarithm; so does a change of
 // sign, but no copy, conversion, comparison or absolute value.
 #pragma once
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
