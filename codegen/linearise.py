@@ -107,14 +107,24 @@ def _modal(d: Definition) -> Iterator[_Modal]:
     waist = linear_waist(g, [root], d.directions)
     if waist is None:
         return
-    forms = {z: g.name(f"z{k}", value) for k, (z, value) in enumerate(waist.rewritten.items())}
-    (root,), new = substitute(g, [root], forms)
+    named: dict[Node, Node] = {}
+    replacement = {z: _named(g, value, named) for z, value in waist.rewritten.items()}
+    (root,), new = substitute(g, [root], replacement)
+    forms = tuple(named.values())
     constant = tuple(new[kept[c]] for c in d.constant)
-    root, constant, squares = _quadratic(g, root, tuple(forms.values()), constant)
-    yield _Modal(d, root, constant, waist, (tuple(forms.values()), squares))
-    above = reachable([root, *constant], stop=lambda n: n in squares or n in forms.values())
-    upper = tuple(n for n in above if n in squares or n in forms.values())
+    root, constant, squares = _quadratic(g, root, forms, constant)
+    yield _Modal(d, root, constant, waist, (forms, squares))
+    above = reachable([root, *constant], stop=lambda n: n in squares or n in forms)
+    upper = tuple(n for n in above if n in squares or n in forms)
     yield _Modal(d, root, constant, waist, (upper,), _slopes(g, waist, upper))
+
+
+def _named(g: Graph, form: Node, named: dict[Node, Node]) -> Node:
+    """The name of a linear form; a form and its negative share one."""
+    negative = g.neg(form)
+    if negative in named:
+        return g.neg(named[negative])
+    return named.setdefault(form, g.name(f"z{len(named)}", form))
 
 
 def _quadratic(

@@ -87,7 +87,11 @@ class Lowering:
         return self.g.div(top, bottom)
 
     def _pow(self, e: Any) -> Node:
-        base, exponent = self(e.base), e.exp
+        base, exponent = e.base, e.exp
+        if isinstance(base, sp.Abs) and isinstance(exponent, sp.Rational):
+            # SymPy makes |x|^(2/3) of (x^2)^(1/3); the square needs no branch
+            base, exponent = base.args[0] ** 2, exponent / 2
+        base = self(base)
         if isinstance(exponent, sp.Rational):
             return self.g.power(base, Fraction(int(exponent.p), int(exponent.q)))
         return self.g.call(Op.EXP, self.g.mul(self(exponent), self.g.call(Op.LOG, base)))

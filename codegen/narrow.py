@@ -10,6 +10,8 @@ squares in the plane, d the minor there and t the hoop stretch.
 from __future__ import annotations
 
 import functools
+import operator
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -55,7 +57,7 @@ def degrees(
 
 def _whole(power: Node) -> int:
     """Exponent of a power if that is a positive integer, else 0."""
-    e = power.payload
+    e = power.payload if power.op is Op.POW else None
     return int(e) if isinstance(e, Fraction) and e.denominator == 1 and e > 0 else 0
 
 
@@ -109,7 +111,7 @@ def narrow(
 
 @dataclass(frozen=True)
 class _Quadratic:
-    """`scale` times constants times a `shape` in the forms alone; the shape starts with 1."""
+    """`scale` times the constants of all terms times a `shape`, which starts with 1."""
 
     constants: Monomial
     scale: Fraction
@@ -150,6 +152,10 @@ class _Search:
     forms: frozenset[Node]
     memo: dict[Node, Polynomial | None] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self._ids = {f.id for f in self.forms}
+        self._nodes = {f.id: f for f in self.forms}
+
     def targets(self, roots: Sequence[Node]) -> list[Node]:
         """Polynomials that something which is none uses (or that are roots themselves)."""
         out = {r: None for r in roots if 1 < self.degree[r] < ABOVE}
@@ -177,7 +183,10 @@ class _Search:
             basis = [*base, *extra]
             if len(basis) >= self._used(targets):
                 return None
-            rows = [_represent(dict(p.shape), [*basis, *squared]) for p in parts]
+            rows = [
+                _represent(dict(p.shape), 1 if self.degree[t] == 2 else 2, [*basis, *squared])
+                for t, p in zip(solved, parts, strict=True)
+            ]
             found = [row for row in rows if row is not None]
             if len(found) == len(parts):
                 break
@@ -186,8 +195,10 @@ class _Search:
         recipes = {t: _Recipe(p, row) for t, p, row in zip(solved, parts, found, strict=True)}
         unit = Fraction(1)
         recipes |= {n: _Recipe(q, {(basis.index(q.shape),): unit}) for n, q in fixed.items()}
-        forms = {f.id: f for f in self.forms}
-        terms = [_polynomial_value(self.g, dict(s), forms) for s in [*basis, *squared]]
+        inside = {self._nodes[i] for shape in basis for m, _ in shape for i in m}
+        if not recipes.keys().isdisjoint(reachable(inside - self.forms)):
+            return None
+        terms = [_polynomial_value(self.g, dict(s), self._nodes) for s in [*basis, *squared]]
         terms = [self.g.name(f"q{k}", t) if k < len(basis) else t for k, t in enumerate(terms)]
         return recipes, terms, tuple(terms[: len(basis)])
 
@@ -229,27 +240,45 @@ class _Search:
             yield from combinations(short, count)
 
     def split(self, n: Node) -> _Quadratic | None:
-        """A polynomial as constants times a shape; None where terms have different constants."""
+        """A polynomial as the constants that all terms share times a shape; None: too long."""
         p = self.polynomial(n)
         if not p:
             return None
-        inside = {f.id for f in self.forms}
-        constants = {tuple(i for i in m if i not in inside) for m in p}
-        if len(constants) != 1:
-            return None
-        scale, shape = _normalised({tuple(i for i in m if i in inside): c for m, c in p.items()})
-        return _Quadratic(constants.pop(), scale, shape)
+        shared = functools.reduce(operator.and_, (self._constants(m) for m in p))
+        scale, shape = _normalised({_without(m, shared): c for m, c in p.items()})
+        return _Quadratic(tuple(sorted(shared.elements())), scale, shape)
+
+    def _constants(self, m: Monomial) -> Counter[int]:
+        return Counter(i for i in m if i not in self._ids)
 
     def polynomial(self, n: Node) -> Polynomial | None:
         """Exact expansion; None where it gets long."""
         if n not in self.memo:
+            self._nodes[n.id] = n
             self.memo[n] = self._expand(n)
         return self.memo[n]
+
+    def _inverse_power(self, n: Node) -> Polynomial | None:
+        """1/x^k as the k-th power of 1/x, so that it meets other powers of 1/x."""
+        power = n.args[0] if n.op is Op.RECIP else n
+        e = power.payload
+        if power.op is not Op.POW or not isinstance(e, Fraction) or e.denominator != 1:
+            return None
+        if (e > 0) is not (n.op is Op.RECIP):
+            return None
+        atom = self.g.recip(power.args[0])
+        self._nodes[atom.id] = atom
+        return {(atom.id,) * abs(int(e)): Fraction(1)}
 
     def _expand(self, n: Node) -> Polynomial | None:
         if n.op is Op.CONST:
             return {(): n.value}
-        if n in self.forms or (self.degree[n] == 0 and n.op not in (Op.MUL, Op.NEG)):
+        inverse = self._inverse_power(n)
+        if inverse is not None:
+            return inverse
+        if n in self.forms or (
+            self.degree[n] == 0 and n.op not in (Op.MUL, Op.NEG) and not _whole(n)
+        ):
             return {(n.id,): Fraction(1)}
         args = [self.polynomial(a) for a in n.args]
         parts = [p for p in args if p is not None]
@@ -267,6 +296,12 @@ class _Search:
         return out if len(out) <= LONGEST else None
 
 
+def _without(m: Monomial, taken: Counter[int]) -> Monomial:
+    left = Counter(m)
+    left.subtract(taken)
+    return tuple(sorted(left.elements()))
+
+
 def _normalised(p: Polynomial) -> tuple[Fraction, _Shape]:
     """Leading coefficient and the polynomial divided by it, in a fixed order."""
     items = sorted(p.items())
@@ -277,10 +312,9 @@ def _normalised(p: Polynomial) -> tuple[Fraction, _Shape]:
 
 
 def _represent(
-    target: Polynomial, basis: Sequence[_Shape]
+    target: Polynomial, along: int, basis: Sequence[_Shape]
 ) -> dict[tuple[int, ...], Fraction] | None:
-    """Coefficients of a polynomial of degree 2 or 4 over the basis or products of two of it."""
-    along = 1 if len(next(iter(target))) == 2 else 2
+    """Coefficients of a polynomial over products of `along` values of the basis."""
     products: dict[tuple[int, ...], Polynomial] = {}
     for indices in combinations_with_replacement(range(len(basis)), along):
         p: Polynomial = {(): Fraction(1)}

@@ -210,6 +210,19 @@ def _sum(g: Graph, terms: list[tuple[int, Node]], start: Node | None = None) -> 
     return result
 
 
+def inverses(g: Graph, roots: Roots) -> Roots:
+    """1/x next to x^(-1/3) is its third power: two multiplications for a division."""
+    rooted = {n.args[0] for n in reachable(roots) if n.op is Op.RCBRT}
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        if n.op is Op.RECIP and n.args[0] in rooted:
+            y = g.call(Op.RCBRT, args[0])
+            return g.mul(y, g.mul(y, y))
+        return g.rebuild(n.op, args, n.payload)
+
+    return rewrite(g, roots, rule)
+
+
 def assume(g: Graph, roots: Roots) -> Roots:
     """Inside one side of a branch its condition is known: drop inner branches on it."""
     memo: dict[tuple[Node, tuple[tuple[Node, bool], ...]], Node] = {}
@@ -308,6 +321,7 @@ def straight_line(points: Sequence[Sequence[Fraction]]) -> tuple[Pass, ...]:
         Pass("assume", assume),
         Pass("powers", powers),
         Pass("common factors", factor),
+        Pass("inverses of roots", inverses),
         unrolled(points),
         Pass("equal values", merge_equal),
         Pass("invariants first", invariants_first),

@@ -14,10 +14,12 @@ from typing import Any
 import mpmath
 
 from codegen.arithmetic import number
-from codegen.graph import BOOLEAN, Graph, Node, Op, reachable
+from codegen.graph import BOOLEAN, Graph, Input, Node, Op, reachable
 
 DIGITS = 50
 AGREE = 30
+SMALL = mpmath.mpf(1) / 32
+"""Size of the unknowns: near the undeformed state volumes are positive and roots have values."""
 POINTS = 2
 """Points of the signature; as many fresh ones confirm each merge."""
 
@@ -65,11 +67,15 @@ def _sample(nodes: Sequence[Node], rng: random.Random) -> dict[Node, Value]:
     for n in nodes:
         if n.op in (Op.INPUT, Op.SUM, Op.BRANCH):
             # Sums and branches stand for themselves: a sample would see one side only.
-            values[n] = _random(rng)
+            values[n] = _random(rng) * (SMALL if _unknown(n) else 1)
         else:
             args = [values[a] for a in n.args]
             values[n] = None if any(a is None for a in args) else _computed(n, args)
     return values
+
+
+def _unknown(n: Node) -> bool:
+    return isinstance(n.payload, Input) and n.payload.array in ("dofs", "interpolated")
 
 
 def _random(rng: random.Random) -> mpmath.mpf:

@@ -150,6 +150,13 @@ def test_relations_and_logic(relation: Any, expected: list[int]) -> None:
     assert [value(indicator, at, 2) for at in (1, 2, 3)] == expected
 
 
+def test_a_power_of_an_absolute_value_is_one_of_the_square() -> None:
+    """SymPy turns (x^2)^(1/3) into |x|^(2/3): no branch may come of that."""
+    power = lowered((x**2) ** sp.Rational(1, 3))
+    assert not any(n.op is Op.BRANCH for n in reachable([power]))
+    assert value((x**2) ** sp.Rational(1, 3), -8.0, 1.0) == pytest.approx(4.0, rel=1e-15)
+
+
 def test_extrema_and_absolute_value() -> None:
     for at in ((1, 2), (2, 1), (-3, -3), (0, -1)):
         assert value(sp.Max(x, y), *at) == max(at)

@@ -67,3 +67,16 @@ def test_a_polynomial_of_other_values_is_left_alone() -> None:
     x, y = unknowns(g, 2)
     quartic = g.add(g.mul(g.power(x, 3), y), g.mul(x, x))
     assert narrow(g, [g.call(Op.EXP, quartic)], [x, y], []) is None
+
+
+def test_constants_may_stand_inside_the_invariants() -> None:
+    """F = 1 + G/A with A from the geometry, some entries without it: as SymPy leaves them."""
+    g = Graph()
+    x = unknowns(g, 6)
+    a = g.recip(x[5])
+    F = [g.mul(a, x[0]), x[1], x[2], g.mul(a, x[3]), x[4]]
+    root = axisymmetric(g, F)
+    found = narrow(g, [root], x[:5], [])
+    assert found is not None
+    assert len(found.squares) == 2
+    assert same_value(found.roots[0], root, inputs(1.9, 0.1, 0.2, 2.1, 1.1, 2.0))
