@@ -15,7 +15,8 @@ not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped 
 | `n`           |                      | number of elements                                       |
 | `points`      |                      | number of quadrature points                              |
 | `modes`       |                      | shape functions of the interpolated field (0 if none)    |
-| `coordinates` | n, nodes * 2         | reference positions z1, r1, z2, r2, ...                  |
+| `coordinates` | n, nodes * ncomp     | reference positions node by node: z1, r1, z2, r2, ...;   |
+|               |                      | the components are those of the manifest                 |
 | `dofs`        | n, ndof              | direct unknowns in the model's order, then the `modes`   |
 |               |                      | unknowns of the interpolated field                       |
 | `data`        | n, ndata             | constants of each element, in the manifest's order       |

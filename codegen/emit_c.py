@@ -153,7 +153,8 @@ def dofs_expression(d: Definition) -> str:
 
 def _pointers(p: Printer, task: str) -> None:
     d = p.d
-    p.line(2, f"const double *restrict X = coordinates + {2 * d.nodes} * e;")
+    if d.coordinates:
+        p.line(2, f"const double *restrict X = coordinates + {d.coordinate_width} * e;")
     p.line(2, f"const double *restrict d = dofs + {dofs_expression(d)} * e;")
     if d.data:
         p.line(2, f"const double *restrict a = data + {len(d.data)} * e;")
@@ -165,7 +166,8 @@ def _pointers(p: Printer, task: str) -> None:
         p.line(
             2, f"double *restrict K = tangent + {dofs_expression(d)} * {dofs_expression(d)} * e;"
         )
-    used = ["X", "d", *(["a"] if d.data else []), *(["t"] if task == abi.Task.PRODUCT else [])]
+    used = [*(["X"] if d.coordinates else []), "d", *(["a"] if d.data else [])]
+    used += ["t"] if task == abi.Task.PRODUCT else []
     p.line(2, " ".join(f"(void){name};" for name in used))
 
 
@@ -283,7 +285,8 @@ def _target(d: Definition, task: str, x: Entry) -> str:
 def _unused(lines: Sequence[str]) -> list[str]:
     """Silence arguments that a family has no use for."""
     text = "\n".join(lines)
-    names = ("points", "modes", "data", "parameters", "direction", "rule", "basis", "tangent")
+    names = ["points", "modes", "coordinates", "data", "parameters", "direction"]
+    names += ["rule", "basis", "tangent"]
     return [f"    (void){name};" for name in names if name not in text]
 
 

@@ -93,7 +93,8 @@ def _widths(d: Definition, task: str) -> dict[str, int]:
     """Values per element of each array that a task reads."""
     size = len(d.unknowns)
     along = size if task == abi.Task.PRODUCT else 0
-    return {"coordinates": 2 * d.nodes, "dofs": size, "data": len(d.data), "direction": along}
+    coordinates = d.coordinate_width
+    return {"coordinates": coordinates, "dofs": size, "data": len(d.data), "direction": along}
 
 
 def _loads(p: _LanePrinter, task: str) -> None:
@@ -151,7 +152,7 @@ def _batch(d: Definition, task: str) -> str:
         abi.declaration(d.name, task),
         "{",
         "    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;",
-        "    (void)parameters, (void)direction;",
+        f"    (void)parameters, (void)direction{'' if d.coordinates else ', (void)coordinates'};",
         "    ptrdiff_t e = 0;",
         "    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)",
         f"        {name}_group({', '.join(at.values())}, parameters,",

@@ -9,7 +9,7 @@ the tangent is the derivative of that residual.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mpmath
@@ -95,6 +95,32 @@ class Oracle:
                 plus, minus = (self._residual(state, _moved(base, j, s * h)) for s in (1, -1))
                 columns.append([(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)])
             return [list(row) for row in zip(*columns, strict=True)]
+
+    def product(self, state: State, direction: Sequence[Number]) -> Vector:
+        """Tangent times `direction`: one difference of the residual, where `tangent` takes ndof."""
+        with mpmath.workdps(self.digits):
+            return self._rate(state, "dofs", _mpf(direction))
+
+    def derivative(self, state: State, array: str, index: int) -> Vector:
+        """Derivative of the residual by one entry of `coordinates`, `data` or `parameters`."""
+        with mpmath.workdps(self.digits):
+            size = len(getattr(state, array))
+            return self._rate(state, array, [mpmath.mpf(k == index) for k in range(size)])
+
+    def _rate(self, state: State, array: str, direction: Vector) -> Vector:
+        h = mpmath.mpf(10) ** -self.step
+        base = _mpf(getattr(state, array))
+        plus, minus = (
+            self._residual(at, _mpf(at.dofs))
+            for s in (1, -1)
+            for at in [
+                replace(
+                    state,
+                    **{array: [b + s * h * v for b, v in zip(base, direction, strict=True)]},
+                )
+            ]
+        )
+        return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
 
     def _residual(self, state: State, dofs: Vector) -> Vector:
         h = mpmath.mpf(10) ** -self.step

@@ -1,7 +1,7 @@
-"""Axisymmetric kinematics and the compressible Mooney-Rivlin energy of the paper, (3)-(6).
+"""Kinematics of solids: any dimension first, then the axisymmetric ones of the paper, (3)-(6).
 
-Coordinates are ordered (axial, radial) = (z, r); the deformation gradient of an axisymmetric
-motion is a 2x2 block and the hoop stretch.
+Axisymmetric coordinates are ordered (axial, radial) = (z, r); the deformation gradient of an
+axisymmetric motion is a 2x2 block and the hoop stretch.
 """
 
 from __future__ import annotations
@@ -13,6 +13,39 @@ import sympy as sp
 
 from codegen import shapes
 from codegen.model import Model
+
+
+@dataclass(frozen=True)
+class Isoparametric:
+    """Shape function gradients by the reference coordinates, [node][component], and Jacobian."""
+
+    dN: list[list[Any]]
+    detJ: Any
+
+
+def isoparametric(m: Model, X: Any, parent: Any) -> Isoparametric:
+    """Geometry at the point from nodal coordinates [component][node] and parent gradients.
+
+    Works in one, two and three dimensions; `parent` is e.g. `shapes.hex8_gradient(xi, eta, zeta)`.
+    """
+    size = len(X)
+    J = sp.Matrix(size, size, lambda i, k: shapes.interpolate([g[k] for g in parent], X[i]))
+    J = m.define("dX", J)
+    detJ = m.define("detJ", J.det(method="berkowitz"))
+    inverse = m.define("dX_inverse", J.adjugate() / detJ)
+    dN = [list(sp.Matrix([list(g)]) * inverse) for g in parent]
+    return Isoparametric(
+        [[m.define(f"dN_{a}{k}", v) for k, v in enumerate(row)] for a, row in enumerate(dN)], detJ
+    )
+
+
+def deformation_gradient(m: Model, dN: Any, u: Any) -> Any:
+    """Matrix F = 1 + Grad u, named F_00, F_01, ..., from displacements [component][node]."""
+    size = len(u)
+    F = sp.Matrix(
+        size, size, lambda i, k: (1 if i == k else 0) + shapes.interpolate([g[k] for g in dN], u[i])
+    )
+    return m.define("F", F, waist=True)
 
 
 @dataclass(frozen=True)

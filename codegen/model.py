@@ -32,6 +32,7 @@ class Definition:
     name: str
     doc: str
     nodes: int
+    coordinates: tuple[str, ...]
     unknowns: tuple[str, ...]
     interpolated: str | None
     parameters: tuple[Argument, ...]
@@ -47,6 +48,11 @@ class Definition:
     fields: tuple[tuple[str, Node], ...]
     product: bool = False
     derivatives: tuple[tuple[str, Node], ...] = ()
+
+    @property
+    def coordinate_width(self) -> int:
+        """Coordinates of one element: components times nodes."""
+        return len(self.coordinates) * self.nodes
 
     @property
     def conservative(self) -> bool:
@@ -69,6 +75,7 @@ class Model:
         self.graph = Graph()
         self._bound: dict[sp.Symbol, Node] = {}
         self._lower = Lowering(self.graph, self._bound)
+        self._coordinates: tuple[str, ...] = ()
         self._unknowns: list[str] = []
         self._interpolated: str | None = None
         self._directions: list[Node] = []
@@ -84,8 +91,10 @@ class Model:
     # declarations -------------------------------------------------------------------------------
 
     def coordinates(self, *names: str) -> list[list[sp.Symbol]]:
-        """Reference coordinates, one list over the nodes for each component."""
-        width = len(names)
+        """Reference coordinates, any number of components: a list over the nodes for each."""
+        if self._coordinates not in ((), names):
+            raise ModelError(f"the coordinates are {', '.join(self._coordinates)} already")
+        self._coordinates, width = names, len(names)
         return [
             [self._input(f"{name}{a + 1}", "coordinates", a * width + c) for a in range(self.nodes)]
             for c, name in enumerate(names)
@@ -211,6 +220,7 @@ class Model:
             name=self.name,
             doc=self.doc,
             nodes=self.nodes,
+            coordinates=self._coordinates,
             unknowns=tuple(self._unknowns),
             interpolated=self._interpolated,
             parameters=tuple(self._arguments["parameters"]),

@@ -115,6 +115,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
     return {
         "doc": d.doc,
         "nodes": d.nodes,
+        "coordinates": list(d.coordinates),
         "unknowns": list(d.unknowns),
         "interpolated": d.interpolated,
         "parameters": {a.name: a.meaning for a in d.parameters},

@@ -53,12 +53,14 @@ class ArgumentError(KernelError, ValueError):
 class Kernel:
     """One kernel family.  Calls take n elements at once; arrays are converted to float64.
 
-    coordinates (n, 2*nodes), dofs (n, ndof), data (n, len(data)), parameters (len(parameters),)
-    or a mapping by name, rule None for the model's default (the only one when `unrolled`).
+    coordinates (n, nodes*len(coordinates)) (any, for a kernel that has none), dofs (n, ndof),
+    data (n, len(data)), parameters (len(parameters),) or a mapping by name, rule None for the
+    model's default (the only one when `unrolled`).
     """
 
     name: str
     nodes: int
+    coordinates: tuple[str, ...]
     unknowns: tuple[str, ...]
     interpolated: str | None
     parameters: tuple[str, ...]
@@ -129,7 +131,10 @@ class _Call:
         self.modes = self._modes()
         self.n = len(dofs)
         self.ndof = len(kernel.unknowns) + self.modes
-        self.coordinates = self._array("coordinates", coordinates, (self.n, 2 * kernel.nodes))
+        width = kernel.nodes * len(kernel.coordinates)
+        self.coordinates = np.empty(0)
+        if width:
+            self.coordinates = self._array("coordinates", coordinates, (self.n, width))
         self.dofs = self._array("dofs", dofs, (self.n, self.ndof))
         self.data = self._array(
             "data", np.empty((self.n, 0)) if data is None else data, (self.n, len(kernel.data))
@@ -271,6 +276,7 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
     return Kernel(
         name=name,
         nodes=entry["nodes"],
+        coordinates=tuple(entry["coordinates"]),
         unknowns=tuple(entry["unknowns"]),
         interpolated=entry["interpolated"],
         parameters=tuple(entry["parameters"]),
