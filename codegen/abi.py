@@ -19,7 +19,9 @@ not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped 
 |               |                      | the components are those of the manifest                 |
 | `dofs`        | n, ndof              | direct unknowns in the model's order, then the `modes`   |
 |               |                      | unknowns of the interpolated field                       |
-| `data`        | n, ndata             | constants of each element, in the manifest's order       |
+| `data`        | n, ndata +           | constants of each element, in the manifest's order; then |
+|               | points * npoint      | those of each of its points (history, ...), point by     |
+|               |                      | point                                                    |
 | `parameters`  | nparameters          | constants of the call, in the manifest's order           |
 | `direction`   | n, ndof              | vector that task `product` multiplies by the tangent     |
 | `rule`        | points, dimension + 1| parent coordinates of each point, then its weight        |
@@ -39,7 +41,9 @@ not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped 
 
 Pointers that a family does not use (no data, no basis, no parameters, no tangent) may be NULL.
 A kernel keeps no state, allocates nothing, reports nothing: a value outside the model's domain
-comes out as not-a-number.
+comes out as not-a-number.  An element in which a local iteration (`Model.implicit`) finds no
+solution, or in which a function of stretches meets a matrix that is not positive definite, is
+not-a-number in *every* entry of its `values` and `tangent`; the other elements are not touched.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from codegen.graph import BOOLEAN, Graph, Node, Op, reachable
+from codegen.graph import BOOLEAN, Graph, Node, Op, Routine, reachable
 
 Partials = list[tuple[Node, Node]]
 Given = Mapping[Node, Mapping[Node, Node]]
@@ -28,8 +28,12 @@ class DifferentiationError(ValueError):
 
 def partials(g: Graph, n: Node) -> Partials:
     """Local derivatives of `n` with respect to its operands (not for BRANCH and SUM)."""
-    if not n.args or n.op in BOOLEAN:
+    if not n.args or n.op in BOOLEAN or n.op is Op.CALL:
         return []
+    if n.op is Op.ITEM:
+        routine = n.args[0].payload
+        assert isinstance(routine, Routine)
+        return routine.partials(g, n)
     a = n.args[0]
     match n.op:
         case Op.NAME:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from codegen import abi, support_c
-from codegen.graph import BOOLEAN, Input, Node, Op
+from codegen.graph import BOOLEAN, Input, Node, Op, Place, Routine, reachable
 from codegen.model import Definition
 from codegen.schedule import If, Loop, Schedule, Statement
 
@@ -58,6 +58,9 @@ _ARRAYS = {
     "data": "a[{}]",
     "parameters": "parameters[{}]",
     "rule": "w[{}]",
+    "point data": "b[{}]",
+    "local": "s[{}]",
+    "external": "p[{}]",
     "interpolated": "p{}",
     "interpolated direction": "t{}",
 }
@@ -97,12 +100,23 @@ class Printer:
         for s in statements:
             if isinstance(s, If):
                 self.branch(depth, s)
+            elif isinstance(s.payload, Routine):
+                self.call(depth, s, s.payload)
             else:
                 right = self.expression(s)
                 kind = "int" if s.op in BOOLEAN else "double"
                 self.line(depth, f"const {kind} {self.fresh(s)} = {right};")
 
+    def call(self, depth: int, n: Node, routine: Routine) -> None:
+        """Run a routine on its operands; a failure is remembered."""
+        operands = ", ".join(self.ref(a) for a in n.args) or "0.0"
+        name = f"{abi.PREFIX}_{self.d.name}_{routine.name}"
+        self.line(depth, f"double {self.fresh(n)}[{routine.outputs}];")
+        self.line(depth, f"failed |= {name}((const double[]){{{operands}}}, {self.ref(n)});")
+
     def expression(self, n: Node) -> str:
+        if isinstance(n.payload, Place):
+            return f"{self.ref(n.args[0])}[{n.payload.index}]"
         if n.op is Op.POW:
             return f"pow({self.ref(n.args[0])}, {number(float(n.payload))})"  # type: ignore[arg-type]
         return _FORMATS[n.op].format(*(self.ref(a) for a in n.args))
@@ -128,6 +142,9 @@ def function(
     p = Printer(definition)
     p.line(1, "for (ptrdiff_t e = 0; e < n; ++e) {")
     _pointers(p, task)
+    fallible = any(n.op is Op.CALL for n in reachable([x.node for x in entries]))
+    if fallible:
+        p.line(2, "int failed = 0;")
     scattered = [x for x in entries if _in_loop(x)]
     if scattered and task != abi.Task.FIELDS:
         _clear(p, task)
@@ -136,6 +153,8 @@ def function(
         if stage.loop is not None:
             _loop(p, stage.loop, task, entries)
     _store_after(p, task, entries)
+    if fallible:
+        _mark(p, task)
     p.line(1, "}")
     body = "\n".join(_unused(p.lines) + p.lines)
     text = f"{abi.declaration(definition.name, task)}\n{{\n{body}\n}}\n"
@@ -151,13 +170,20 @@ def dofs_expression(d: Definition) -> str:
     return f"({direct} + modes)" if d.interpolated else str(direct)
 
 
+def data_expression(d: Definition) -> str:
+    """Data of one element, those of its points included."""
+    if not d.point_data:
+        return str(len(d.data))
+    return f"({len(d.data)} + {len(d.point_data)} * points)"
+
+
 def _pointers(p: Printer, task: str) -> None:
     d = p.d
     if d.coordinates:
         p.line(2, f"const double *restrict X = coordinates + {d.coordinate_width} * e;")
     p.line(2, f"const double *restrict d = dofs + {dofs_expression(d)} * e;")
-    if d.data:
-        p.line(2, f"const double *restrict a = data + {len(d.data)} * e;")
+    if d.data or d.point_data:
+        p.line(2, f"const double *restrict a = data + {data_expression(d)} * e;")
     if task == abi.Task.PRODUCT:
         p.line(2, f"const double *restrict t = direction + {dofs_expression(d)} * e;")
     if task not in (abi.Task.ENERGY, abi.Task.FIELDS):
@@ -166,7 +192,7 @@ def _pointers(p: Printer, task: str) -> None:
         p.line(
             2, f"double *restrict K = tangent + {dofs_expression(d)} * {dofs_expression(d)} * e;"
         )
-    used = [*(["X"] if d.coordinates else []), "d", *(["a"] if d.data else [])]
+    used = [*(["X"] if d.coordinates else []), "d", *(["a"] if d.data or d.point_data else [])]
     used += ["t"] if task == abi.Task.PRODUCT else []
     p.line(2, " ".join(f"(void){name};" for name in used))
 
@@ -176,6 +202,22 @@ def _clear(p: Printer, task: str) -> None:
     p.line(2, f"for (ptrdiff_t i = 0; i < {size}; ++i) R[i] = 0.0;")
     if task == abi.Task.TANGENT:
         p.line(2, f"for (ptrdiff_t i = 0; i < {size} * {size}; ++i) K[i] = 0.0;")
+
+
+def _mark(p: Printer, task: str) -> None:
+    """A routine without a result spoils its whole element, whatever was computed from it."""
+    size = dofs_expression(p.d)
+    sizes = {
+        abi.Task.ENERGY: {"values + e": "1"},
+        abi.Task.FIELDS: {
+            f"values + {len(p.d.fields)} * points * e": f"{len(p.d.fields)} * points"
+        },
+        abi.Task.TANGENT: {"R": size, "K": f"{size} * {size}"},
+    }.get(abi.Task(task) if task in set(abi.Task) else abi.Task.RESIDUAL, {"R": size})
+    p.line(2, "if (failed) {")
+    for array, length in sizes.items():
+        p.line(3, f"for (ptrdiff_t i = 0; i < {length}; ++i) ({array})[i] = NAN;")
+    p.line(2, "}")
 
 
 def _store_after(p: Printer, task: str, entries: Sequence[Entry]) -> None:
@@ -198,6 +240,10 @@ def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
     p.line(2, "for (ptrdiff_t q = 0; q < points; ++q) {")
     p.line(3, f"const double *restrict w = rule + {p.d.rule.dimension + 1} * q;")
     p.line(3, "(void)w;")
+    if p.d.point_data:
+        size = len(p.d.point_data)
+        p.line(3, f"const double *restrict b = a + {len(p.d.data)} + {size} * q;")
+        p.line(3, "(void)b;")
     if p.d.interpolated:
         p.line(3, "const double *restrict B = basis + 2 * modes * q;")
         _gather(p, "p", "d")
@@ -290,9 +336,9 @@ def _unused(lines: Sequence[str]) -> list[str]:
     return [f"    (void){name};" for name in names if name not in text]
 
 
-def source(definition: Definition, functions: Iterable[str]) -> str:
-    """The C file of a kernel family."""
-    return "\n".join([_banner(definition), f'#include "{HEADER}"', "", *functions])
+def source(definition: Definition, functions: Iterable[str], before: Iterable[str] = ()) -> str:
+    """The C file of a kernel family; `before` are the routines that its functions call."""
+    return "\n".join([_banner(definition), f'#include "{HEADER}"', "", *before, *functions])
 
 
 def _banner(d: Definition) -> str:
@@ -302,7 +348,8 @@ def _banner(d: Definition) -> str:
     lines = [" *", f" * {d.name}: {d.doc}", " *", *rows("dofs", d.unknowns)]
     if d.interpolated:
         lines.append(f" * dofs[{len(d.unknowns)} + i]  {d.interpolated}, i < modes")
-    for label, arguments in (("parameters", d.parameters), ("data", d.data)):
+    groups = (("parameters", d.parameters), ("data", d.data), ("point data", d.point_data))
+    for label, arguments in groups:
         lines += rows(label, [f"{a.name}: {a.meaning}" for a in arguments])
     lines += rows("fields", [name for name, _ in d.fields])
     text = "\n".join(lines).replace("*/", "* /")

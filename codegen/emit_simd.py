@@ -21,11 +21,11 @@ FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.CO
 
 
 def suits(plan: Schedule) -> bool:
-    """True for a kernel without loops and branches."""
+    """True for a kernel without loops, branches and routines."""
     return (
         len(plan.stages) == 1
         and plan.stages[0].loop is None
-        and not any(isinstance(s, If) for s in plan.stages[0].before)
+        and not any(isinstance(s, If) or s.op is Op.CALL for s in plan.stages[0].before)
     )
 
 
@@ -94,7 +94,8 @@ def _widths(d: Definition, task: str) -> dict[str, int]:
     size = len(d.unknowns)
     along = size if task == abi.Task.PRODUCT else 0
     coordinates = d.coordinate_width
-    return {"coordinates": coordinates, "dofs": size, "data": len(d.data), "direction": along}
+    data = len(d.data) + len(d.point_data) * len(d.rule.weights)
+    return {"coordinates": coordinates, "dofs": size, "data": data, "direction": along}
 
 
 def _loads(p: _LanePrinter, task: str) -> None:

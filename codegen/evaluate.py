@@ -14,7 +14,8 @@ from typing import Any
 
 import mpmath
 
-from codegen.graph import Input, Node, Op, reachable
+from codegen.evaluate_routines import results
+from codegen.graph import Input, Node, Op, Place, Routine, reachable
 from codegen.model import Definition
 
 Number = Any
@@ -49,7 +50,8 @@ _BINARY: dict[Op, Callable[[Number, Number], Number]] = {
 class State:
     """Arguments of one element: exact numbers, as doubles or mpmath values.
 
-    `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative).
+    `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative);
+    `point_data` [point][entry].
     """
 
     coordinates: Sequence[Number]
@@ -58,6 +60,7 @@ class State:
     parameters: Sequence[Number] = ()
     rule: Sequence[Sequence[Number]] = ((1,),)
     basis: Sequence[Sequence[tuple[Number, Number]]] = ()
+    point_data: Sequence[Sequence[Number]] = ()
 
 
 @dataclass(frozen=True)
@@ -195,6 +198,12 @@ class _Walk:
                 return mpmath.fsum(self.at(n.args[0], k) for k in range(len(self.state.rule)))
             case Op.BRANCH:
                 return self.at(n.args[1 if self.at(n.args[0], q) else 2], q)
+            case Op.CALL:
+                assert isinstance(n.payload, Routine)
+                return results(n.payload, [self.at(a, q) for a in n.args], _local)
+            case Op.ITEM:
+                assert isinstance(n.payload, Place)
+                return self.at(n.args[0], q)[n.payload.index]
             case Op.POW:
                 e: Any = n.payload
                 return self.at(n.args[0], q) ** (mpmath.mpf(e.numerator) / e.denominator)
@@ -204,6 +213,8 @@ class _Walk:
     def _input(self, source: Input, q: int) -> Number:
         if source.array == "rule":
             return mpmath.mpf(self.state.rule[q][source.index])
+        if source.array == "point data":
+            return mpmath.mpf(self.state.point_data[q][source.index])
         if source.array == "interpolated":
             modes = self.state.basis[q]
             unknowns = self.arrays["dofs"][-len(modes) :]
@@ -211,6 +222,13 @@ class _Walk:
                 mpmath.mpf(b[source.index]) * p for b, p in zip(modes, unknowns, strict=True)
             )
         return self.arrays[source.array][source.index]
+
+
+def _local(values: Sequence[Node], local: Vector, external: Vector) -> Vector:
+    """Localised values of a routine."""
+    walk = _Walk(State((), ()), {})
+    walk.arrays = {"local": local, "external": external}
+    return [walk.value(n) for n in values]
 
 
 def evaluate(root: Node, inputs: Mapping[tuple[str, int], Number], digits: int = 50) -> Number:

@@ -7,6 +7,9 @@ arithmetic); everything else is a named pass (`codegen.passes`).
 
 A node *varies* when its value depends on the quadrature point; `SUM` adds its operand over the
 points of the element and does not vary.
+
+A `CALL` runs a `Routine`, a function of its own with several results, on its operands; `ITEM`
+is one of the results.  How a routine is differentiated is the routine's affair.
 """
 
 from __future__ import annotations
@@ -45,6 +48,8 @@ class Op(StrEnum):
     NOT = "not"
     BRANCH = "branch"
     SUM = "sum"
+    CALL = "call"
+    ITEM = "item"
 
 
 BOOLEAN = frozenset({Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR, Op.NOT})
@@ -61,7 +66,30 @@ class Input:
     varying: bool = False
 
 
-Payload = Fraction | Input | str | None
+@dataclass(frozen=True)
+class Place:
+    """Position of an `ITEM` among the results of its routine."""
+
+    index: int
+
+
+@dataclass(frozen=True, eq=False)
+class Routine:
+    """A function with several results that the graph calls and does not look into.
+
+    `name` is unique in a model; `inputs` and `outputs` are the numbers of operands and results.
+    """
+
+    name: str
+    inputs: int
+    outputs: int
+
+    def partials(self, g: Graph, item: Node) -> list[tuple[Node, Node]]:
+        """Derivatives of one result with respect to the operands it depends on."""
+        raise NotImplementedError
+
+
+Payload = Fraction | Input | str | Place | Routine | None
 
 
 class Node:
@@ -258,6 +286,11 @@ class Graph:
             return self.neg(self.sum(body.args[0]))
         return self.node(Op.SUM, (body,))
 
+    def run(self, routine: Routine, args: Sequence[Node]) -> list[Node]:
+        """The results of a routine."""
+        call = self.node(Op.CALL, tuple(args), routine)
+        return [self.node(Op.ITEM, (call,), Place(k)) for k in range(routine.outputs)]
+
     def rebuild(self, op: Op, args: Sequence[Node], payload: Payload) -> Node:
         """The constructor of `op`, with its identities, on new operands."""
         if op in FREE and op is not Op.NAME:
@@ -273,7 +306,7 @@ class Graph:
             return maker(*args)
         if op in (Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS):
             return self.call(op, args[0])
-        return self.node(op, tuple(args))
+        return self.node(op, tuple(args), payload)
 
     def _makers(self) -> dict[Op, Callable[..., Node]]:
         return {
@@ -307,4 +340,5 @@ def reachable(roots: Iterable[Node], stop: Callable[[Node], bool] | None = None)
 
 def operations(roots: Iterable[Node]) -> int:
     """Number of run-time operations below `roots` (each shared value counted once)."""
-    return sum(1 for n in reachable(roots) if n.op not in FREE and n.op is not Op.SUM)
+    free = (Op.SUM, Op.ITEM)
+    return sum(1 for n in reachable(roots) if n.op not in FREE and n.op not in free)

@@ -6,58 +6,20 @@ A model page declares its arguments, writes its mathematics in SymPy, and ends w
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
 
+from codegen.definition import Argument, Definition
+from codegen.differentiate import gradient
+from codegen.entries import Entries, fraction
 from codegen.graph import Graph, Node
 from codegen.lower import Lowering, ModelError
 from codegen.quadrature import QuadratureRule
+from codegen.routines import SYMMETRIC, Control, isotropic, localise, newton, symmetric
 
-
-@dataclass(frozen=True)
-class Argument:
-    """A named scalar argument of a kernel and what it means (with its unit)."""
-
-    name: str
-    meaning: str
-
-
-@dataclass(frozen=True)
-class Definition:
-    """A finished model: everything the compiler needs, nothing differentiated yet."""
-
-    name: str
-    doc: str
-    nodes: int
-    coordinates: tuple[str, ...]
-    unknowns: tuple[str, ...]
-    interpolated: str | None
-    parameters: tuple[Argument, ...]
-    data: tuple[Argument, ...]
-    rule: QuadratureRule
-    unroll: bool
-    graph: Graph
-    potential: Node
-    constant: tuple[Node, ...]
-    given: Mapping[Node, Mapping[Node, Node]]
-    directions: tuple[Node, ...]
-    waist: tuple[Node, ...]
-    fields: tuple[tuple[str, Node], ...]
-    product: bool = False
-    derivatives: tuple[tuple[str, Node], ...] = ()
-
-    @property
-    def coordinate_width(self) -> int:
-        """Coordinates of one element: components times nodes."""
-        return len(self.coordinates) * self.nodes
-
-    @property
-    def conservative(self) -> bool:
-        """True when the residual is the gradient of the potential (no exceptions)."""
-        return not self.constant and not self.given
+__all__ = ["Argument", "Definition", "Model"]
 
 
 class Model:
@@ -79,7 +41,11 @@ class Model:
         self._unknowns: list[str] = []
         self._interpolated: str | None = None
         self._directions: list[Node] = []
-        self._arguments: dict[str, list[Argument]] = {"parameters": [], "data": []}
+        self._arguments: dict[str, list[Argument]] = {
+            "parameters": [],
+            "data": [],
+            "point data": [],
+        }
         self._waist: list[Node] = []
         self._given: dict[Node, dict[Node, Node]] = {}
         self._constant: list[Node] = []
@@ -137,6 +103,10 @@ class Model:
         """Arguments that differ from element to element."""
         return self._declare("data", meanings)
 
+    def point_data(self, **meanings: str) -> list[sp.Symbol]:
+        """Arguments that differ from quadrature point to point, e.g. history variables."""
+        return self._declare("point data", meanings, varying=True)
+
     def point(self) -> list[sp.Symbol]:
         """Coordinates of the quadrature point in the parent element."""
         names = ("xi", "eta", "zeta")[: self.rule.dimension]
@@ -177,6 +147,70 @@ class Model:
         if derivative is not None:
             self._given[node] = {self._bound[s]: self._lower(e) for s, e in derivative.items()}
         return self._bind(name, node)
+
+    def implicit(
+        self,
+        name: str,
+        equations: Callable[[Any], Any],
+        *,
+        start: Any,
+        tolerance: float = 1e-10,
+        size: float = 1.0,
+        iterations: int = 25,
+    ) -> Any:
+        """Local unknowns s with equations(s) = 0, found by Newton's method inside the kernel.
+
+        `start` is where the iteration begins: a scalar, a list, or a matrix, and s is alike; so is
+        what `equations` returns.  Derivatives of s follow from the implicit function theorem,
+        whatever the start.  The iteration ends when a step changes every s_k by no more than
+        `tolerance` (`size` + |s_k|), `size` being the magnitude that matters; the last step is
+        taken, so that the error is of the order of its square.  Without success after `iterations`
+        steps all outputs of the element are not-a-number.
+        """
+        begin, unknowns = Entries.of(start), Entries.of(start).map(lambda _: sp.Dummy(real=True))
+        local = self._placeholders(name, unknowns)
+        found = Entries.of(equations(unknowns.shaped()))
+        if len(found.values) != len(local):
+            raise ModelError(
+                f"{name}: {len(found.values)} equations for {len(local)} unknowns; one for each"
+            )
+        system = localise(self.graph, [self._lower(e) for e in found.values], local)
+        control = Control(fraction(tolerance), fraction(size), iterations)
+        routine = newton(self.graph, name, system, control)
+        for k in range(len(local)):
+            if all(row[k] is self.graph.zero for row in routine.by_local):
+                raise ModelError(f"{name}: unknown {k} does not occur in the equations")
+        args = [*system.external, *(self._lower(e) for e in begin.values)]
+        return self._named(name, begin, self.graph.run(routine, args))
+
+    def principal(self, name: str, C: Any, energy: Callable[[Any, Any, Any], Any]) -> sp.Symbol:
+        """An isotropic energy of the principal stretches: energy(lambda_1, lambda_2, lambda_3).
+
+        C is the symmetric right Cauchy-Green matrix, 3x3 (its upper triangle is read), the
+        stretches are the roots of its eigenvalues, and `energy` must not change when they are
+        exchanged.  First and second derivatives by C are exact also where stretches are equal.
+        """
+        if sp.Matrix(C).shape != (3, 3):
+            raise ModelError(f"{name}: C has shape {sp.Matrix(C).shape}, must be (3, 3)")
+        squares = Entries([sp.Dummy(positive=True) for _ in range(3)], ("", "", ""), list)
+        local = self._placeholders(name, squares)
+        value = self._lower(energy(*(sp.sqrt(c) for c in squares.values)))
+        if not symmetric(value, local):
+            raise ModelError(f"{name}: the energy changes when two stretches are exchanged")
+        system = localise(self.graph, [value], local)
+        routine = isotropic(name, 6 + len(system.external), system.values[0])
+        args = [*(self._lower(C[i, j]) for i, j in SYMMETRIC), *system.external]
+        return self._bind(name, self.graph.name(name, self.graph.run(routine, args)[0]))
+
+    def derivative(self, name: str, value: Any, by: Any) -> Any:
+        """Derivatives of a scalar by one named symbol, a list or a matrix of them, e.g. P = dW/dF.
+
+        The symbols are those of `define` or of arguments; all else is differentiated through.
+        """
+        symbols = Entries.of(by)
+        sources = [self._lower(s) for s in symbols.values]
+        slopes = gradient(self.graph, self._lower(value), sources, given=self._given)
+        return self._named(name, symbols, [slopes[s] for s in sources])
 
     def integral(self, name: str, integrand: Any) -> sp.Symbol:
         """Quadrature of `integrand` over the parent element."""
@@ -225,6 +259,7 @@ class Model:
             interpolated=self._interpolated,
             parameters=tuple(self._arguments["parameters"]),
             data=tuple(self._arguments["data"]),
+            point_data=tuple(self._arguments["point data"]),
             rule=self.rule,
             unroll=self.unroll,
             graph=self.graph,
@@ -240,10 +275,27 @@ class Model:
 
     # binding ------------------------------------------------------------------------------------
 
-    def _declare(self, array: str, meanings: Mapping[str, str]) -> list[sp.Symbol]:
+    def _placeholders(self, name: str, symbols: Entries) -> list[Node]:
+        """Inputs that stand for local unknowns while their equations are written."""
+        nodes = [self.graph.input(f"local {name}", k) for k in range(len(symbols.values))]
+        self._bound.update(zip(symbols.values, nodes, strict=True))
+        return nodes
+
+    def _named(self, name: str, like: Entries, nodes: Sequence[Node]) -> Any:
+        """Symbols for `nodes`, arranged like other values."""
+        labels = [name + suffix for suffix in like.suffixes]
+        named = [self.graph.name(s, n) for s, n in zip(labels, nodes, strict=True)]
+        symbols = [self._bind(s, n) for s, n in zip(labels, named, strict=True)]
+        return Entries(symbols, like.suffixes, like.arrange).shaped()
+
+    def _declare(
+        self, array: str, meanings: Mapping[str, str], *, varying: bool = False
+    ) -> list[sp.Symbol]:
         start = len(self._arguments[array])
         self._arguments[array] += [Argument(n, " ".join(m.split())) for n, m in meanings.items()]
-        return [self._input(name, array, start + k) for k, name in enumerate(meanings)]
+        return [
+            self._input(name, array, start + k, varying=varying) for k, name in enumerate(meanings)
+        ]
 
     def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
         return self._bind(name, self.graph.input(array, index, varying=varying))

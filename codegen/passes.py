@@ -256,7 +256,7 @@ def literals(g: Graph, roots: Roots) -> Roots:
 
     def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
         known = all(a.op is Op.CONST for a in args) and (bool(args) or n.op is Op.PI)
-        if not known or n.op in (Op.SUM, Op.BRANCH) or n.op in BOOLEAN:
+        if not known or n.op in (Op.SUM, Op.BRANCH, Op.CALL) or n.op in BOOLEAN:
             return g.rebuild(n.op, args, n.payload)
         with mpmath.workdps(50):
             result = number(n, [value.get(o, _exact(a)) for o, a in zip(n.args, args, strict=True)])
@@ -270,10 +270,11 @@ def _exact(n: Node) -> mpmath.mpf:
     return mpmath.mpf(n.value.numerator) / n.value.denominator
 
 
-def unrolled(points: Sequence[Sequence[Fraction]]) -> Pass:
+def unrolled(points: Sequence[Sequence[Fraction]], data: tuple[int, int] = (0, 0)) -> Pass:
     """Loops over the points written out; `points` holds (coordinates..., weight) of each.
 
-    The coordinates are rationals good to far more digits than a double holds.
+    The coordinates are rationals good to far more digits than a double holds.  `data` are the
+    numbers of data of the element and of one of its points.
     """
 
     def apply(g: Graph, roots: Roots) -> Roots:
@@ -292,7 +293,10 @@ def unrolled(points: Sequence[Sequence[Fraction]]) -> Pass:
                 new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
             else:
                 for q, point in enumerate(points):
-                    if isinstance(n.payload, Input):
+                    if isinstance(n.payload, Input) and n.payload.array == "point data":
+                        index = data[0] + data[1] * q + n.payload.index
+                        copies[q][n] = g.input("data", index)
+                    elif isinstance(n.payload, Input):
                         copies[q][n] = g.const(point[n.payload.index])
                     else:
                         args = tuple(at(a, q) for a in n.args)
@@ -314,7 +318,9 @@ STANDARD = (
 )
 
 
-def straight_line(points: Sequence[Sequence[Fraction]]) -> tuple[Pass, ...]:
+def straight_line(
+    points: Sequence[Sequence[Fraction]], data: tuple[int, int] = (0, 0)
+) -> tuple[Pass, ...]:
     """The passes of a kernel whose loop over the points is written out."""
     return (
         Pass("fold", fold),
@@ -322,7 +328,7 @@ def straight_line(points: Sequence[Sequence[Fraction]]) -> tuple[Pass, ...]:
         Pass("powers", powers),
         Pass("common factors", factor),
         Pass("inverses of roots", inverses),
-        unrolled(points),
+        unrolled(points, data),
         Pass("equal values", merge_equal),
         Pass("invariants first", invariants_first),
         Pass("common sums", common_sums),

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from codegen import abi, emit_c, emit_simd, linearise, passes
+from codegen import abi, emit_c, emit_routines, emit_simd, linearise, passes
+from codegen.graph import Routine
 from codegen.model import Definition
 from codegen.order import arranged
 from codegen.schedule import Schedule, schedule, straight_line
@@ -23,6 +24,7 @@ class Function:
     plan: Schedule
     temporaries: int
     trace: list[passes.TraceRow]
+    routines: tuple[Routine, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -37,14 +39,18 @@ class KernelSource:
 def compile_model(definition: Definition) -> KernelSource:
     """All kernels of one model."""
     functions = {t: compile_task(definition, t) for t in linearise.tasks(definition)}
-    text = emit_c.source(definition, [f.text for f in functions.values()])
+    called = dict.fromkeys(r for f in functions.values() for r in f.routines)
+    before = emit_routines.texts(definition, called)
+    text = emit_c.source(definition, [f.text for f in functions.values()], before)
     return KernelSource(definition, text, functions)
 
 
 def compile_task(definition: Definition, task: str) -> Function:
     """One kernel, all stages in order; of several chain rules the one with fewest operations."""
     written_out = definition.unroll and task != abi.Task.FIELDS
-    chosen = passes.straight_line(_points(definition)) if written_out else passes.STANDARD
+    data = (len(definition.data), len(definition.point_data))
+    straight = passes.straight_line(_points(definition), data)
+    chosen = straight if written_out else passes.STANDARD
     tried = [_rewritten(definition, e, chosen) for e in linearise.variants(definition, task)]
     entries, plan, trace = min(tried, key=lambda t: _work(definition, t[1]))
     if task != abi.Task.FIELDS and emit_simd.suits(plan):
@@ -52,7 +58,8 @@ def compile_task(definition: Definition, task: str) -> Function:
         text, temporaries = emit_simd.function(definition, task, entries, plan)
     else:
         text, temporaries = emit_c.function(definition, task, entries, plan)
-    return Function(text, plan, temporaries, trace)
+    routines = tuple(emit_routines.called([x.node for x in entries]))
+    return Function(text, plan, temporaries, trace, routines)
 
 
 def _rewritten(
@@ -120,6 +127,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "interpolated": d.interpolated,
         "parameters": {a.name: a.meaning for a in d.parameters},
         "data": {a.name: a.meaning for a in d.data},
+        "point_data": {a.name: a.meaning for a in d.point_data},
         "fields": [name for name, _ in d.fields],
         "unrolled": d.unroll,
         "rule": {"points": points, "weights": [float(w.evalf(30)) for w in d.rule.weights]},

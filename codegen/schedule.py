@@ -67,11 +67,11 @@ def schedule(roots: Sequence[Node]) -> Schedule:
         outputs = tuple(r for r in varying if level[r] == k)
         ends = [*(s.args[0] for s in feeds), *outputs]
         loop = None
-        once += len(fixed)
+        once += sum(n.op is not Op.ITEM for n in fixed)
         if ends:
             inside = [n for n in _in_loop(ends) if _computed(n)]
             loop = Loop(place(depth_first(inside, ends), set(ends)), feeds, outputs)
-            looped += len(inside) + len(feeds)
+            looped += sum(n.op is not Op.ITEM for n in inside) + len(feeds)
         stages.append(Stage(before, loop))
     return Schedule(tuple(stages), once, looped)
 

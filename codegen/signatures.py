@@ -18,6 +18,8 @@ from codegen.graph import BOOLEAN, Graph, Input, Node, Op, reachable
 
 DIGITS = 50
 AGREE = 30
+OPAQUE = (Op.INPUT, Op.SUM, Op.BRANCH, Op.ITEM)
+"""Values that stand for themselves: a sample would see one side of a branch only."""
 SMALL = mpmath.mpf(1) / 32
 """Size of the unknowns: near the undeformed state volumes are positive and roots have values."""
 POINTS = 2
@@ -33,7 +35,7 @@ def merge_equal(g: Graph, roots: list[Node]) -> list[Node]:
         first: dict[tuple[str, ...], Node] = {}
         same: dict[Node, tuple[Node, int]] = {}
         for n in nodes:
-            if n.op in BOOLEAN or n.op in (Op.CONST, Op.PI, Op.INPUT, Op.SUM, Op.BRANCH):
+            if n.op in BOOLEAN or n.op in (Op.CONST, Op.PI, Op.CALL) or n.op in OPAQUE:
                 continue
             key, sign = _signature([s[n] for s in samples[:POINTS]])
             if not key:
@@ -65,9 +67,10 @@ def _sample(nodes: Sequence[Node], rng: random.Random) -> dict[Node, Value]:
     """Values at one random point; None where there is none (a branch on complex numbers)."""
     values: dict[Node, Value] = {}
     for n in nodes:
-        if n.op in (Op.INPUT, Op.SUM, Op.BRANCH):
-            # Sums and branches stand for themselves: a sample would see one side only.
+        if n.op in OPAQUE:
             values[n] = _random(rng) * (SMALL if _unknown(n) else 1)
+        elif n.op is Op.CALL:
+            values[n] = None
         else:
             args = [values[a] for a in n.args]
             values[n] = None if any(a is None for a in args) else _computed(n, args)

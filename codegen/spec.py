@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from codegen.graph import BOOLEAN, Input, Node, Op, reachable
+from codegen.graph import BOOLEAN, Input, Node, Op, Place, Routine, reachable
 
 ARITY: dict[Op, int] = {
     **dict.fromkeys((Op.CONST, Op.PI, Op.INPUT), 0),
@@ -15,8 +15,18 @@ ARITY: dict[Op, int] = {
     **dict.fromkeys((Op.SIN, Op.COS, Op.NOT, Op.SUM), 1),
     **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR), 2),
     Op.BRANCH: 3,
+    Op.ITEM: 1,
+    Op.CALL: -1,
 }
-PAYLOAD: dict[Op, type] = {Op.CONST: Fraction, Op.POW: Fraction, Op.INPUT: Input, Op.NAME: str}
+"""Operands of each operation; -1: as many as the routine says."""
+PAYLOAD: dict[Op, type] = {
+    Op.CONST: Fraction,
+    Op.POW: Fraction,
+    Op.INPUT: Input,
+    Op.NAME: str,
+    Op.CALL: Routine,
+    Op.ITEM: Place,
+}
 
 
 class IllegalGraphError(ValueError):
@@ -29,8 +39,9 @@ def check(roots: Sequence[Node], *, names: bool = True) -> None:
     `names=False` also forbids NAME nodes: they live only until the passes begin.
     """
     for n in reachable(roots):
-        if len(n.args) != ARITY[n.op]:
-            raise IllegalGraphError(f"{n}: {n.op} takes {ARITY[n.op]} operands")
+        arity = n.payload.inputs if isinstance(n.payload, Routine) else ARITY[n.op]
+        if len(n.args) != arity:
+            raise IllegalGraphError(f"{n}: {n.op} takes {arity} operands")
         if not isinstance(n.payload, PAYLOAD.get(n.op, type(None))):
             raise IllegalGraphError(f"{n}: payload of a wrong kind")
         if any(a.id >= n.id for a in n.args):
@@ -50,3 +61,5 @@ def _check_kinds(n: Node) -> None:
             raise IllegalGraphError(
                 f"{n}: operand {k} is {'no' if k in logical else 'a'} condition"
             )
+        if (a.op is Op.CALL) != (n.op is Op.ITEM):
+            raise IllegalGraphError(f"{n}: results of a routine are taken by item, and only they")

@@ -54,8 +54,8 @@ class Kernel:
     """One kernel family.  Calls take n elements at once; arrays are converted to float64.
 
     coordinates (n, nodes*len(coordinates)) (any, for a kernel that has none), dofs (n, ndof),
-    data (n, len(data)), parameters (len(parameters),) or a mapping by name, rule None for the
-    model's default (the only one when `unrolled`).
+    data (n, len(data)), point_data (n, points, len(point_data)), parameters (len(parameters),) or
+    a mapping by name, rule None for the model's default (the only one when `unrolled`).
     """
 
     name: str
@@ -65,6 +65,7 @@ class Kernel:
     interpolated: str | None
     parameters: tuple[str, ...]
     data: tuple[str, ...]
+    point_data: tuple[str, ...]
     fields: tuple[str, ...]
     tasks: tuple[str, ...]
     default_rule: Rule
@@ -115,6 +116,7 @@ class _Call:
         dofs: Array,
         *,
         data: Array | None = None,
+        point_data: Array | None = None,
         direction: Array | None = None,
         parameters: Array | Mapping[str, float] = (),  # type: ignore[assignment]
         rule: Rule | None = None,
@@ -139,6 +141,10 @@ class _Call:
         self.data = self._array(
             "data", np.empty((self.n, 0)) if data is None else data, (self.n, len(kernel.data))
         )
+        if kernel.point_data or point_data is not None:
+            size = (self.n, len(self.rule.weights), len(kernel.point_data))
+            at_points = self._array("point_data", _or_empty(point_data), size)
+            self.data = np.hstack([self.data, at_points.reshape(self.n, size[1] * size[2])])
         self.parameters = self._array(
             "parameters", self._ordered(parameters), (len(kernel.parameters),)
         )
@@ -216,6 +222,10 @@ class _Call:
         return values
 
 
+def _or_empty(value: Array | None) -> Array:
+    return np.empty(0) if value is None else value
+
+
 _ffi = cffi.FFI()
 
 
@@ -281,6 +291,7 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         interpolated=entry["interpolated"],
         parameters=tuple(entry["parameters"]),
         data=tuple(entry["data"]),
+        point_data=tuple(entry["point_data"]),
         fields=tuple(entry["fields"]),
         tasks=tuple(entry["tasks"]),
         unrolled=entry["unrolled"],

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import mpmath
+import numpy as np
 
 from codegen import build, linearise, pipeline
 from codegen.abi import Task
@@ -117,3 +118,41 @@ def compiled(d: Definition, directory: Path, level: str = "-O1") -> Kernel:
     write(d, directory)
     build.build(directory, extra=(*build.STRICT, level))
     return load_kernel(d.name, directory)
+
+
+def element_state(kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> State:
+    """One element's arguments for the oracle, from those of the kernel's methods."""
+    rule = given.get("rule") or kernel.default_rule
+    table = np.column_stack([rule.points.reshape(len(rule.weights), -1), rule.weights])
+    parameters = given.get("parameters", ())
+    if isinstance(parameters, Mapping):
+        parameters = [parameters[p] for p in kernel.parameters]
+    return State(
+        np.ravel(coordinates).tolist(),
+        np.ravel(dofs).tolist(),
+        np.ravel(given.get("data", ())).tolist(),
+        list(parameters),
+        table.tolist(),
+        () if rule.basis is None else rule.basis.tolist(),
+        np.asarray(given.get("point_data", ())).tolist(),
+    )
+
+
+def off(found: Any, exact: Any) -> float:
+    """Largest difference relative to the largest exact entry; infinite for not-a-number."""
+    expected = np.array(exact, dtype=object).astype(np.float64)
+    difference = np.abs(np.asarray(found) - expected)
+    assert difference.shape == expected.shape
+    if np.isnan(difference).any():
+        return np.inf
+    return float(difference.max() / max(np.abs(expected).max(), 1e-300))
+
+
+def tangent_errors(d: Definition, kernel: Kernel, coordinates: Any, dofs: Any, **given: Any) -> Any:
+    """Errors of residual and of tangent times a random vector against the oracle (see `off`)."""
+    at = element_state(kernel, coordinates, dofs, **given)
+    batched = {k: np.array([v]) if k.endswith("data") else v for k, v in given.items()}
+    R, K = kernel.tangent(np.reshape(coordinates, (1, -1)), np.reshape(dofs, (1, -1)), **batched)
+    oracle = Oracle(d)
+    v = np.random.default_rng(11).uniform(0.5, 1.5, len(at.dofs))
+    return off(R[0], oracle.residual(at)), off(K[0] @ v, oracle.product(at, v.tolist()))

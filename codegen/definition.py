@@ -1,0 +1,53 @@
+"""A finished model as one record: what the compiler gets from a model page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from codegen.graph import Graph, Node
+from codegen.quadrature import QuadratureRule
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A named scalar argument of a kernel and what it means (with its unit)."""
+
+    name: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A finished model: everything the compiler needs, nothing differentiated yet."""
+
+    name: str
+    doc: str
+    nodes: int
+    coordinates: tuple[str, ...]
+    unknowns: tuple[str, ...]
+    interpolated: str | None
+    parameters: tuple[Argument, ...]
+    data: tuple[Argument, ...]
+    point_data: tuple[Argument, ...]
+    rule: QuadratureRule
+    unroll: bool
+    graph: Graph
+    potential: Node
+    constant: tuple[Node, ...]
+    given: Mapping[Node, Mapping[Node, Node]]
+    directions: tuple[Node, ...]
+    waist: tuple[Node, ...]
+    fields: tuple[tuple[str, Node], ...]
+    product: bool = False
+    derivatives: tuple[tuple[str, Node], ...] = ()
+
+    @property
+    def coordinate_width(self) -> int:
+        """Coordinates of one element: components times nodes."""
+        return len(self.coordinates) * self.nodes
+
+    @property
+    def conservative(self) -> bool:
+        """True when the residual is the gradient of the potential (no exceptions)."""
+        return not self.constant and not self.given

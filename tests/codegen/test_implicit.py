@@ -1,0 +1,253 @@
+"""Unknowns eliminated at the point: values, derivatives, failure, history."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+
+from codegen import build, pipeline, quadrature
+from codegen.differentiate import gradient
+from codegen.evaluate import Oracle, State, evaluate
+from codegen.graph import Graph, Node, Op, reachable
+from codegen.lower import ModelError
+from codegen.model import Definition, Model
+from codegen.routines import Newton, inverse
+from codegen.spec import IllegalGraphError, check
+from runtime.kernels import ArgumentError, Kernel, load_kernel
+from tests.codegen.workshop import compiled, difference, element_state, off, tangent_errors
+
+HISTORY = np.array([[0.3], [0.5]])
+NOWHERE = np.zeros((1, 0))
+
+
+def coupled(n: int, *, unroll: bool, name: str = "coupled") -> Definition:
+    """n coupled cubic equations at each point; the first has no diagonal slope at s_0 = 0."""
+    m = Model(f"{name}_{n}", nodes=1, rule=quadrature.gauss(2, 1), unroll=unroll)
+    x, y = m.unknown("x"), m.unknown("y")
+    (k,) = m.parameters(k="stiffness")
+    (h,) = m.point_data(h="history")
+    (xi,) = m.point()
+    e = m.define("e", x * (1 + xi) + y**2)
+
+    def equations(s: list[Any]) -> list[Any]:
+        mixed = [s[(i + 1) % n] for i in range(n)]
+        pairs = enumerate(zip(s, mixed, strict=True))
+        return [a**3 + min(i, 1) * a + k * b - e - h for i, (a, b) in pairs]
+
+    s = m.implicit("s", equations, start=[sp.Integer(0)] * n)
+    m.potential(m.integral("Pi", x * sum((i + 1) * a**2 for i, a in enumerate(s)) + e**2))
+    m.fields(first=s[0], last=s[-1])
+    return m.finish()
+
+
+def one(equation: Callable[..., Any], *, start: Any = 1, name: str = "one", **given: Any) -> Model:
+    """A model with one unknown x and one local unknown s; the page goes on from there."""
+    m = Model(name, nodes=1, rule=quadrature.point_rule())
+    x = m.unknown("x")
+    m.s = m.implicit("s", lambda s: equation(s, x), start=start, **given)  # type: ignore[attr-defined]
+    return m
+
+
+# ------------------------------------------------------------------------------------- the values
+
+
+SIZES = [(1, False), (2, True), (3, False), (5, True)]
+
+
+@pytest.fixture(scope="module")
+def family(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Definition, Kernel]]:
+    """One library of systems of all sizes, looped and written out."""
+    directory = tmp_path_factory.mktemp("coupled")
+    models = {d.name: d for d in (coupled(n, unroll=u) for n, u in SIZES)}
+    texts = pipeline.files([pipeline.compile_model(d) for d in models.values()])
+    for name, text in texts.items():
+        (directory / name).write_text(text, encoding="utf-8")
+    build.build(directory, extra=(*build.STRICT, "-O1"))
+    return {name: (d, load_kernel(name, directory)) for name, d in models.items()}
+
+
+@pytest.mark.parametrize("n", [n for n, _ in SIZES])
+def test_systems_against_the_oracle(n: int, family: Any) -> None:
+    d, kernel = family[f"coupled_{n}"]
+    given: dict[str, Any] = {"parameters": [2.0], "point_data": HISTORY}
+    assert max(tangent_errors(d, kernel, (), [0.7, 0.4], **given)) <= 1e-13
+    at = element_state(kernel, (), [0.7, 0.4], **given)
+    u = np.array([[0.7, 0.4]])
+    named = {**given, "point_data": HISTORY[None]}
+    assert off(kernel.energy(NOWHERE, u, **named), [Oracle(d).potential(at)]) <= 1e-14
+    assert off(kernel.fields_at(NOWHERE, u, **named)[0], Oracle(d).fields(at)) <= 1e-14
+
+
+def test_the_oracle_solves_the_equation_itself() -> None:
+    """s^3 + k s = e + h, checked by putting the oracle's s back; a wrong tangent is refused."""
+    d = coupled(1, unroll=False)
+    at = element_state_of_one(d)
+    for (s, _), (h,), (xi, _) in zip(Oracle(d).fields(at), HISTORY, at.rule, strict=True):
+        with mpmath.workdps(60):
+            e = mpmath.mpf(0.7) * (1 + mpmath.mpf(xi)) + mpmath.mpf(0.4) ** 2
+            assert abs(s**3 + 2 * s - e - mpmath.mpf(h)) < 1e-50
+
+
+def element_state_of_one(d: Definition) -> State:
+    rows = zip(d.rule.points, d.rule.weights, strict=True)
+    table = [[float(x.evalf(30)) for x in (*p, w)] for p, w in rows]
+    return State((), (0.7, 0.4), (), (2.0,), table, (), HISTORY.tolist())
+
+
+def test_a_forgotten_dependence_of_the_equation_is_refused(tmp_path: Path) -> None:
+    """With dg/dp of one operand taken for zero, residual and tangent must both be found wrong."""
+    d = coupled(1, unroll=False)
+    (call,) = (n for n in reachable([d.potential]) if n.op is Op.CALL)
+    routine = call.payload
+    assert isinstance(routine, Newton)
+    spoilt = (d.graph.zero,) * len(routine.by_external[0])
+    object.__setattr__(routine, "by_external", (spoilt,))
+    kernel = compiled(d, tmp_path)
+    errors = tangent_errors(d, kernel, (), [0.7, 0.4], parameters=[2.0], point_data=HISTORY)
+    assert min(errors) > 1e-3
+
+
+def test_local_unknowns_held_constant(tmp_path: Path) -> None:
+    """Frozen in the residual, moving in the tangent: dW/dx at s, then the whole derivative."""
+    m = one(lambda s, x: s + sp.log(s) - x, name="frozen")
+    s, x = m.s, sp.Symbol("x", real=True)  # type: ignore[attr-defined]
+    m.potential(s**2 * x**3, constant=[s])
+    d = m.finish()
+    kernel = compiled(d, tmp_path)
+    assert max(tangent_errors(d, kernel, (), [0.8])) <= 1e-14
+
+
+def test_a_matrix_of_unknowns_and_a_branch(tmp_path: Path) -> None:
+    """A symmetric square root by A A = B; solved only on the side that is taken."""
+    m = Model("root", nodes=1, rule=quadrature.point_rule())
+    a, b = m.unknown("a"), m.unknown("b")
+    B = sp.Matrix([[a, b / 3], [b / 3, 2]])
+    A = m.implicit("A", lambda A: A * A - B, start=sp.eye(2))
+    assert A.shape == (2, 2)
+    m.potential(sp.Piecewise((A.det() ** 3 + A[0, 1] ** 2, a > 0), (a**2 * b, True)))
+    d = m.finish()
+    kernel = compiled(d, tmp_path)
+    for u in ([1.7, 0.9], [-1.5, 0.4]):  # no real root on the other side: never looked for
+        assert max(tangent_errors(d, kernel, (), u)) <= 1e-13
+
+
+# --------------------------------------------------------------------------------------- failure
+
+
+def test_an_equation_without_a_solution_spoils_its_element_only(tmp_path: Path) -> None:
+    m = one(lambda s, x: s**2 + x, name="rootless")
+    s, x = m.s, sp.Symbol("x", real=True)  # type: ignore[attr-defined]
+    # a comparison would swallow the not-a-number: the energy must not come out as x^2
+    m.potential(sp.Piecewise((s * x, s > 0), (x**2, True)))
+    m.fields(constant=sp.Integer(3), s=s)
+    kernel = compiled(m.finish(), tmp_path)
+    X, u = np.zeros((3, 0)), np.array([[-4.0], [1.0], [-9.0]])
+    R, K = kernel.tangent(X, u)
+    results = (
+        kernel.energy(X, u)[:, None],
+        kernel.residual(X, u),
+        R,
+        K[0:, 0],
+        *([kernel.fields_at(X, u)[:, 0]]),
+    )
+    for values in results:
+        assert np.isfinite(values[[0, 2]]).all()
+        assert np.isnan(values[1]).all()
+    np.testing.assert_allclose(kernel.fields_at(X, u)[[0, 2], 0, 1], [2.0, 3.0], rtol=1e-15)
+
+
+def test_too_few_iterations_are_a_failure(tmp_path: Path) -> None:
+    for limit, enough in ((3, False), (30, True)):
+        m = one(lambda s, x: sp.exp(s) - x, start=5, name=f"limit_{limit}", iterations=limit)
+        m.potential(m.s)  # type: ignore[attr-defined]
+        (tmp_path / str(limit)).mkdir()
+        kernel = compiled(m.finish(), tmp_path / str(limit))
+        found = kernel.energy(np.zeros((1, 0)), np.array([[2.0]]))
+        assert np.isfinite(found[0]) == enough
+        assert not enough or abs(found[0] - np.log(2)) < 1e-15
+
+
+def test_a_singular_system_is_a_failure(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="s: unknown 0 does not occur in the equations"):
+        one(lambda s, x: (s - s) * x + x)
+    m = one(lambda s, x: (s - x) ** 2 + x, start=sp.Symbol("x", real=True), name="flat")
+    m.potential(m.s)  # type: ignore[attr-defined]
+    kernel = compiled(m.finish(), tmp_path)
+    assert np.isnan(kernel.residual(np.zeros((1, 0)), np.array([[2.0]]))).all()
+
+
+# ----------------------------------------------------------------------------- inverse and graph
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+def test_the_inverse_and_its_derivative(n: int) -> None:
+    g = Graph()
+    A = [[g.input("dofs", n * i + j) for j in range(n)] for i in range(n)]
+    X = inverse(g, A)
+    check([x for row in X for x in row])
+    rng = np.random.default_rng(7)
+    numbers = rng.uniform(-1, 1, (n, n))
+    numbers[0, 0] = 0.0 if n > 1 else 0.3  # needs pivoting
+    at = {("dofs", k): float(v) for k, v in enumerate(numbers.ravel())}
+    found = np.array([[float(evaluate(x, at)) for x in row] for row in X])
+    np.testing.assert_allclose(found @ numbers, np.eye(n), atol=1e-13)
+    slopes = gradient(g, X[-1][0], [a for row in A for a in row])
+    for k in (0, n * n - 1):
+        exact = difference(X[-1][0], at, k)
+        assert abs(evaluate(slopes[A[k // n][k % n]], at) - exact) <= 1e-30 * (1 + abs(exact))
+
+
+def test_a_routine_is_taken_by_its_items() -> None:
+    d = coupled(2, unroll=False)
+    check([d.potential])
+    (call,) = (n for n in reachable([d.potential]) if n.op is Op.CALL)
+    wrong: list[Node] = [
+        d.graph.node(Op.NEG, (call,)),
+        d.graph.node(Op.CALL, call.args[:-1], call.payload),
+        d.graph.node(Op.CALL, call.args),
+        d.graph.node(Op.ITEM, (call.args[0],), d.graph.run(call.payload, call.args)[0].payload),  # type: ignore[arg-type]
+    ]
+    for n in wrong:
+        with pytest.raises(IllegalGraphError, match=f"#{n.id} "):
+            check([n])
+
+
+# ------------------------------------------------------------------------------------- arguments
+
+
+def test_point_data_are_checked(family: Any) -> None:
+    _, kernel = family["coupled_1"]
+    assert kernel.point_data == ("h",)
+    u = np.zeros((1, 2))
+    for wrong in (None, HISTORY, HISTORY[None, :1], np.zeros((1, 2, 2))):
+        with pytest.raises(ArgumentError, match=r"point_data has shape .* must be \(1, 2, 1\)"):
+            kernel.residual(NOWHERE, u, parameters=[2.0], point_data=wrong)
+
+
+def test_elements_and_points_have_their_own_data(family: Any, rng: np.random.Generator) -> None:
+    for n, _ in SIZES[:2]:
+        _, kernel = family[f"coupled_{n}"]
+        u, h = rng.uniform(0.2, 0.6, (7, 2)), rng.uniform(0.1, 0.5, (7, 2, 1))
+        X = np.zeros((7, 0))
+        together = kernel.residual(X, u, parameters=[2.0], point_data=h)
+        for e in range(7):
+            part = slice(e, e + 1)
+            alone = kernel.residual(X[part], u[part], parameters=[2.0], point_data=h[part])
+            np.testing.assert_array_equal(alone[0], together[e])
+        swapped = kernel.residual(X, u, parameters=[2.0], point_data=h[:, ::-1])
+        assert np.abs(swapped - together).min() > 0
+
+
+def test_as_many_equations_as_unknowns() -> None:
+    m = Model("short", nodes=1, rule=quadrature.point_rule())
+    x = m.unknown("x")
+    with pytest.raises(ModelError, match="s: 1 equations for 2 unknowns"):
+        m.implicit("s", lambda s: [s[0] - x], start=[x, x])
+    with pytest.raises(ModelError, match="0 must be a number > 0"):
+        m.implicit("t", lambda t: t - x, start=x, tolerance=0)
