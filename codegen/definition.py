@@ -41,6 +41,7 @@ class Definition:
     fields: tuple[tuple[str, Node], ...]
     product: bool = False
     derivatives: tuple[tuple[str, Node], ...] = ()
+    tasks: tuple[str, ...] | None = None
 
     @property
     def coordinate_width(self) -> int:

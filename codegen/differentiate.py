@@ -47,6 +47,10 @@ def partials(g: Graph, n: Node) -> Partials:
             return [(a, g.mul(g.const(2), a))] if a is b else [(a, b), (b, a)]
         case Op.NEG:
             return [(a, g.neg(g.one))]
+        case Op.ATAN2:
+            x = n.args[1]
+            scale = g.recip(g.add(g.mul(a, a), g.mul(x, x)))
+            return [(a, g.mul(x, scale)), (x, g.neg(g.mul(a, scale)))]
         case _:
             return [(a, _derivative_of_call(g, n, a))]
 
@@ -72,8 +76,27 @@ def _derivative_of_call(g: Graph, n: Node, a: Node) -> Node:
             return g.call(Op.COS, a)
         case Op.COS:
             return g.neg(g.call(Op.SIN, a))
+        case Op.TAN:
+            return g.add(g.one, g.mul(n, n))
+        case Op.ASIN:
+            return g.recip(g.call(Op.SQRT, _one_minus_square(g, a)))
+        case Op.ACOS:
+            return g.neg(g.recip(g.call(Op.SQRT, _one_minus_square(g, a))))
+        case Op.ATAN:
+            return g.recip(g.add(g.one, g.mul(a, a)))
+        case Op.SINH:
+            return g.call(Op.COSH, a)
+        case Op.COSH:
+            return g.call(Op.SINH, a)
+        case Op.TANH:
+            return g.sub(g.one, g.mul(n, n))
         case _:
             raise DifferentiationError(f"no derivative rule for {n.op}")
+
+
+def _one_minus_square(g: Graph, a: Node) -> Node:
+    """(1 - a)(1 + a), which keeps its digits near a = 1."""
+    return g.mul(g.sub(g.one, a), g.add(g.one, a))
 
 
 @dataclass

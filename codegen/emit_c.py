@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from codegen import abi, support_c
-from codegen.graph import BOOLEAN, Input, Node, Op, Place, Routine, reachable
+from codegen.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine, reachable
 from codegen.model import Definition
 from codegen.schedule import If, Loop, Schedule, Statement
 
@@ -43,6 +43,8 @@ _FORMATS: dict[Op, str] = {
     Op.EXP: "exp({})",
     Op.SIN: "sin({})",
     Op.COS: "cos({})",
+    Op.ATAN2: "atan2({}, {})",
+    **{op: f"{op}({{}})" for op in sorted(ELEMENTARY)},
     Op.LT: "{} < {}",
     Op.LE: "{} <= {}",
     Op.EQ: "{} == {}",

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 from codegen import abi
 from codegen.emit_c import Entry, Printer, number
-from codegen.graph import FREE, Input, Node, Op
+from codegen.graph import ELEMENTARY, FREE, Input, Node, Op
 from codegen.model import Definition
 from codegen.schedule import If, Schedule, Statement
 
 _LETTERS = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
-FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS})
+FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS}) | ELEMENTARY
 
 
 def suits(plan: Schedule) -> bool:
@@ -27,6 +27,29 @@ def suits(plan: Schedule) -> bool:
         and plan.stages[0].loop is None
         and not any(isinstance(s, If) or s.op is Op.CALL for s in plan.stages[0].before)
     )
+
+
+def wrappers(text: str) -> list[str]:
+    """Functions of vectors that `text` calls and that the header does not have."""
+    needed = [op for op in sorted(ELEMENTARY) if f"softehl_v{op}(" in text]
+    one = [
+        f"#if SOFTEHL_LANES == 4\nSOFTEHL_LANEWISE({op})\n#else\n"
+        f"#define softehl_v{op}(a) {op}(a)\n#endif\n"
+        for op in needed
+    ]
+    return one + ([_ATAN2] if "softehl_vatan2(" in text else [])
+
+
+_ATAN2 = """#if SOFTEHL_LANES == 4
+static inline softehl_vec softehl_vatan2(softehl_vec y, softehl_vec x)
+{
+    return (softehl_vec){
+        atan2(y[0], x[0]), atan2(y[1], x[1]), atan2(y[2], x[2]), atan2(y[3], x[3])};
+}
+#else
+#define softehl_vatan2(y, x) atan2(y, x)
+#endif
+"""
 
 
 class _LanePrinter(Printer):
@@ -58,6 +81,8 @@ class _LanePrinter(Printer):
         right = self.expression(s)
         if s.op in FUNCTIONS:
             right = f"softehl_v{s.op}({self.ref(s.args[0])})"
+        elif s.op is Op.ATAN2:
+            right = f"softehl_vatan2({', '.join(self.as_vector(a) for a in s.args)})"
         elif s.op is Op.POW:
             right = f"softehl_vpow({self.ref(s.args[0])}, {number(float(s.payload))})"  # type: ignore[arg-type]
         self.line(depth, f"const V {self.fresh(s)} = {right};")

@@ -32,9 +32,17 @@ _UNARY: dict[Op, Callable[[Number], Number]] = {
     Op.EXP: mpmath.exp,
     Op.SIN: mpmath.sin,
     Op.COS: mpmath.cos,
+    Op.TAN: lambda a: mpmath.sin(a) / mpmath.cos(a),
+    Op.ASIN: mpmath.asin,
+    Op.ACOS: mpmath.acos,
+    Op.ATAN: mpmath.atan,
+    Op.SINH: lambda a: (mpmath.exp(a) - mpmath.exp(-a)) / 2,
+    Op.COSH: lambda a: (mpmath.exp(a) + mpmath.exp(-a)) / 2,
+    Op.TANH: mpmath.tanh,
     Op.NOT: lambda a: not a,
 }
 _BINARY: dict[Op, Callable[[Number, Number], Number]] = {
+    Op.ATAN2: mpmath.atan2,
     Op.ADD: lambda a, b: a + b,
     Op.SUB: lambda a, b: a - b,
     Op.MUL: lambda a, b: a * b,

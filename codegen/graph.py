@@ -40,6 +40,14 @@ class Op(StrEnum):
     EXP = "exp"
     SIN = "sin"
     COS = "cos"
+    TAN = "tan"
+    ASIN = "asin"
+    ACOS = "acos"
+    ATAN = "atan"
+    SINH = "sinh"
+    COSH = "cosh"
+    TANH = "tanh"
+    ATAN2 = "atan2"
     LT = "lt"
     LE = "le"
     EQ = "eq"
@@ -53,6 +61,10 @@ class Op(StrEnum):
 
 
 BOOLEAN = frozenset({Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR, Op.NOT})
+ELEMENTARY = frozenset(
+    {Op.TAN, Op.ASIN, Op.ACOS, Op.ATAN, Op.SINH, Op.COSH, Op.TANH},
+)
+"""Functions of one argument that are those of the C library and nothing more."""
 FREE = frozenset({Op.CONST, Op.PI, Op.INPUT, Op.NAME})
 """Operations that cost nothing at run time."""
 
@@ -254,11 +266,13 @@ class Graph:
         return self.node(Op.POW, (a,), e)
 
     def call(self, op: Op, a: Node) -> Node:
-        """A function of one argument (SQRT, CBRT, RCBRT = 1/CBRT, LOG, EXP, SIN, COS)."""
+        """A function of one argument: SQRT, CBRT, RCBRT = 1/CBRT, LOG, EXP, SIN, ..."""
         if op is Op.LOG and a is self.one:
             return self.zero
         if op is Op.EXP and a is self.zero:
             return self.one
+        if a is self.zero and op in (Op.TAN, Op.ASIN, Op.ATAN, Op.SINH, Op.TANH):
+            return a
         if op in (Op.SQRT, Op.CBRT) and a in (self.zero, self.one):
             return a
         if op is Op.RCBRT and a is self.one:
@@ -304,7 +318,7 @@ class Graph:
         maker = self._makers().get(op)
         if maker is not None:
             return maker(*args)
-        if op in (Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS):
+        if op in (Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS, *ELEMENTARY):
             return self.call(op, args[0])
         return self.node(op, tuple(args), payload)
 

@@ -15,7 +15,7 @@ from codegen.waists import Waist, linear_waist, strip, substitute
 
 
 def tasks(d: Definition) -> list[str]:
-    """What a model offers: an energy only where the residual is its gradient."""
+    """What a model offers: an energy only where the residual is its gradient, or what it chose."""
     offered: list[str] = [Task.RESIDUAL, Task.TANGENT]
     if d.conservative:
         offered.insert(0, Task.ENERGY)
@@ -23,6 +23,8 @@ def tasks(d: Definition) -> list[str]:
         offered.append(Task.FIELDS)
     if d.product:
         offered.append(Task.PRODUCT)
+    if d.tasks is not None:
+        offered = [t for t in offered if t in d.tasks]
     return offered + [derivative_task(name) for name, _ in d.derivatives]
 
 

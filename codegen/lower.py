@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import sympy as sp
@@ -12,7 +15,30 @@ from codegen.graph import Graph, Node, Op
 
 
 class ModelError(ValueError):
-    """The model says something a kernel cannot hold; the message names it."""
+    """The model says something a kernel cannot hold; the message names it and the page's line.
+
+    `where` is the file and line; left out, it is found among the callers: the first one that is
+    not the generator itself (a model that ships is a page like any other).
+    """
+
+    def __init__(self, message: str, where: str | None = None) -> None:
+        place = where or page_line()
+        super().__init__(f"{place}: {message}" if place else message)
+
+
+_HERE = Path(__file__).resolve().parent
+
+
+def page_line() -> str:
+    """File and line of the model page that is being read, e.g. `my_model.py:12`."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        path = Path(frame.f_code.co_filename)
+        ours = path.is_relative_to(_HERE) and not path.is_relative_to(_HERE / "models")
+        if not ours and "sympy" not in path.parts and not path.name.startswith("<"):
+            return f"{path}:{frame.f_lineno}"
+        frame = frame.f_back
+    return ""
 
 
 _FUNCTIONS: dict[type, Op] = {
@@ -20,7 +46,18 @@ _FUNCTIONS: dict[type, Op] = {
     sp.exp: Op.EXP,
     sp.sin: Op.SIN,
     sp.cos: Op.COS,
+    sp.tan: Op.TAN,
+    sp.asin: Op.ASIN,
+    sp.acos: Op.ACOS,
+    sp.atan: Op.ATAN,
+    sp.sinh: Op.SINH,
+    sp.cosh: Op.COSH,
+    sp.tanh: Op.TANH,
 }
+SUPPORTED = (
+    "+ - * / **, sqrt, cbrt, log, exp, sin, cos, tan, asin, acos, atan, atan2, sinh, cosh, tanh, "
+    "Abs, sign, Heaviside, Min, Max, Piecewise"
+)
 
 
 class Lowering:
@@ -40,12 +77,18 @@ class Lowering:
             (sp.Piecewise, lambda e: self._piecewise(list(e.args), e)),
             ((sp.Max, sp.Min), self._extremum),
             (sp.Abs, lambda e: self._absolute(self(e.args[0]))),
+            (sp.sign, lambda e: self._step(self(e.args[0]), (-1, 0, 1))),
+            (sp.Heaviside, lambda e: self._step(self(e.args[0]), (0, e.args[1], 1))),
+            (sp.atan2, lambda e: self.g.node(Op.ATAN2, (self(e.args[0]), self(e.args[1])))),
             (sp.core.relational.Relational, self._relation),
             ((sp.And, sp.Or, sp.Not), self._logic),
         ]
 
     def __call__(self, expression: Any) -> Node:
-        e = sp.sympify(expression)
+        try:
+            e = sp.sympify(expression)
+        except (sp.SympifyError, TypeError, ValueError):
+            raise ModelError(f"{expression!r} is no mathematical expression") from None
         found = self._memo.get(e)
         if found is None:
             found = self._memo[e] = self._convert(e)
@@ -62,9 +105,15 @@ class Lowering:
             if isinstance(e, kind):
                 return rule(e)
         operation = _FUNCTIONS.get(type(e))
-        if operation is None:
-            raise ModelError(f"{type(e).__name__} in {e} has no kernel operation")
-        return self.g.call(operation, self(e.args[0]))
+        if operation is not None:
+            return self.g.call(operation, self(e.args[0]))
+        if isinstance(e, sp.MatrixBase):
+            raise ModelError(f"a matrix of shape {e.shape} where a scalar is needed")
+        if e is sp.I or isinstance(e, (sp.re, sp.im, sp.conjugate)):
+            raise ModelError(f"{e} has no kernel operation: kernels compute with real numbers")
+        raise ModelError(
+            f"{type(e).__name__} in {e} has no kernel operation; there are {SUPPORTED}"
+        )
 
     def _symbol(self, e: Any) -> Node:
         if e not in self.bound:
@@ -84,7 +133,15 @@ class Lowering:
                 bottom = self.g.mul(bottom, self(factor.base**-factor.exp))
             else:
                 top = self.g.mul(top, self(factor))
-        return self.g.div(top, bottom)
+        return self.g.div(top, self._divisor(bottom, e))
+
+    def _divisor(self, n: Node, e: Any) -> Node:
+        value = n
+        while value.op is Op.NAME:
+            value = value.args[0]
+        if value is self.g.zero:
+            raise ModelError(f"{e} divides by zero")
+        return n
 
     def _pow(self, e: Any) -> Node:
         base, exponent = e.base, e.exp
@@ -92,6 +149,8 @@ class Lowering:
             # SymPy makes |x|^(2/3) of (x^2)^(1/3); the square needs no branch
             base, exponent = base.args[0] ** 2, exponent / 2
         base = self(base)
+        if exponent.is_negative:
+            self._divisor(base, e)
         if isinstance(exponent, sp.Rational):
             return self.g.power(base, Fraction(int(exponent.p), int(exponent.q)))
         return self.g.call(Op.EXP, self.g.mul(self(exponent), self.g.call(Op.LOG, base)))
@@ -114,6 +173,13 @@ class Lowering:
 
     def _absolute(self, a: Node) -> Node:
         return self.g.branch(self.g.compare(Op.LT, a, self.g.zero), self.g.neg(a), a)
+
+    def _step(self, a: Node, values: tuple[Any, Any, Any]) -> Node:
+        """One value below zero, one at zero, one above."""
+        below, at, above = (self(v) for v in values)
+        zero = self.g.zero
+        upper = self.g.branch(self.g.compare(Op.LT, zero, a), above, at)
+        return self.g.branch(self.g.compare(Op.LT, a, zero), below, upper)
 
     def _relation(self, e: Any) -> Node:
         a, b = self(e.lhs), self(e.rhs)

@@ -11,11 +11,12 @@ from typing import Any
 
 import sympy as sp
 
+from codegen.abi import Task
 from codegen.definition import Argument, Definition
 from codegen.differentiate import gradient
 from codegen.entries import Entries, fraction
-from codegen.graph import Graph, Node
-from codegen.lower import Lowering, ModelError
+from codegen.graph import Graph, Input, Node, reachable
+from codegen.lower import Lowering, ModelError, page_line
 from codegen.quadrature import QuadratureRule
 from codegen.routines import SYMMETRIC, Control, isotropic, localise, newton, symmetric
 
@@ -53,6 +54,8 @@ class Model:
         self._potential: Node | None = None
         self._product = False
         self._derivatives: list[tuple[str, Node]] = []
+        self._tasks: tuple[str, ...] | None = None
+        self._declared: dict[str, tuple[Node, str]] = {}
 
     # declarations -------------------------------------------------------------------------------
 
@@ -66,12 +69,17 @@ class Model:
             for c, name in enumerate(names)
         ]
 
-    def nodal_unknowns(self, *names: str) -> list[list[sp.Symbol]]:
-        """Unknowns at the nodes, numbered node by node; one list for each component."""
+    def nodal_unknowns(self, *names: str, idle: Sequence[str] = ()) -> list[list[sp.Symbol]]:
+        """Unknowns at the nodes, numbered node by node; one list for each component.
+
+        The `idle` ones of `names` belong to the node but need not enter the mathematics.
+        """
         columns: list[list[sp.Symbol]] = [[] for _ in names]
         for a in range(self.nodes):
             for c, name in enumerate(names):
                 columns[c].append(self.unknown(f"{name}{a + 1}"))
+                if name in idle:
+                    self._declared.pop(f"{name}{a + 1}", None)
         return columns
 
     def unknown(self, name: str) -> sp.Symbol:
@@ -238,19 +246,38 @@ class Model:
         """Quantities to be evaluated at the quadrature points for post-processing."""
         self._fields = [(name, self._lower(value)) for name, value in values.items()]
 
-    def offer(self, *, product: bool = False, derivatives: Sequence[Any] = ()) -> None:
-        """Further tasks: the tangent times a vector, derivatives of the residual by argument.
+    def offer(
+        self,
+        *,
+        tasks: Sequence[str] | None = None,
+        product: bool = False,
+        derivatives: Sequence[Any] = (),
+    ) -> None:
+        """What is generated: tasks by name, derivatives of the residual by argument.
 
+        `tasks` are chosen among energy, residual, tangent (residual and tangent together), fields
+        and product; left out, all but the product.  `product` adds the tangent times a vector.
         `derivatives` lists symbols of parameters, data or coordinates.
         """
-        self._product = product
-        self._derivatives = [(str(s), self._lower(s)) for s in derivatives]
+        known = [str(t) for t in Task]
+        for t in tasks or ():
+            if t not in known:
+                raise ModelError(f"no task {t!r}; there are {', '.join(known)}")
+        self._tasks = None if tasks is None else (*tasks, *([Task.PRODUCT] if product else []))
+        self._product = product or Task.PRODUCT in (tasks or ())
+        nodes = [(str(s), self._lower(s)) for s in derivatives]
+        for name, n in nodes:
+            source = n.payload.array if isinstance(n.payload, Input) else ""
+            if source not in ("parameters", "data", "coordinates"):
+                raise ModelError(f"{name} is no parameter, datum or coordinate to derive by")
+        self._derivatives = nodes
 
     def finish(self) -> Definition:
         """The frozen definition of the model."""
         if self._potential is None:
             raise ModelError(f"model {self.name} has neither a potential nor a weak form")
-        return Definition(
+        self._check_use(self._potential)
+        definition = Definition(
             name=self.name,
             doc=self.doc,
             nodes=self.nodes,
@@ -271,7 +298,27 @@ class Model:
             fields=tuple(self._fields),
             product=self._product,
             derivatives=tuple(self._derivatives),
+            tasks=self._tasks,
         )
+
+        chosen = definition.tasks or ()
+        if Task.ENERGY in chosen and not definition.conservative:
+            raise ModelError(f"no energy for {self.name}: its residual is not the gradient of one")
+        if Task.FIELDS in chosen and not definition.fields:
+            raise ModelError(f"no task fields for {self.name}: it declares none")
+        return definition
+
+    def _check_use(self, potential: Node) -> None:
+        """Every unknown enters the potential, every other argument it or a field."""
+        given = [n for pairs in self._given.values() for n in (*pairs, *pairs.values())]
+        equations = set(reachable([potential, *given]))
+        used = equations | set(reachable([n for _, n in self._fields]))
+        for name, (n, where) in self._declared.items():
+            unknown = isinstance(n.payload, Input) and n.payload.array == "dofs"
+            if n not in (equations if unknown else used):
+                advice = "its residual is zero; is it idle?" if unknown else "leave it out"
+                what = "unknown" if unknown else "argument"
+                raise ModelError(f"the {what} {name} is never used: {advice}", where)
 
     # binding ------------------------------------------------------------------------------------
 
@@ -298,7 +345,11 @@ class Model:
         ]
 
     def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
-        return self._bind(name, self.graph.input(array, index, varying=varying))
+        node = self.graph.input(array, index, varying=varying)
+        symbol = self._bind(name, node)
+        if array in ("dofs", "parameters", "data", "point data"):
+            self._declared.setdefault(name, (node, page_line()))
+        return symbol
 
     def _bind(self, name: str, node: Node) -> sp.Symbol:
         symbol = sp.Symbol(name, real=True)

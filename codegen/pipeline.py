@@ -41,6 +41,7 @@ def compile_model(definition: Definition) -> KernelSource:
     functions = {t: compile_task(definition, t) for t in linearise.tasks(definition)}
     called = dict.fromkeys(r for f in functions.values() for r in f.routines)
     before = emit_routines.texts(definition, called)
+    before += emit_simd.wrappers("".join(f.text for f in functions.values()))
     text = emit_c.source(definition, [f.text for f in functions.values()], before)
     return KernelSource(definition, text, functions)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from codegen.graph import BOOLEAN, Input, Node, Op, Place, Routine, reachable
+from codegen.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine, reachable
 
 ARITY: dict[Op, int] = {
     **dict.fromkeys((Op.CONST, Op.PI, Op.INPUT), 0),
@@ -13,7 +13,8 @@ ARITY: dict[Op, int] = {
         (Op.NAME, Op.NEG, Op.RECIP, Op.POW, Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP), 1
     ),
     **dict.fromkeys((Op.SIN, Op.COS, Op.NOT, Op.SUM), 1),
-    **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR), 2),
+    **dict.fromkeys(ELEMENTARY, 1),
+    **dict.fromkeys((Op.ATAN2, Op.ADD, Op.SUB, Op.MUL, Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR), 2),
     Op.BRANCH: 3,
     Op.ITEM: 1,
     Op.CALL: -1,

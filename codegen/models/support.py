@@ -49,7 +49,7 @@ def axial_spring() -> Definition:
         doc=axial_spring.__doc__ or "",
     )
     X = m.coordinates("Z", "R")
-    u = m.nodal_unknowns("u_z", "u_r")
+    u = m.nodal_unknowns("u_z", "u_r", idle=["u_r"])
     (stiffness,) = m.parameters(stiffness="bedding stiffness [N/mm^3]")
     xi, eta = m.point()
     e = kin.quad4(m, "", X, xi, eta)

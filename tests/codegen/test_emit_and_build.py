@@ -290,8 +290,8 @@ def test_shipped_c_is_plain_c11_without_warnings(tmp_path: Path) -> None:
 def test_documentation_cannot_end_the_comment(tmp_path: Path) -> None:
     m = Model("commented", nodes=1, rule=quadrature.point_rule(), doc="kappa*/mu ratio")
     x = m.unknown("x")
-    m.parameters(k="stiffness [N*/mm]")
-    m.potential(x**2)
+    (k,) = m.parameters(k="stiffness [N*/mm]")
+    m.potential(k * x**2)
     compiled(m.finish(), tmp_path)
 
 

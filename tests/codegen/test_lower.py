@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import mpmath
 import pytest
 import sympy as sp
 
+from codegen import kinematics as kin
 from codegen import quadrature
 from codegen.evaluate import evaluate
 from codegen.graph import Graph, Node, Op, operations, reachable
@@ -46,6 +48,9 @@ def model(**kwargs: Any) -> Model:
         x ** sp.Rational(-2, 3) + y ** sp.Rational(7, 5) + sp.cbrt(x * y),
         x**y + sp.pi * x + sp.E + sp.exp(1 + x),
         sp.Max(x, y, 2) - sp.Min(x, 3 * y, 7) + sp.Abs(x - y) + sp.Abs(y - x),
+        sp.tan(x / 9) + sp.asin(x / 9) - sp.acos(y / 9) * sp.atan(x) + sp.atan2(y, x - 3),
+        sp.sinh(x) * sp.cosh(y) - sp.tanh(x / y),
+        sp.sign(x - 3) * y + sp.Heaviside(y - 3) + 2 * sp.Heaviside(x - 5, 1),
         sp.Piecewise((x**2, x > y), (y**3, x >= 0), (sp.Integer(1), True)),
     ],
     ids=str,
@@ -182,8 +187,12 @@ def test_extrema_and_absolute_value() -> None:
             r"a branch without a last condition: .*end it with \(.., True\)",
         ),
         (sp.gamma(x), r"gamma in gamma\(x\) has no kernel operation"),
-        (1 + sp.tan(y) ** 2, r"tan in tan\(y\)"),
-        (sp.Heaviside(x), "Heaviside in"),
+        (1 + sp.erf(y) ** 2, r"erf in erf\(y\) has no kernel operation; there are .* atan2, sinh"),
+        (sp.DiracDelta(x), "DiracDelta in"),
+        (sp.Matrix([[x, y]]), r"a matrix of shape \(1, 2\) where a scalar is needed"),
+        (sp.sqrt(-2) * x, "I has no kernel operation: kernels compute with real numbers"),
+        (sp.log(-3), "I has no kernel operation: kernels compute with real numbers"),
+        ("x +", "'x \\+' is no mathematical expression"),
         (sp.Function("f")(x), r"f in f\(x\)"),
         (sp.zoo, "zoo has no kernel operation"),
         (sp.nan, "nan has no kernel operation"),
@@ -253,3 +262,63 @@ def test_an_undeclared_constant_is_named() -> None:
     u = m.unknown("u")
     with pytest.raises(ModelError, match="symbol a is not declared"):
         m.potential(u**2, constant=[sp.Symbol("a", real=True)])
+
+
+# ------------------------------------------------------------------------- the line of the page
+
+
+def line_of(text: str) -> int:
+    """Line of this file that holds `text` first."""
+    rows = Path(__file__).read_text(encoding="utf-8").splitlines()
+    return next(k for k, row in enumerate(rows, 1) if text in row)
+
+
+def test_errors_name_file_and_line_of_the_page() -> None:
+    m = model()
+    u = m.unknown("u")
+    with pytest.raises(ModelError) as failed:
+        m.define("g", sp.gamma(u))  # the line that is named
+    place = f"{__file__}:{line_of('the line that ' + 'is named')}: "
+    assert str(failed.value).startswith(place)
+
+
+def test_errors_inside_helpers_name_the_line_of_the_page() -> None:
+    m = model()
+    m.coordinates("X")
+    with pytest.raises(ModelError, match=f"test_lower.py:{line_of('# a helper ' + 'fails')}: "):
+        kin.isoparametric(m, [[sp.Symbol("strange")]], [(1,)])  # a helper fails
+
+
+def test_what_is_never_used_is_named_where_it_was_declared() -> None:
+    m = model()
+    u = m.unknown("u")
+    m.unknown("v")  # the idle unknown
+    m.potential(u**2)
+    place = f"test_lower.py:{line_of('# the idle ' + 'unknown')}: the unknown v is never used"
+    with pytest.raises(ModelError, match=place):
+        m.finish()
+    m = model()
+    u = m.unknown("u")
+    k, c = m.parameters(k="used in a field only", c="never")
+    m.potential(u**2)
+    m.fields(k=k)
+    with pytest.raises(ModelError, match="the argument c is never used"):
+        m.finish()
+    m.fields(k=k + c)
+    assert m.finish().fields
+
+
+def test_idle_unknowns_need_not_be_used() -> None:
+    m = model()
+    (u,), _ = m.nodal_unknowns("u", "v", idle=["v"])
+    m.potential(u**2)
+    assert m.finish().unknowns == ("u1", "v1")
+
+
+def test_a_division_by_zero_is_named() -> None:
+    m = model()
+    u = m.unknown("u")
+    z = m.define("z", sp.Integer(0))
+    for e in (u / z, 1 / z, z ** sp.Rational(-1, 2)):
+        with pytest.raises(ModelError, match="divides by zero"):
+            m.potential(e)
