@@ -1,0 +1,238 @@
+"""The pages of `tests/codegen/pages`: tangents in every branch, rigid motions, closed forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.integrate import solve_ivp
+
+from codegen import shapes
+from codegen.evaluate import Oracle
+from codegen.model import Definition
+from runtime.kernels import Kernel
+from runtime.rules import Rule
+from tests.codegen.pages.gent import gent
+from tests.codegen.pages.maxwell import maxwell
+from tests.codegen.pages.ogden_hex8 import ogden
+from tests.codegen.pages.penalty_spring import penalty_spring
+from tests.codegen.workshop import compiled, element_state, off, tangent_errors
+
+Array = npt.NDArray[np.float64]
+SQUARE = np.array(shapes.QUAD_NODES) / 2.0
+CUBE = np.array(shapes.HEX_NODES) / 2.0
+CENTRE = Rule(np.zeros((1, 3)), np.array([8.0]), None)
+OGDEN = {"mu_1": 1.0, "alpha_1": 1.3, "mu_2": -0.2, "alpha_2": -2.0, "kappa": 10.0}
+GENT = {"mu": 1.2, "Jm": 5.0, "kappa": 10.0}
+MAXWELL = {"mu": 1.0, "kappa": 10.0, "mu_v": 2.0, "tau": 3.0, "dt": 0.5}
+AT_REST = np.array([[1.0, 1.0, 1.0, 0.0]] * 4)
+TURN = np.array([[0.8, -0.6], [0.6, 0.8]])
+Made = tuple[Definition, Kernel]
+
+
+def made(factory: pytest.TempPathFactory, d: Definition) -> Made:
+    return d, compiled(d, factory.mktemp(d.name), "-O0")
+
+
+@pytest.fixture(scope="module")
+def a_gent(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    return made(tmp_path_factory, gent())
+
+
+@pytest.fixture(scope="module")
+def a_maxwell(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    return made(tmp_path_factory, maxwell())
+
+
+@pytest.fixture(scope="module")
+def an_ogden(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    return made(tmp_path_factory, ogden())
+
+
+@pytest.fixture(scope="module")
+def a_spring(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    return made(tmp_path_factory, penalty_spring())
+
+
+def moved(X: Array, F: Array) -> Array:
+    """Displacements (1, n) of the motion x = F X."""
+    return (X @ F.T - X).reshape(1, -1)
+
+
+# ------------------------------------------------------------------------------------------- Gent
+
+
+def test_gent_against_the_oracle(a_gent: Made, rng: np.random.Generator) -> None:
+    d, kernel = a_gent
+    X, u = SQUARE + rng.uniform(-0.1, 0.1, (4, 2)), rng.uniform(-0.1, 0.1, (4, 2))
+    assert max(tangent_errors(d, kernel, X, u, parameters=GENT)) <= 1e-14
+    at = element_state(kernel, X, u, parameters=GENT)
+    fields = kernel.fields_at(X.reshape(1, 8), u.reshape(1, 8), parameters=GENT)
+    assert off(fields[0], Oracle(d).fields(at)) <= 1e-14
+
+
+def test_gent_closed_forms(a_gent: Made) -> None:
+    """Simple shear g: sigma_xy = mu g / (1 - g^2/Jm); rigid motion: no force; no energy beyond the limit."""
+    _, kernel = a_gent
+    X, g = SQUARE.reshape(1, 8), 0.4
+    shear = moved(SQUARE, np.array([[1.0, g], [0.0, 1.0]]))
+    sigma = kernel.fields_at(X, shear, parameters=GENT)[0, :, 3]
+    np.testing.assert_allclose(sigma, 1.2 * g / (1 - g**2 / 5), rtol=1e-14)
+    assert np.abs(kernel.residual(X, moved(SQUARE, TURN), parameters=GENT)).max() < 1e-14
+    far = moved(SQUARE, np.array([[1.0, 3.0], [0.0, 1.0]]))
+    assert np.isnan(kernel.energy(X, far, parameters=GENT)).all()
+
+
+# ------------------------------------------------------------------------------------------ Ogden
+
+
+@pytest.mark.parametrize("strain", [0.1, 0.0])
+def test_ogden_against_the_oracle(strain: float, an_ogden: Made, rng: np.random.Generator) -> None:
+    """At one point, which is as good as eight: distinct stretches, and a turned cube at rest."""
+    d, kernel = an_ogden
+    X = CUBE + rng.uniform(-0.1, 0.1, (8, 3))
+    u = rng.uniform(-strain, strain, (8, 3)) if strain else X @ np.eye(3)[[1, 2, 0]].T - X
+    errors = tangent_errors(d, kernel, X, u, parameters=OGDEN, rule=CENTRE)
+    assert errors[1] <= 1e-14
+    assert strain == 0 or errors[0] <= 1e-14  # at rest the residual is rounding and nothing else
+    R = kernel.residual(X.reshape(1, 24), u.reshape(1, 24), parameters=OGDEN)
+    assert strain or np.abs(R).max() < 1e-14
+
+
+def test_ogden_in_tension(an_ogden: Made) -> None:
+    """Force on a face of the unit cube: dW/dl_1 at stretches l_1, l_2 = l_3."""
+    _, kernel = an_ogden
+    l1, l2 = 1.6, 0.8
+    J, bar = l1 * l2 * l2, np.array([l1, l2, l2]) / (l1 * l2 * l2) ** (1 / 3)
+    terms = [(OGDEN["mu_1"], OGDEN["alpha_1"]), (OGDEN["mu_2"], OGDEN["alpha_2"])]
+    force = sum(mu * (bar[0] ** a - np.mean(bar**a)) / l1 for mu, a in terms)
+    force += OGDEN["kappa"] * (J - 1) * l2 * l2
+    u = moved(CUBE, np.diag([l1, l2, l2]))
+    R = kernel.residual(CUBE.reshape(1, 24), u, parameters=OGDEN).reshape(8, 3)
+    assert R[CUBE[:, 0] > 0, 0].sum() == pytest.approx(force, rel=1e-13)
+
+
+def test_ogden_at_rest_is_linear_elasticity(an_ogden: Made) -> None:
+    """Stress 2 mu dev(eps) + kappa tr(eps), mu = sum mu_p alpha_p / 2: three equal stretches."""
+    _, kernel = an_ogden
+    shear = (1.0 * 1.3 + 0.2 * 2.0) / 2
+    _, K = kernel.tangent(CUBE.reshape(1, 24), np.zeros((1, 24)), parameters=OGDEN)
+    eps = np.array([[0.3, 0.1, 0.0], [0.1, -0.2, 0.25], [0.0, 0.25, 0.4]])
+    force = (K[0] @ (CUBE @ eps).ravel()).reshape(8, 3)
+    stress = 2 * shear * (eps - np.trace(eps) / 3 * np.eye(3)) + 10.0 * np.trace(eps) * np.eye(3)
+    np.testing.assert_allclose(CUBE.T @ force, stress, rtol=0, atol=1e-13)
+
+
+# ----------------------------------------------------------------------------------------- spring
+
+
+@pytest.mark.parametrize(("u", "closed"), [((0.1, 0.2), True), ((1.5, 0.2), False)])
+def test_spring_in_both_branches(u: tuple[float, float], closed: bool, a_spring: Made) -> None:
+    d, kernel = a_spring
+    parameters = [3.0, 0.0, 0.1, 1.0]
+    X, at = np.array([[0.3, 0.2]]), np.array([u])
+    _, K = kernel.tangent(X, at, parameters=parameters)
+    assert K.any() == closed
+    if closed:
+        assert max(tangent_errors(d, kernel, X, u, parameters=parameters)) <= 1e-14
+    x = X[0] + u - [0.0, 0.1]
+    gap = np.hypot(*x) - 1
+    R = kernel.residual(X, at, parameters=parameters)[0]
+    np.testing.assert_allclose(R, 3 * min(gap, 0) * x / np.hypot(*x), rtol=1e-14)
+    v = np.array([[0.3, -0.7]])
+    np.testing.assert_allclose(
+        kernel.product(X, at, v, parameters=parameters)[0], K[0] @ v[0], rtol=1e-14
+    )
+    slope = kernel.derivative("r", X, at, parameters=parameters)[0]
+    np.testing.assert_allclose(slope, -3 * closed * x / np.hypot(*x), rtol=1e-14)
+
+
+# ---------------------------------------------------------------------------------------- Maxwell
+
+
+def test_maxwell_against_the_oracle(a_maxwell: Made, rng: np.random.Generator) -> None:
+    d, kernel = a_maxwell
+    X, u = SQUARE + rng.uniform(-0.1, 0.1, (4, 2)), rng.uniform(-0.2, 0.2, (4, 2))
+    old = AT_REST + rng.uniform(-0.1, 0.1, (4, 4))
+    given: dict[str, Any] = {"parameters": MAXWELL, "point_data": old}
+    assert max(tangent_errors(d, kernel, X, u, **given)) <= 1e-14
+
+
+def stepped(kernel: Kernel, u: Array, steps: int, **changed: float) -> Array:
+    """History (1, 4, 4) after `steps` at a fixed deformation, from rest."""
+    history = AT_REST[None]
+    for _ in range(steps):
+        history = kernel.fields_at(
+            SQUARE.reshape(1, 8), u, parameters={**MAXWELL, **changed}, point_data=history
+        )
+    return history
+
+
+def test_maxwell_in_closed_form(a_maxwell: Made, rng: np.random.Generator) -> None:
+    """C_v is the unimodular part of C_v,old + dt/tau Cbar (Shutov et al. 2013)."""
+    _, kernel = a_maxwell
+    F, old = np.eye(3), AT_REST + rng.uniform(-0.1, 0.1, (4, 4))
+    F[:2, :2] += rng.uniform(-0.3, 0.3, (2, 2))
+    C = F.T @ F * np.linalg.det(F) ** (-2 / 3)
+    found = kernel.fields_at(
+        SQUARE.reshape(1, 8),
+        moved(SQUARE, F[:2, :2]),
+        parameters=MAXWELL,
+        point_data=old[None],
+    )
+    for (a, b, c, d), now in zip(old, found[0], strict=True):
+        step = np.array([[a, d, 0], [d, b, 0], [0, 0, c]]) + 0.5 / 3.0 * C
+        step /= np.linalg.det(step) ** (1 / 3)
+        np.testing.assert_allclose(now, step[[0, 1, 2, 0], [0, 1, 2, 1]], rtol=0, atol=1e-14)
+
+
+def test_maxwell_relaxes(a_maxwell: Made) -> None:
+    """Small shear held: backward Euler leaves (1 + dt/tau)^-n of the branch's force."""
+    _, kernel = a_maxwell
+    X, u = SQUARE.reshape(1, 8), moved(SQUARE, np.array([[1.0, 1e-5], [0.0, 1.0]]))
+    forces = []
+    for n in (1, 2, 5):
+        before = stepped(kernel, u, n - 1)
+        R = kernel.residual(X, u, parameters=MAXWELL, point_data=before).reshape(4, 2)
+        forces.append(R[SQUARE[:, 1] > 0, 0].sum())
+    expected = [1e-5 * (1.0 + 2.0 * (1 + 0.5 / 3.0) ** -n) for n in (1, 2, 5)]
+    np.testing.assert_allclose(forces, expected, rtol=1e-8)
+
+
+def test_maxwell_flows_to_rest_and_follows_the_differential_equation(a_maxwell: Made) -> None:
+    """At a large fixed shear C_v tends to Cbar; with small steps C_v is the exact solution."""
+    _, kernel = a_maxwell
+    F = np.array([[1.0, 0.9], [0.0, 1.0]])
+    u = moved(SQUARE, F)
+    C = np.eye(3)
+    C[:2, :2] = F.T @ F
+    end = stepped(kernel, u, 60, dt=2.0)
+    np.testing.assert_allclose(end[0, 0], [C[0, 0], C[1, 1], 1.0, C[0, 1]], rtol=1e-12)
+
+    def rate(_: float, v: Array) -> Array:
+        Cv = v.reshape(3, 3)
+        change: Array = (C - np.trace(C @ np.linalg.inv(Cv)) / 3 * Cv) / 3.0
+        return change.ravel()
+
+    exact = solve_ivp(rate, (0, 1.0), np.eye(3).ravel(), rtol=1e-11, atol=1e-12).y[:, -1]
+    errors = [
+        np.abs(stepped(kernel, u, n, dt=1.0 / n)[0, 0] - exact[[0, 4, 8, 1]]).max()
+        for n in (20, 40, 80)
+    ]
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    np.testing.assert_allclose(orders, 1.0, atol=0.05)
+
+
+def test_maxwell_knows_rigid_motions(a_maxwell: Made, rng: np.random.Generator) -> None:
+    """History is material: a turn on top of a deformation turns the forces and no more."""
+    _, kernel = a_maxwell
+    F = np.eye(2) + rng.uniform(-0.2, 0.2, (2, 2))
+    old = (AT_REST + rng.uniform(-0.05, 0.05, (4, 4)))[None]
+    X, given = SQUARE.reshape(1, 8), {"parameters": MAXWELL, "point_data": old}
+    R = kernel.residual(X, moved(SQUARE, F), **given).reshape(4, 2)
+    turned = kernel.residual(X, moved(SQUARE, TURN @ F), **given).reshape(4, 2)
+    np.testing.assert_allclose(turned, R @ TURN.T, rtol=0, atol=1e-14)
+    rest = kernel.residual(X, moved(SQUARE, TURN), parameters=MAXWELL, point_data=AT_REST[None])
+    assert np.abs(rest).max() < 1e-14
