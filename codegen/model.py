@@ -31,10 +31,16 @@ class Model:
     """
 
     def __init__(
-        self, name: str, *, nodes: int, rule: QuadratureRule, unroll: bool = False, doc: str = ""
+        self,
+        name: str,
+        *,
+        nodes: int,
+        rule: QuadratureRule,
+        unroll: bool = False,
+        doc: str | None = "",
     ) -> None:
         self.name, self.nodes, self.rule, self.unroll = name, nodes, rule, unroll
-        self.doc = " ".join(doc.split())
+        self.doc = " ".join((doc or "").split())
         self.graph = Graph()
         self._bound: dict[sp.Symbol, Node] = {}
         self._lower = Lowering(self.graph, self._bound)

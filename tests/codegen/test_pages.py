@@ -74,7 +74,7 @@ def test_gent_against_the_oracle(a_gent: Made, rng: np.random.Generator) -> None
 
 
 def test_gent_closed_forms(a_gent: Made) -> None:
-    """Simple shear g: sigma_xy = mu g / (1 - g^2/Jm); rigid motion: no force; no energy beyond the limit."""
+    """Simple shear g: sigma_xy = mu g / (1 - g^2/Jm); a rigid motion; beyond the limit."""
     _, kernel = a_gent
     X, g = SQUARE.reshape(1, 8), 0.4
     shear = moved(SQUARE, np.array([[1.0, g], [0.0, 1.0]]))

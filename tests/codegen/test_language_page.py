@@ -1,0 +1,59 @@
+"""`docs/language.md`: its examples run, compile and are right; it names what there is."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from codegen.lower import SUPPORTED
+from codegen.model import Definition, Model
+from runtime.kernels import Kernel
+from tests.codegen.workshop import compiled, tangent_errors
+
+PAGE = (Path(__file__).parents[2] / "docs" / "language.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+SQUARE = [-0.5, -0.5, 0.5, -0.5, 0.5, 0.5, -0.5, 0.5]
+MOVED = [0.1, 0.05, 0.2, -0.1, 0.15, 0.1, -0.05, 0.2]
+CALLS: dict[str, tuple[list[float], list[float], dict[str, Any]]] = {
+    "definition": (SQUARE, MOVED, {"parameters": [1.0, 2.0]}),
+    "stop": ([], [1.5], {"parameters": [3.0, 1.0]}),
+    "creep": (
+        [0.0, 2.0],
+        [0.0, 0.3],
+        {"parameters": [2.0, 0.7, 0.5], "point_data": np.array([[0.02]])},
+    ),
+    "ogden": (SQUARE, MOVED, {"parameters": [1.0, 1.7]}),
+}
+
+
+@pytest.fixture(scope="module")
+def names() -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for block in BLOCKS:
+        exec(compile(block, "docs/language.md", "exec"), found)
+    return found
+
+
+def test_every_model_of_the_page_is_called(names: dict[str, Any]) -> None:
+    assert {k for k, v in names.items() if isinstance(v, Definition)} == set(CALLS)
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_examples_against_the_oracle(name: str, names: dict[str, Any], tmp_path: Path) -> None:
+    X, u, given = CALLS[name]
+    kernel: Kernel = compiled(names[name], tmp_path, "-O0")
+    assert max(tangent_errors(names[name], kernel, X, u, **given)) <= 1e-14
+    if name == "ogden":
+        assert kernel.tasks == ("residual", "tangent", "product", "d_alpha", "d_X3")
+
+
+def test_the_page_names_everything() -> None:
+    said = set(re.findall(r"`(?:\w+(?:, \w+)* = )?m\.(\w+)", PAGE))
+    there = {n for n in vars(Model) if not n.startswith("_")}
+    assert there <= said | {"doc"}
+    functions = set(re.findall(r"\w+", SUPPORTED))
+    assert functions <= set(re.findall(r"\w+", PAGE))
