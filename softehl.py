@@ -102,11 +102,21 @@ def _commands() -> "click.Group":
     @click.argument("models", metavar="[MODEL.py]...", nargs=-1, type=click.Path(path_type=Path))
     @click.option("--check", is_flag=True, help="Write nothing; exit 1 if generated/ is stale.")
     @click.option("--trace", metavar="KERNEL", help="Show what each pass did to a kernel.")
-    def generate(models: tuple[Path, ...], check: bool, trace: str | None) -> int:
+    @click.option(
+        "--target",
+        type=click.Choice(["simd", "scalar", "ufcx"]),
+        default="simd",
+        show_default=True,
+        help="Four elements at once, one at a time, or cells for DOLFINx.",
+    )
+    @click.option("--out", type=click.Path(path_type=Path), help="Folder of another target.")
+    def generate(
+        models: tuple[Path, ...], check: bool, trace: str | None, target: str, out: Path | None
+    ) -> int:
         """Regenerate the C files from the models (all of them if none is named)."""
         from codegen.cli import generate
 
-        return generate(models, check, trace)
+        return generate(models, check, trace, target, out)
 
     @commands.command()
     def kernels() -> int:

@@ -44,6 +44,35 @@ A kernel keeps no state, allocates nothing, reports nothing: a value outside the
 comes out as not-a-number.  An element in which a local iteration (`Model.implicit`) finds no
 solution, or in which a function of stretches meets a matrix that is not positive definite, is
 not-a-number in *every* entry of its `values` and `tangent`; the other elements are not touched.
+
+Targets
+-------
+`simd` (the default): the functions above, four elements at once where the kernel has neither a
+loop nor a branch.  The lanes are the vector extensions of gcc >= 12 and clang; another compiler,
+or `-DSOFTEHL_LANES=1`, gets groups of one element from the same source.
+`scalar`: the functions above, one element after another, plain C11.
+`ufcx`: one cell at a time for DOLFINx custom kernels.  The tasks `energy`, `residual`, `tangent`
+and `d_NAME` of a family become functions `softehl_NAME_TASK_ufcx` of UFCx's type,
+
+    void f(double *A, const double *w, const double *c, const double *coordinate_dofs,
+           const int *entity_local_index, const uint8_t *quadrature_permutation,
+           void *custom_data);
+
+| argument                 | shape              | meaning                                        |
+|--------------------------|--------------------|------------------------------------------------|
+| `A`                      | 1, ndof, ndof*ndof | **accumulated** (UFCx adds, the caller clears):|
+|                          |                    | energy, residual, or tangent row-major         |
+| `w`                      | ndof + ndata       | unknowns of the cell, then its data            |
+| `c`                      | nparameters        | parameters, in the manifest's order            |
+| `coordinate_dofs`        | nodes, 3           | vertices (x, y, z); the plane ones read (x, y) |
+| `entity_local_index`     |                    | not read, may be NULL                          |
+| `quadrature_permutation` |                    | not read, may be NULL                          |
+| `custom_data`            |                    | not read, may be NULL                          |
+
+Vertices, and with them the nodal unknowns in `w` and the rows and columns of `A`, stand in the
+order of DOLFINx (basix): `VERTEX_ORDER` says which of its vertices each node of the model is.
+A quadrilateral runs around in a model and in tensor-product order in DOLFINx.  The components of
+one node stay neighbours, as in a blocked element; unknowns that belong to no node follow.
 """
 
 from __future__ import annotations
@@ -59,6 +88,18 @@ class Task(StrEnum):
     TANGENT = "tangent"
     FIELDS = "fields"
     PRODUCT = "product"
+
+
+class Target(StrEnum):
+    """For whom a kernel is printed."""
+
+    SIMD = "simd"
+    SCALAR = "scalar"
+    UFCX = "ufcx"
+
+
+VERTEX_ORDER = {(4, 2): (0, 1, 3, 2), (8, 3): (0, 1, 3, 2, 4, 5, 7, 6)}
+"""DOLFINx vertex of each node, by (nodes, parent dimension); the same number where not listed."""
 
 
 def derivative_task(name: str) -> str:
@@ -78,6 +119,13 @@ ARGUMENTS = (
 )
 
 
+UFCX_ARGUMENTS = (
+    "double *restrict A, const double *restrict w, const double *restrict c,",
+    "const double *restrict coordinate_dofs, const int *restrict entity_local_index,",
+    "const uint8_t *restrict quadrature_permutation, void *custom_data",
+)
+
+
 def function_name(family: str, task: str) -> str:
     """Name of the C function of a family and task."""
     return f"{PREFIX}_{family}_{task}"
@@ -87,3 +135,9 @@ def declaration(family: str, task: str) -> str:
     """C prototype without the semicolon."""
     lines = "\n    ".join(ARGUMENTS)
     return f"void {function_name(family, task)}(\n    {lines})"
+
+
+def ufcx_declaration(family: str, task: str) -> str:
+    """C prototype of target `ufcx` without the semicolon."""
+    lines = "\n    ".join(UFCX_ARGUMENTS)
+    return f"void {function_name(family, task)}_ufcx(\n    {lines})"

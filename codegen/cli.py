@@ -11,18 +11,30 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Column, Table
 
-from codegen import pipeline
+from codegen import pipeline, targets
+from codegen.abi import Target
 from codegen.build import GENERATED
 from codegen.models import ALL
 
 
-def generate(models: Sequence[Path] = (), check: bool = False, trace: str | None = None) -> int:
-    """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1)."""
+def generate(
+    models: Sequence[Path] = (),
+    check: bool = False,
+    trace: str | None = None,
+    target: str = Target.SIMD,
+    out: Path | None = None,
+) -> int:
+    """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1).
+
+    Another `target` than simd goes into the folder `out`.
+    """
     if models:
         print("softehl: models from other files are not available yet", file=sys.stderr)
         return 2
     if trace is not None:
         return _trace(trace)
+    if target != Target.SIMD or out is not None:
+        return targets.write((make() for make in ALL.values()), Target(target), out)
     files = pipeline.files(pipeline.compile_model(make()) for make in ALL.values())
     stale = [name for name, text in files.items() if _differs(GENERATED / name, text)]
     known = {*files, "__init__.py"}

@@ -42,6 +42,8 @@ class Definition:
     product: bool = False
     derivatives: tuple[tuple[str, Node], ...] = ()
     tasks: tuple[str, ...] | None = None
+    nodal: tuple[tuple[int, int], ...] = ()
+    """First unknown and number of components of every field with unknowns at the nodes."""
 
     @property
     def coordinate_width(self) -> int:

@@ -48,6 +48,7 @@ class Model:
         self._unknowns: list[str] = []
         self._interpolated: str | None = None
         self._directions: list[Node] = []
+        self._nodal: list[tuple[int, int]] = []
         self._arguments: dict[str, list[Argument]] = {
             "parameters": [],
             "data": [],
@@ -81,6 +82,7 @@ class Model:
         The `idle` ones of `names` belong to the node but need not enter the mathematics.
         """
         columns: list[list[sp.Symbol]] = [[] for _ in names]
+        self._nodal.append((len(self._unknowns), len(names)))
         for a in range(self.nodes):
             for c, name in enumerate(names):
                 columns[c].append(self.unknown(f"{name}{a + 1}"))
@@ -305,6 +307,7 @@ class Model:
             product=self._product,
             derivatives=tuple(self._derivatives),
             tasks=self._tasks,
+            nodal=tuple(self._nodal),
         )
 
         chosen = definition.tasks or ()

@@ -1,8 +1,8 @@
 """The hand-written part of the generated header: lanes, transposing loads and stores, roots."""
 
-TEXT = r"""
+LANES = r"""
 /* One lane per element.  Without vector extensions a group is one element. */
-#if defined(__GNUC__) && defined(__has_builtin)
+#if !defined(SOFTEHL_LANES) && defined(__GNUC__) && defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
 #define SOFTEHL_LANES 4
 #endif
@@ -10,13 +10,17 @@ TEXT = r"""
 #ifndef SOFTEHL_LANES
 #define SOFTEHL_LANES 1
 #endif
+"""
 
+ROOTS = r"""
 /* a^(-1/3) for a > 0, not-a-number otherwise. */
 static inline double softehl_rcbrt(double a)
 {
     return a > 0.0 ? 1.0 / cbrt(a) : NAN;
 }
+"""
 
+VECTORS = r"""
 #if SOFTEHL_LANES == 4
 typedef double softehl_vec __attribute__((vector_size(32)));
 typedef long long softehl_bits __attribute__((vector_size(32)));
@@ -180,3 +184,5 @@ static inline void softehl_pad(double *to, const double *from, ptrdiff_t width, 
             to[e * width + k] = from[(e < count ? e : count - 1) * width + k];
 }
 """
+
+TEXT = LANES + ROOTS + VECTORS

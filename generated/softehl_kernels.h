@@ -6,7 +6,7 @@
 #include <stddef.h>
 
 /* One lane per element.  Without vector extensions a group is one element. */
-#if defined(__GNUC__) && defined(__has_builtin)
+#if !defined(SOFTEHL_LANES) && defined(__GNUC__) && defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
 #define SOFTEHL_LANES 4
 #endif

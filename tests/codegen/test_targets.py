@@ -1,0 +1,105 @@
+"""Targets: which printer, which files; four lanes, one lane and scalar C say the same."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from codegen import build, cli, pipeline
+from codegen.abi import Target
+from codegen.models import ALL
+from runtime.kernels import Kernel, load_kernel
+from tests.codegen.element_states import Case, all_cases
+
+FAMILIES = ("solid_taylor", "contact", "axial_spring")
+CASES = [c for c in all_cases() if c.family in FAMILIES]
+
+
+@pytest.fixture(scope="module")
+def scalar(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Kernels of target `scalar`."""
+    directory = tmp_path_factory.mktemp("scalar")
+    kernels = [pipeline.compile_model(ALL[name](), Target.SCALAR) for name in FAMILIES]
+    for name, text in pipeline.files(kernels).items():
+        (directory / name).write_text(text, encoding="utf-8")
+    build.build(directory, extra=(*build.STRICT, "-O1"))
+    return directory
+
+
+@pytest.fixture(scope="module")
+def one_lane(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shipped C as a compiler without vector extensions reads it."""
+    directory = tmp_path_factory.mktemp("one_lane")
+    for source in (*build.GENERATED.glob("*.[ch]"), build.GENERATED / "manifest.json"):
+        shutil.copy(source, directory)
+    build.build(directory, extra=(*build.STRICT, "-Wpedantic", "-O1", "-DSOFTEHL_LANES=1"))
+    return directory
+
+
+def values(kernel: Kernel, case: Case) -> list[Any]:
+    """All that a kernel says about a batch of three elements."""
+    X, u, a = (np.tile(v, (3, 1)) for v in (case.coordinates, case.dofs, case.data))
+    given: dict[str, Any] = {"data": a, "parameters": case.parameters}
+    out = [kernel.residual(X, u, **given), *kernel.tangent(X, u, **given)]
+    return out + ([kernel.energy(X, u, **given)] if "energy" in kernel.tasks else [])
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda c: f"{c.family}: {c.label}")
+@pytest.mark.parametrize("other", ["scalar", "one_lane"])
+def test_targets_agree(case: Case, other: str, request: pytest.FixtureRequest) -> None:
+    directory: Path = request.getfixturevalue(other)
+    found = values(load_kernel(case.family, directory), case)
+    expected = values(load_kernel(case.family), case)
+    for a, b in zip(found, expected, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-13 * np.abs(b).max())
+
+
+def test_scalar_c_has_no_vectors(scalar: Path) -> None:
+    shipped = (build.GENERATED / "solid_taylor.c").read_text()
+    plain = (scalar / "solid_taylor.c").read_text()
+    assert "_group(" in shipped
+    assert "const V " in shipped
+    assert "_group(" not in plain
+    assert "const V " not in plain
+
+
+def test_the_default_is_simd_where_it_suits() -> None:
+    """A branch (contact) and a field at the points are printed one element at a time."""
+    kernel = pipeline.compile_model(ALL["contact"]())
+    assert all("const V " not in f.text for f in kernel.functions.values())
+    solid = pipeline.compile_model(ALL["axial_spring"]())
+    assert all("const V " in f.text for f in solid.functions.values())
+
+
+# ------------------------------------------------------------------------------- the command line
+
+
+def test_generate_writes_cells_for_dolfinx(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(cli, "ALL", {k: ALL[k] for k in ("contact", "film")})
+    assert cli.generate(target="ufcx", out=tmp_path / "cells") == 0
+    printed = capsys.readouterr()
+    assert "left out: film interpolates p" in printed.err
+    assert "1 files of target ufcx" in printed.out
+    assert [p.name for p in (tmp_path / "cells").iterdir()] == ["contact_ufcx.c"]
+
+
+def test_generate_writes_a_complete_folder_of_scalar_c(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cli, "ALL", {"contact": ALL["contact"]})
+    assert cli.generate(target="scalar", out=tmp_path) == 0
+    build.build(tmp_path, extra=("-O0",))
+    assert load_kernel("contact", tmp_path).tasks == ("residual", "tangent")
+
+
+def test_another_target_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.generate(target="ufcx") == 2
+    assert capsys.readouterr().err == (
+        "softehl: generated/ holds target simd only, give --out FOLDER for target ufcx\n"
+    )

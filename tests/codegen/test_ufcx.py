@@ -1,0 +1,202 @@
+"""Target `ufcx`: called cell by cell as DOLFINx does it, against the batched kernels.
+
+The order of the vertices and the accumulation are written out here by hand; the batched kernels
+are those that `test_oracle.py` holds against 90 digits.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from codegen import emit_ufcx, pipeline, quadrature
+from codegen.abi import Target
+from codegen.model import Definition, Model
+from codegen.models import ALL
+from runtime.assembly import Assembler, ElementBlock
+from runtime.kernels import load_kernel
+from tests.codegen.cell_kernels import TENSOR, Array, CellKernels, Plane, cell_kernels, distorted
+from tests.codegen.element_states import MATERIALS, Case, all_cases
+from tests.codegen.workshop import compiled
+
+LIMIT = 1e-12
+FAMILIES = tuple(name for name in ALL if name != "film")
+CASES = {f"{c.family}: {c.label}": c for c in all_cases() if c.family != "film"}
+QUADS = ("solid_q4", "solid_fbar", "solid_taylor", "mean_rotation", "axial_spring")
+
+
+@pytest.fixture(scope="module")
+def cells(tmp_path_factory: pytest.TempPathFactory) -> dict[str, CellKernels]:
+    directory = tmp_path_factory.mktemp("ufcx")
+    return {name: cell_kernels(ALL[name](), directory) for name in FAMILIES}
+
+
+def order(case: Case) -> list[int]:
+    """Place in DOLFINx's cell of each unknown of ours."""
+    nodes = TENSOR if case.family in QUADS else range(len(case.coordinates) // 2)
+    nodal = [2 * v + c for v in nodes for c in (0, 1)]
+    return [*nodal, *range(len(nodal), len(case.dofs))]
+
+
+def called(kernels: CellKernels, case: Case, task: str, start: float = 0.0) -> Array:
+    """One cell in DOLFINx's order, its result in ours."""
+    ndof, at = len(case.dofs), order(case)
+    X = case.coordinates.reshape(-1, 2)
+    vertices = np.full((len(X), 3), np.nan)
+    vertices[[p // 2 for p in at[: 2 * len(X) : 2]], :2] = X
+    w = np.empty(ndof)
+    w[at] = case.dofs
+    A = np.full(ndof if task == "residual" else (ndof, ndof), start)
+    kernels.add(task, A, [*w, *case.data], case.parameters, vertices)
+    return A[at] if task == "residual" else A[np.ix_(at, at)]
+
+
+def close(a: Array, b: Array) -> bool:
+    return bool(np.abs(a - b).max() <= LIMIT * np.abs(b).max())
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_cell_is_the_element_in_another_order(name: str, cells: dict[str, CellKernels]) -> None:
+    case = CASES[name]
+    positional, named = case.arguments()
+    R, K = load_kernel(case.family).tangent(*positional, **named)
+    kernels = cells[case.family]
+    assert close(called(kernels, case, "residual"), R[0])
+    assert close(called(kernels, case, "tangent"), K[0])
+
+
+def test_cells_are_added_to_what_is_there(cells: dict[str, CellKernels]) -> None:
+    case = CASES["solid_q4: ring"]
+    for task in ("residual", "tangent"):
+        once, above = (called(cells["solid_q4"], case, task, s) for s in (0.0, 1e3))
+        np.testing.assert_allclose(above - 1e3, once, atol=1e-12 * 1e3)
+        assert once.all()
+
+
+def test_an_energy_is_one_number(cells: dict[str, CellKernels]) -> None:
+    case = CASES["solid_q4: ring"]
+    positional, named = case.arguments()
+    at = order(case)
+    w, vertices, A = np.empty(8), np.zeros((4, 3)), np.array([2.0, 7.0])
+    w[at] = case.dofs
+    vertices[list(TENSOR), :2] = case.coordinates.reshape(4, 2)
+    cells["solid_q4"].add("energy", A, w, case.parameters, vertices)
+    expected = load_kernel("solid_q4").energy(*positional, **named)[0]
+    assert A[0] - 2.0 == pytest.approx(expected, rel=1e-12)
+    assert A[1] == 7.0
+
+
+def assembled(kernels: CellKernels, plane: Plane, vertex: tuple[int, ...]) -> tuple[Array, Array]:
+    """Loop over cells in the manner of DOLFINx: gather, call with cleared A, scatter."""
+    size, numbers = plane.points.size, np.empty(4, dtype=np.int64)
+    R, K = np.zeros(size), np.zeros((size, size))
+    u = plane.motion
+    for cell in plane.cells:
+        numbers[list(vertex)] = cell
+        geometry = np.column_stack([plane.points[numbers], np.zeros(4)])
+        dofs = (2 * numbers[:, None] + np.arange(2)).ravel()
+        b, A = np.zeros(8), np.zeros((8, 8))
+        kernels.add("residual", b, u[numbers], MATERIALS[0], geometry)
+        kernels.add("tangent", A, u[numbers], MATERIALS[0], geometry)
+        R[dofs] += b
+        K[np.ix_(dofs, dofs)] += A
+    return R, K
+
+
+def ours(plane: Plane, family: str) -> tuple[Array, Array]:
+    """Residual and tangent of the project's own assembly."""
+    block = ElementBlock(
+        "solid", load_kernel(family), plane.points[plane.cells].reshape(-1, 8), plane.dofs
+    )
+    assembler = Assembler.build(plane.points.size, [block])
+    R, K = assembler.linearise(plane.motion.ravel(), {"solid": np.array(MATERIALS[0])})
+    return R, K.toarray()
+
+
+@pytest.mark.parametrize("family", ["solid_q4", "solid_fbar"])
+def test_a_loop_over_cells_gives_our_assembly(
+    family: str, cells: dict[str, CellKernels], rng: np.random.Generator
+) -> None:
+    plane = distorted(rng)
+    R, K = assembled(cells[family], plane, TENSOR)
+    expected_R, expected_K = ours(plane, family)
+    assert close(R, expected_R)
+    assert close(K, expected_K)
+
+
+def test_the_comparison_sees_a_wrong_order_of_vertices(
+    cells: dict[str, CellKernels], rng: np.random.Generator
+) -> None:
+    plane = distorted(rng)
+    R, K = assembled(cells["solid_q4"], plane, (0, 1, 2, 3))
+    expected_R, expected_K = ours(plane, "solid_q4")
+    assert not close(R, expected_R)
+    assert not close(K, expected_K)
+
+
+# -------------------------------------------------------------- what the shipped ones do not have
+
+
+def looped() -> Definition:
+    """A loop that stays a loop, data, a parameter derivative, a nodal and a free unknown."""
+    m = Model("looped", nodes=2, rule=quadrature.gauss(3, 1))
+    X = m.coordinates("Z", "R")
+    (u,) = m.nodal_unknowns("u")
+    lam = m.unknown("lambda")
+    (c,) = m.data(c="constant of the element")
+    (k,) = m.parameters(k="stiffness")
+    (xi,) = m.point()
+    a = m.define("a", u[0] * (1 - xi) + u[1] * (1 + xi) + c * X[1][0], waist=True)
+    mean = m.integral("mean", a**2 + X[0][1])
+    m.potential(m.integral("Pi", k * (a - mean) ** 4) + lam * mean)
+    m.offer(derivatives=[k])
+    return m.finish()
+
+
+def test_loops_keep_their_rule_in_a_table(tmp_path: Path) -> None:
+    kernels, batch = cell_kernels(looped(), tmp_path), compiled(looped(), tmp_path)
+    X, u, c, k = [0.2, 1.4, 0.9, 1.1], [0.4, 0.37, -0.8], [0.7], [2.5]
+    given: dict[str, Any] = {"data": [c], "parameters": k}
+    R, K = batch.tangent(np.array([X]), np.array([u]), **given)
+    slope = batch.derivative("k", np.array([X]), np.array([u]), **given)
+    vertices = [*X[:2], np.nan, *X[2:], np.nan]
+    for task, expected in (("residual", R), ("tangent", K), ("d_k", slope)):
+        A = np.zeros(expected.shape[1:])
+        kernels.add(task, A, [*u, *c], k, vertices)
+        assert close(A, expected[0])
+    text = (tmp_path / "looped_ufcx.c").read_text()
+    assert "static const double rule[] = {" in text
+    assert "q < 3" in text
+
+
+def test_an_interpolated_field_is_refused() -> None:
+    with pytest.raises(emit_ufcx.TargetError, match=r"film interpolates p .* use simd or scalar"):
+        pipeline.compile_model(ALL["film"](), Target.UFCX)
+
+
+def test_fields_and_products_are_not_offered() -> None:
+    tasks = pipeline.compile_model(ALL["solid_q4"](), Target.UFCX).functions
+    assert list(tasks) == ["energy", "residual", "tangent"]
+
+
+def hexahedron() -> Definition:
+    """Eight nodes in space, the lower face counterclockwise, then the upper one."""
+    m = Model("brick", nodes=8, rule=quadrature.gauss(2, 3))
+    X = m.coordinates("X", "Y", "Z")
+    (u,) = m.nodal_unknowns("u")
+    m.potential(sum(x * y**3 for x, y in zip(X[2], u, strict=True)))
+    return m.finish()
+
+
+def test_the_vertices_of_a_hexahedron() -> None:
+    d = hexahedron()
+    assert emit_ufcx.vertices(d) == (0, 1, 3, 2, 4, 5, 7, 6)
+    text = pipeline.compile_model(d, Target.UFCX).text
+    for node, vertex in enumerate((0, 1, 3, 2, 4, 5, 7, 6)):
+        assert f" * w[{vertex}]  u{node + 1}\n" in text
+        assert f"coordinate_dofs[{3 * vertex + 2}]" in text
+    assert not re.search(r"coordinate_dofs\[\d*[^258\d]\]", text)
