@@ -80,11 +80,12 @@ def _trace(family: str) -> int:
 def kernels() -> int:
     """Print the cost table of the manifest."""
     entries = json.loads((GENERATED / "manifest.json").read_text())["kernels"]
-    titles = ("task", "operations", "once", "per point", "temporaries", "C bytes")
+    titles = ("task", "operations", "once", "per point", "temporaries", "live", "C bytes")
     table = Table(Column("kernel", no_wrap=True), *titles)
     for name, entry in entries.items():
         for task, cost in entry["tasks"].items():
-            row = (cost["operations"], cost["operations_once"], cost["operations_per_point"])
-            table.add_row(name, task, *map(str, row), str(cost["temporaries"]), str(entry["bytes"]))
+            names = ("operations", "operations_once", "operations_per_point", "temporaries")
+            row = [*(cost[n] for n in names), cost["peak_live"], entry["bytes"]]
+            table.add_row(name, task, *map(str, row))
     Console().print(table)
     return 0

@@ -13,6 +13,7 @@ from typing import Any
 from codegen import abi, emit_c, emit_routines, emit_simd, emit_ufcx, linearise, passes
 from codegen.abi import Target
 from codegen.graph import Routine
+from codegen.liveness import peak_live
 from codegen.model import Definition
 from codegen.order import arranged
 from codegen.schedule import Schedule, schedule, straight_line
@@ -166,4 +167,5 @@ def _cost(f: Function, points: int) -> dict[str, int]:
         "operations_once": once,
         "operations_per_point": per_point,
         "temporaries": f.temporaries,
+        "peak_live": peak_live(f.plan),
     }
