@@ -82,6 +82,7 @@ class Lowering:
             (sp.atan2, lambda e: self.g.node(Op.ATAN2, (self(e.args[0]), self(e.args[1])))),
             (sp.core.relational.Relational, self._relation),
             ((sp.And, sp.Or, sp.Not), self._logic),
+            (sp.ITE, self._choice),
         ]
 
     def __call__(self, expression: Any) -> Node:
@@ -204,3 +205,9 @@ class Lowering:
         for other in rest:
             result = self.g.node(op, (result, other))
         return result
+
+    def _choice(self, e: Any) -> Node:
+        """What SymPy makes of a condition on a branch: (c and a) or (not c and b)."""
+        c, a, b = (self(x) for x in e.args)
+        refused = self.g.node(Op.NOT, (c,))
+        return self.g.node(Op.OR, (self.g.node(Op.AND, (c, a)), self.g.node(Op.AND, (refused, b))))

@@ -34,7 +34,7 @@ def common_sums(g: Graph, roots: list[Node]) -> list[Node]:
     for layer in _layers(roots, inner):
         for n in layer:
             if n.op in (Op.ADD, Op.SUB) and not first_difference(n):
-                plan.add(n, _linear(n, inner, new))
+                plan.add(n, _linear(g, n, inner, new))
             else:
                 new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
         new.update(plan.solve())
@@ -81,8 +81,8 @@ def _layers(roots: Sequence[Node], inner: set[Node]) -> list[list[Node]]:
     return [layers[k] for k in sorted(layers)]
 
 
-def _linear(n: Node, inner: set[Node], new: dict[Node, Node]) -> dict[Node, Fraction]:
-    """Coefficients of a maximal sum over its terms."""
+def _linear(g: Graph, n: Node, inner: set[Node], new: dict[Node, Node]) -> dict[Node, Fraction]:
+    """Coefficients of a maximal sum over its terms; all constants are one term, times +1 or -1."""
     out: dict[Node, Fraction] = {}
 
     def walk(m: Node, c: Fraction) -> None:
@@ -94,6 +94,8 @@ def _linear(n: Node, inner: set[Node], new: dict[Node, Node]) -> dict[Node, Frac
                     if value.op is Op.NEG
                     else (c * value.args[0].value, value.args[1])
                 )
+            if value.op is Op.CONST:
+                c, value = c * value.value, g.one
             out[value] = out.get(value, Fraction(0)) + c
         elif _scaled(m):
             walk(m.args[1], c * m.args[0].value)
@@ -104,6 +106,9 @@ def _linear(n: Node, inner: set[Node], new: dict[Node, Node]) -> dict[Node, Frac
             walk(m.args[1], -c if m.op is Op.SUB else c)
 
     walk(n, Fraction(1))
+    constant = out.pop(g.one, Fraction(0))
+    if constant:
+        out[g.const(abs(constant))] = Fraction(1 if constant > 0 else -1)
     return {v: c for v, c in out.items() if c}
 
 
@@ -133,7 +138,8 @@ class _Plan:
                 if len(by_size) == 1:
                     pieces.append((size, self._row(one)))
                 else:
-                    rest.update(one)
+                    for value, sign in one.items():
+                        _insert(self.g, rest, value, sign)
             else:
                 pieces.append((size, self._row(row)))
         if rest:
@@ -204,7 +210,7 @@ def _insert(g: Graph, row: Row, value: Node, sign: int) -> None:
         row[value] = sign
     elif row[value] == sign:
         row.pop(value)
-        row[g.mul(g.const(2), value)] = sign
+        _insert(g, row, g.mul(g.const(2), value), sign)
     else:
         row.pop(value)
 

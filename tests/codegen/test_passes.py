@@ -203,6 +203,19 @@ def test_common_sums_are_added_once() -> None:
     assert (operations(full), operations(rest)) == (4, 6)
 
 
+def test_common_sums_keep_every_constant() -> None:
+    """2 (1 + 9/4 x) + (2 + y): twice one and the two are equal numbers and both count."""
+    g = Graph()
+    x, y = unknowns(g, 2)
+    two = g.const(2)
+    scaled = g.mul(two, g.add(g.one, g.mul(g.const(Fraction(9, 4)), x)))
+    root = g.add(scaled, g.add(two, y))
+    (shared,) = common_sums(g, [root])
+    assert same_value(shared, root, AT)
+    # 9/4 x, 1 + ., 2 ., 2 + y, their sum; then 9/2 x, + y, + 4
+    assert (operations([root]), operations([shared])) == (5, 3)
+
+
 def test_common_sums_leave_products_alone() -> None:
     g = Graph()
     x, y, z = unknowns(g, 3)
