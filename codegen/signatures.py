@@ -2,7 +2,9 @@
 
 Every value is evaluated at random points in many digits.  Values that agree there, up to sign,
 are merged after they have agreed again at fresh points: the chance of a false merge is that of
-two different functions agreeing to 30 digits at four random points.
+two different functions agreeing to 30 digits at all of them.  The first points have positive
+arguments, where roots and logarithms have values; at the others every argument has a random sign,
+which tells sqrt(x^2) from x.
 """
 
 from __future__ import annotations
@@ -24,6 +26,8 @@ SMALL = mpmath.mpf(1) / 32
 """Size of the unknowns: near the undeformed state volumes are positive and roots have values."""
 POINTS = 2
 """Points of the signature; as many fresh ones confirm each merge."""
+SIGNED = 8
+"""Points of either sign, where two equal values agree or have no value both."""
 
 
 def merge_equal(g: Graph, roots: list[Node]) -> list[Node]:
@@ -32,6 +36,7 @@ def merge_equal(g: Graph, roots: list[Node]) -> list[Node]:
     rng = random.Random(0)
     with mpmath.workdps(DIGITS):
         samples = [_sample(nodes, rng) for _ in range(2 * POINTS)]
+        signed = [_sample(nodes, rng, signed=True) for _ in range(SIGNED)]
         first: dict[tuple[str, ...], Node] = {}
         same: dict[Node, tuple[Node, int]] = {}
         for n in nodes:
@@ -43,7 +48,10 @@ def merge_equal(g: Graph, roots: list[Node]) -> list[Node]:
             leader = first.setdefault((str(n.varying), *key), n)
             if leader is not n:
                 relative = sign * _signature([s[leader] for s in samples[:POINTS]])[1]
-                if _confirmed(samples[POINTS:], leader, n, relative):
+                fresh = samples[POINTS:]
+                if _confirmed(fresh, leader, n, relative) and not _refuted(
+                    signed, leader, n, relative
+                ):
                     same[n] = (leader, relative)
     return _rebuilt(g, roots, same)
 
@@ -63,12 +71,15 @@ Value = Any
 """An mpmath number, a truth value, or None where there is no value."""
 
 
-def _sample(nodes: Sequence[Node], rng: random.Random) -> dict[Node, Value]:
+def _sample(
+    nodes: Sequence[Node], rng: random.Random, *, signed: bool = False
+) -> dict[Node, Value]:
     """Values at one random point; None where there is none (a branch on complex numbers)."""
     values: dict[Node, Value] = {}
     for n in nodes:
         if n.op in OPAQUE:
-            values[n] = _random(rng) * (SMALL if _unknown(n) else 1)
+            sign = rng.choice((-1, 1)) if signed else 1
+            values[n] = sign * _random(rng) * (SMALL if _unknown(n) else 1)
         elif n.op is Op.CALL:
             values[n] = None
         else:
@@ -105,6 +116,19 @@ def _signature(values: Sequence[Value]) -> tuple[tuple[str, ...], int]:
 def _confirmed(samples: Sequence[dict[Node, Value]], a: Node, b: Node, sign: int) -> bool:
     for s in samples:
         x, y = s[a], s[b]
-        if x is None or y is None or abs(x - sign * y) > mpmath.mpf(10) ** -AGREE * abs(x):
+        if x is None or y is None or not _agree(x, sign * y):
             return False
     return True
+
+
+def _refuted(samples: Sequence[dict[Node, Value]], a: Node, b: Node, sign: int) -> bool:
+    """True where one of the two has a real value and the other has none, or another one."""
+    for s in samples:
+        real = [v is not None and not isinstance(v, mpmath.mpc) for v in (s[a], s[b])]
+        if real[0] != real[1] or (all(real) and not _agree(s[a], sign * s[b])):
+            return True
+    return False
+
+
+def _agree(x: Value, y: Value) -> bool:
+    return bool(abs(x - y) <= mpmath.mpf(10) ** -AGREE * abs(x))
