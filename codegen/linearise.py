@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from codegen.abi import Task, derivative_task
 from codegen.differentiate import Given, Linearisation, directional, gradient
 from codegen.emit_c import Entry, Slot
-from codegen.graph import FREE, Graph, Input, Node, reachable
+from codegen.graph import FREE, Graph, Input, Node, Op, reachable
 from codegen.model import Definition
 from codegen.narrow import narrow, quadratic_waist
 from codegen.waists import Waist, linear_waist, strip, substitute
@@ -106,6 +106,8 @@ def _modal(d: Definition) -> Iterator[_Modal]:
         return
     g = d.graph
     (root,), kept = strip(g, [d.potential], d.constant)
+    if _has_guarded_values(root):
+        return
     waist = linear_waist(g, [root], d.directions)
     if waist is None:
         return
@@ -158,6 +160,24 @@ def _slopes(g: Graph, waist: Waist, upper: Sequence[Node]) -> dict[Node, dict[No
         for q in upper
         if q.varying
     }
+
+
+_PARTIAL = frozenset({Op.RECIP, Op.POW, Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP})
+
+
+def _has_guarded_values(root: Node) -> bool:
+    """True where only a side of a branch holds a value that need not exist outside of it.
+
+    A waist would take such a value out of its branch.
+    """
+    always: set[Node] = set()
+    stack = [root]
+    while stack:
+        n = stack.pop()
+        if n not in always:
+            always.add(n)
+            stack += n.args[:1] if n.op is Op.BRANCH else n.args
+    return any(n.op in _PARTIAL and n not in always for n in reachable([root]))
 
 
 @dataclass(frozen=True)

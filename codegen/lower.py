@@ -208,6 +208,5 @@ class Lowering:
 
     def _choice(self, e: Any) -> Node:
         """What SymPy makes of a condition on a branch: (c and a) or (not c and b)."""
-        c, a, b = (self(x) for x in e.args)
-        refused = self.g.node(Op.NOT, (c,))
-        return self.g.node(Op.OR, (self.g.node(Op.AND, (c, a)), self.g.node(Op.AND, (refused, b))))
+        c, a, b = e.args
+        return self(sp.Or(sp.And(c, a), sp.And(sp.Not(c), b)))

@@ -162,6 +162,16 @@ def test_a_power_of_an_absolute_value_is_one_of_the_square() -> None:
     assert value((x**2) ** sp.Rational(1, 3), -8.0, 1.0) == pytest.approx(4.0, rel=1e-15)
 
 
+def test_a_condition_on_a_branch_is_a_condition() -> None:
+    """SymPy turns it into an if-then-else of conditions, some of them decided."""
+    inner = sp.Piecewise((x, y > 1), (y**2, True))
+    outer = sp.Piecewise((sp.Integer(1), inner <= 4), (sp.Integer(0), True))
+    decided = sp.Piecewise((sp.Integer(1), sp.Piecewise((x, y > 1), (7, True)) <= 4), (0, True))
+    assert outer.has(sp.ITE)
+    assert [value(outer, *at) for at in ((3, 2), (5, 2), (5, -1), (3, -3))] == [1, 0, 1, 0]
+    assert [value(decided, *at) for at in ((3, 2), (5, 2), (3, 0))] == [1, 0, 0]
+
+
 def test_extrema_and_absolute_value() -> None:
     for at in ((1, 2), (2, 1), (-3, -3), (0, -1)):
         assert value(sp.Max(x, y), *at) == max(at)
