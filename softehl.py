@@ -16,57 +16,109 @@ if TYPE_CHECKING:
     from cases.observer import FilmState, Observer, Outcome, Silent
     from cases.oring import run as run_oring
     from cases.oring_parameters import ORing
+    from codegen import kinematics, quadrature, shapes
+    from codegen.model import Definition, Model
+    from runtime.assembly import Assembler, ElementBlock
     from runtime.continuation import Continuation
-    from runtime.kernels import load_kernel
+    from runtime.dofs import DofLayout
+    from runtime.kernels import Kernel
     from runtime.newton import Newton
+    from runtime.problem import Problem
     from runtime.solution import Branch, Solution, Status
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "Branch": ("runtime.solution", "Branch"),
-    "Continuation": ("runtime.continuation", "Continuation"),
-    "FilmState": ("cases.observer", "FilmState"),
-    "Newton": ("runtime.newton", "Newton"),
-    "ORing": ("cases.oring_parameters", "ORing"),
-    "Observer": ("cases.observer", "Observer"),
-    "Outcome": ("cases.observer", "Outcome"),
-    "Silent": ("cases.observer", "Silent"),
-    "Solution": ("runtime.solution", "Solution"),
-    "Status": ("runtime.solution", "Status"),
-    "load_kernel": ("runtime.kernels", "load_kernel"),
-    "run_oring": ("cases.oring", "run"),
+    "Assembler": "runtime.assembly",
+    "Branch": "runtime.solution",
+    "Continuation": "runtime.continuation",
+    "DofLayout": "runtime.dofs",
+    "ElementBlock": "runtime.assembly",
+    "FilmState": "cases.observer",
+    "Kernel": "runtime.kernels",
+    "Newton": "runtime.newton",
+    "ORing": "cases.oring_parameters",
+    "Observer": "cases.observer",
+    "Outcome": "cases.observer",
+    "Problem": "runtime.problem",
+    "Silent": "cases.observer",
+    "Solution": "runtime.solution",
+    "Status": "runtime.solution",
+    "run_oring": "cases.oring:run",
 }
+_MODELLING = {
+    "Definition": "codegen.model",
+    "Model": "codegen.model",
+    "kinematics": "codegen",
+    "quadrature": "codegen",
+    "shapes": "codegen",
+}
+"""What a model page needs; these import SymPy."""
 
 __all__ = [
+    "Assembler",
     "Branch",
     "Continuation",
+    "Definition",
+    "DofLayout",
+    "ElementBlock",
     "FilmState",
+    "Kernel",
+    "Model",
     "Newton",
     "ORing",
     "Observer",
     "Outcome",
+    "Problem",
     "Silent",
     "Solution",
     "Status",
+    "kinematics",
     "load_kernel",
     "main",
+    "quadrature",
     "run_oring",
+    "shapes",
 ]
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used."""
-    try:
-        module, attribute = _PUBLIC[name]
-    except KeyError:
-        raise AttributeError(f"module 'softehl' has no attribute {name!r}") from None
-    value = globals()[name] = getattr(importlib.import_module(module), attribute)
+    place = _PUBLIC.get(name) or _MODELLING.get(name)
+    if place is None:
+        raise AttributeError(f"module 'softehl' has no attribute {name!r}")
+    module, _, attribute = place.partition(":")
+    imported = importlib.import_module(f"{module}.{name}" if module == "codegen" else module)
+    value = imported if module == "codegen" else getattr(imported, attribute or name)
+    globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *_PUBLIC]
+    return [*globals(), *_PUBLIC, *_MODELLING]
+
+
+def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "Kernel":
+    """A compiled kernel, by any of
+
+    - the name of one that ships: `load_kernel("solid_q4")`;
+    - a model file: `load_kernel("my_model.py")`, with `name` where it has several models.  It is
+      derived and compiled if the cache does not have it; the file is run then;
+    - a folder that `softehl generate` wrote: `load_kernel("generated/my_model")`;
+    - a `Definition`, for notebooks.
+
+    Raises `runtime.kernels.KernelError`, or what is wrong with the model or the compiler.
+    """
+    from runtime import kernels
+
+    if isinstance(source, str) and not source.endswith(".py") and not Path(source).is_dir():
+        return kernels.load_kernel(source)
+    if isinstance(source, (str, Path)) and Path(source).is_dir():
+        return kernels.kernel_in(Path(source).resolve(), name)
+    from codegen import library
+
+    place = Path(source) if isinstance(source, str) else source
+    return kernels.kernel_in(library.folder_of(place), name)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -100,7 +152,7 @@ def _commands() -> "click.Group":
 
     @commands.command()
     @click.argument("models", metavar="[MODEL.py]...", nargs=-1, type=click.Path(path_type=Path))
-    @click.option("--check", is_flag=True, help="Write nothing; exit 1 if generated/ is stale.")
+    @click.option("--check", is_flag=True, help="Write nothing; exit 1 if anything is stale.")
     @click.option("--trace", metavar="KERNEL", help="Show what each pass did to a kernel.")
     @click.option(
         "--target",
@@ -109,11 +161,20 @@ def _commands() -> "click.Group":
         show_default=True,
         help="Four elements at once, one at a time, or cells for DOLFINx.",
     )
-    @click.option("--out", type=click.Path(path_type=Path), help="Folder of another target.")
+    @click.option(
+        "--out",
+        metavar="DIR",
+        type=click.Path(path_type=Path, file_okay=False),
+        help="Folder for MODEL.py or --target  [default: generated/MODEL beside MODEL.py]",
+    )
     def generate(
         models: tuple[Path, ...], check: bool, trace: str | None, target: str, out: Path | None
     ) -> int:
-        """Regenerate the C files from the models (all of them if none is named)."""
+        """Derive, compile and check the kernels of your own models, in MODEL.py.
+
+        The file is run; a model is a function without arguments annotated `-> Definition`.
+        Without a file the kernels that ship, in generated/, are regenerated.
+        """
         from codegen.cli import generate
 
         return generate(models, check, trace, target, out)

@@ -108,6 +108,8 @@ def derivative_task(name: str) -> str:
 
 
 PREFIX = "softehl"
+VERSION = 1
+"""Raised when the meaning of an argument changes: kernels built before are then built anew."""
 
 ARGUMENTS = (
     "ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,",

@@ -17,6 +17,7 @@ import sysconfig
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from time import perf_counter
 
 GENERATED = Path(__file__).resolve().parent.parent / "generated"
 FLAGS = (
@@ -65,15 +66,44 @@ def build(directory: Path = GENERATED, *, extra: Sequence[str] = STRICT) -> Path
     return target
 
 
-def _run(command: Sequence[str]) -> None:
+def build_each(directory: Path) -> dict[str, float]:
+    """Like `build`, one C file after another; returns the seconds that each took, by its stem.
+
+    Warnings are no errors here: a newer compiler may warn of what ours does not.
+    """
+    seconds = {}
+    define = f'-DSOFTEHL_SIGNATURE="{signature(directory)}"'
+    with tempfile.TemporaryDirectory(prefix=".part-", dir=directory) as scratch:
+        objects = []
+        for source in sorted(directory.glob("*.c")):
+            objects.append(str(Path(scratch) / f"{source.stem}.o"))
+            compiling = [f for f in FLAGS if f != "-shared"]
+            start = perf_counter()
+            _run([*compiler(), *compiling, define, "-c", str(source), "-o", objects[-1]])
+            seconds[source.stem] = perf_counter() - start
+        _run([*compiler(), *FLAGS, *objects, "-o", str(directory / LIBRARY), "-lm"])
+    return seconds
+
+
+def identification() -> str:
+    """What the compiler says of itself, the flags and the processor they compile for.
+
+    Its predefined macros hold all of that, the instruction set of -march=native included.
+    """
+    command = [*compiler(), *(f for f in FLAGS if f != "-shared"), "-dM", "-E", "-x", "c", "-"]
+    return shlex.join([*compiler(), *FLAGS]) + "\n" + _run(command)
+
+
+def _run(command: Sequence[str]) -> str:
     line = shlex.join(command)
     if shutil.which(command[0]) is None:
         raise BuildError(
             f"no C compiler: {command[0]!r} is not on the PATH; install one or set CC\n  {line}"
         )
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    result = subprocess.run(command, capture_output=True, text=True, check=False, input="")
     if result.returncode != 0:
         raise BuildError(f"the C compiler failed ({result.returncode}):\n  {line}\n{result.stderr}")
+    return result.stdout
 
 
 def main() -> int:

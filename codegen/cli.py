@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Column, Table
 
-from codegen import pipeline, targets
+from codegen import cli_files, pipeline, targets
 from codegen.abi import Target
 from codegen.build import GENERATED
 from codegen.models import ALL
@@ -26,15 +26,23 @@ def generate(
 ) -> int:
     """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1).
 
-    Another `target` than simd goes into the folder `out`.
+    With `models` do the same for the files of a user, as `codegen.cli_files` says.
+    Another `target` than simd is only written, into the folder `out`.
     """
+    if target != Target.SIMD:
+        if check or trace is not None:
+            print(f"softehl: --check and --trace know target simd, not {target}", file=sys.stderr)
+            return 2
+        if models:
+            return cli_files.write_target(models, Target(target), out)
+        return targets.write((make() for make in ALL.values()), Target(target), out)
     if models:
-        print("softehl: models from other files are not available yet", file=sys.stderr)
+        return cli_files.generate(models, out=out, check=check, trace=trace)
+    if out is not None:
+        print("softehl: --out needs a MODEL.py or a --target", file=sys.stderr)
         return 2
     if trace is not None:
         return _trace(trace)
-    if target != Target.SIMD or out is not None:
-        return targets.write((make() for make in ALL.values()), Target(target), out)
     files = pipeline.files(pipeline.compile_model(make()) for make in ALL.values())
     stale = [name for name, text in files.items() if _differs(GENERATED / name, text)]
     known = {*files, "__init__.py"}
@@ -68,12 +76,7 @@ def _trace(family: str) -> int:
     if family not in ALL:
         print(f"softehl: no model {family!r}; there are {', '.join(ALL)}", file=sys.stderr)
         return 2
-    kernel = pipeline.compile_model(ALL[family]())
-    for task, function in kernel.functions.items():
-        table = Table("pass", "nodes", "operations", title=f"{family} {task}")
-        for row in function.trace:
-            table.add_row(row.name, str(row.nodes), str(row.operations))
-        Console().print(table)
+    cli_files.print_trace(ALL[family]())
     return 0
 
 

@@ -41,6 +41,7 @@ class Definition:
     fields: tuple[tuple[str, Node], ...]
     product: bool = False
     derivatives: tuple[tuple[str, Node], ...] = ()
+    example: tuple[tuple[str, float], ...] = ()
     tasks: tuple[str, ...] | None = None
     nodal: tuple[tuple[int, int], ...] = ()
     """First unknown and number of components of every field with unknowns at the nodes."""

@@ -20,6 +20,7 @@ from codegen.model import Definition
 
 Number = Any
 Vector = list[Number]
+Rows = Sequence[Sequence[Number]] | None
 
 _UNARY: dict[Op, Callable[[Number], Number]] = {
     Op.NAME: lambda a: a,
@@ -82,19 +83,23 @@ class Oracle:
     def potential(self, state: State) -> Number:
         """Value of the (pseudo-)potential."""
         with mpmath.workdps(self.digits):
-            return _Walk(state, {}).value(self.definition.potential)
+            return Walk(state, {}).value(self.definition.potential)
 
     def fields(self, state: State) -> list[Vector]:
         """Field values, [point][field]."""
         with mpmath.workdps(self.digits):
-            walk = _Walk(state, {})
+            walk = Walk(state, {})
             nodes = [n for _, n in self.definition.fields]
             return [[walk.at(n, q) for n in nodes] for q in range(len(state.rule))]
 
-    def residual(self, state: State) -> Vector:
-        """Derivative of the potential with the constants frozen at `state`."""
+    def residual(self, state: State, along: Rows = None) -> Vector:
+        """Derivative of the potential with the constants frozen at `state`.
+
+        Every component; with `along` the products of these vectors with it, which are cheaper
+        where they are fewer (so in `product` and `derivative`).
+        """
         with mpmath.workdps(self.digits):
-            return self._residual(state, _mpf(state.dofs))
+            return self._residual(state, _mpf(state.dofs), along)
 
     def tangent(self, state: State) -> list[Vector]:
         """Rows dR_i/du_j, derivative of `residual` (constants follow the state here)."""
@@ -107,46 +112,41 @@ class Oracle:
                 columns.append([(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)])
             return [list(row) for row in zip(*columns, strict=True)]
 
-    def product(self, state: State, direction: Sequence[Number]) -> Vector:
+    def product(self, state: State, direction: Sequence[Number], along: Rows = None) -> Vector:
         """Tangent times `direction`: one difference of the residual, where `tangent` takes ndof."""
         with mpmath.workdps(self.digits):
-            return self._rate(state, "dofs", _mpf(direction))
+            return self._rate(state, "dofs", _mpf(direction), along)
 
-    def derivative(self, state: State, array: str, index: int) -> Vector:
+    def derivative(self, state: State, array: str, index: int, along: Rows = None) -> Vector:
         """Derivative of the residual by one entry of `coordinates`, `data` or `parameters`."""
         with mpmath.workdps(self.digits):
             size = len(getattr(state, array))
-            return self._rate(state, array, [mpmath.mpf(k == index) for k in range(size)])
+            unit = [mpmath.mpf(k == index) for k in range(size)]
+            return self._rate(state, array, unit, along)
 
-    def _rate(self, state: State, array: str, direction: Vector) -> Vector:
+    def _rate(self, state: State, array: str, direction: Vector, along: Rows) -> Vector:
         h = mpmath.mpf(10) ** -self.step
         base = _mpf(getattr(state, array))
-        plus, minus = (
-            self._residual(at, _mpf(at.dofs))
-            for s in (1, -1)
-            for at in [
-                replace(
-                    state,
-                    **{array: [b + s * h * v for b, v in zip(base, direction, strict=True)]},
-                )
-            ]
-        )
+        moved = (replace(state, **{array: _along(base, s * h, direction)}) for s in (1, -1))
+        plus, minus = (self._residual(at, _mpf(at.dofs), along) for at in moved)
         return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
 
-    def _residual(self, state: State, dofs: Vector) -> Vector:
+    def _residual(self, state: State, dofs: Vector, along: Rows = None) -> Vector:
         h = mpmath.mpf(10) ** -self.step
         frozen = self._frozen(state, dofs)
+        size = range(len(dofs))
+        vectors = [[int(i == j) for i in size] for j in size] if along is None else along
         out = []
-        for j in range(len(dofs)):
+        for v in vectors:
             plus, minus = (
-                _Walk(state, frozen, _moved(dofs, j, s * h)).value(self.definition.potential)
+                Walk(state, frozen, _along(dofs, s * h, v)).value(self.definition.potential)
                 for s in (1, -1)
             )
             out.append((plus - minus) / (2 * h))
         return out
 
     def _frozen(self, state: State, dofs: Vector) -> dict[tuple[Node, int], Number]:
-        walk = _Walk(state, {}, dofs)
+        walk = Walk(state, {}, dofs)
         return {
             (n, q): walk.at(n, q) for n in self.definition.constant for q in range(len(state.rule))
         }
@@ -156,11 +156,15 @@ def _mpf(values: Sequence[Number]) -> Vector:
     return [mpmath.mpf(v) for v in values]
 
 
+def _along(values: Vector, step: Number, direction: Sequence[Number]) -> Vector:
+    return [v + step * d for v, d in zip(values, direction, strict=True)]
+
+
 def _moved(values: Vector, j: int, by: Number) -> Vector:
     return [v + by if i == j else v for i, v in enumerate(values)]
 
 
-class _Walk:
+class Walk:
     """One evaluation; values are remembered per node and point."""
 
     def __init__(
@@ -234,7 +238,7 @@ class _Walk:
 
 def _local(values: Sequence[Node], local: Vector, external: Vector) -> Vector:
     """Localised values of a routine."""
-    walk = _Walk(State((), ()), {})
+    walk = Walk(State((), ()), {})
     walk.arrays = {"local": local, "external": external}
     return [walk.value(n) for n in values]
 
@@ -248,6 +252,6 @@ def evaluate(root: Node, inputs: Mapping[tuple[str, int], Number], digits: int =
             column += [0] * (n.payload.index + 1 - len(column))
             column[n.payload.index] = inputs[n.payload.array, n.payload.index]
     with mpmath.workdps(digits):
-        walk = _Walk(State((), ()), {})
+        walk = Walk(State((), ()), {})
         walk.arrays = {k: _mpf(v) for k, v in arrays.items()}
         return walk.value(root)

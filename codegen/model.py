@@ -15,7 +15,7 @@ from codegen.abi import Task
 from codegen.definition import Argument, Definition
 from codegen.differentiate import gradient
 from codegen.entries import Entries, fraction
-from codegen.graph import Graph, Input, Node, reachable
+from codegen.graph import Graph, Input, Node, Op, reachable
 from codegen.lower import Lowering, ModelError, page_line
 from codegen.quadrature import QuadratureRule
 from codegen.routines import SYMMETRIC, Control, isotropic, localise, newton, symmetric
@@ -61,6 +61,7 @@ class Model:
         self._potential: Node | None = None
         self._product = False
         self._derivatives: list[tuple[str, Node]] = []
+        self._example: dict[str, float] = {}
         self._tasks: tuple[str, ...] | None = None
         self._declared: dict[str, tuple[Node, str]] = {}
 
@@ -280,6 +281,17 @@ class Model:
                 raise ModelError(f"{name} is no parameter, datum or coordinate to derive by")
         self._derivatives = nodes
 
+    def example(self, **values: float) -> None:
+        """Values near which the model makes sense, by name; the check of its kernel starts there.
+
+        Names of parameters, data, unknowns (`u_x1`) and coordinates (`X1`).  What is not named is
+        about 1 (parameters, data), a few per cent (unknowns), the unit cell (coordinates).
+        """
+        unknown = set(values) - {str(s) for s, n in self._bound.items() if n.op is Op.INPUT}
+        if unknown:
+            raise ModelError(f"example: {', '.join(sorted(unknown))} is no argument of {self.name}")
+        self._example.update({name: float(v) for name, v in values.items()})
+
     def finish(self) -> Definition:
         """The frozen definition of the model."""
         if self._potential is None:
@@ -306,6 +318,7 @@ class Model:
             fields=tuple(self._fields),
             product=self._product,
             derivatives=tuple(self._derivatives),
+            example=tuple(self._example.items()),
             tasks=self._tasks,
             nodal=tuple(self._nodal),
         )

@@ -26,6 +26,7 @@ Array = npt.NDArray[np.float64]
 GENERATED = Path(__file__).resolve().parent.parent / "generated"
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
 REMEDY = "run `python -m codegen.build` (make does it)"
+REMEDY_OF_OTHERS = "run `softehl generate` with its model file"
 
 _SIGNATURE = (
     "(ptrdiff_t, ptrdiff_t, ptrdiff_t, const double *, const double *, const double *,"
@@ -253,17 +254,23 @@ def manifest(directory: Path = GENERATED) -> dict[str, Any]:
 @cache
 def _library(directory: Path) -> Any:
     path = directory / LIBRARY
+    remedy = REMEDY if directory == GENERATED else REMEDY_OF_OTHERS
     if not path.exists():
-        raise MissingKernelsError(f"the kernels are not built: {REMEDY}")
+        raise MissingKernelsError(f"the kernels are not built: {remedy}")
     _ffi.cdef(_declarations(directory), override=True)
     library: Any = _ffi.dlopen(str(path))
-    built = _ffi.string(library.softehl_signature()).decode()
-    if built != _sources_signature(directory):
+    if _built_from(library) != _sources_signature(directory):
         _ffi.dlclose(library)
         raise StaleKernelsError(
-            f"{path.name} was built from other sources than {directory.name}/ holds now: {REMEDY}"
+            f"{path.name} was built from other sources than {directory.name}/ holds now: {remedy}"
         )
     return library
+
+
+def _built_from(library: Any) -> str:
+    """Signature of the sources that a library was built from."""
+    text: bytes = _ffi.string(library.softehl_signature())
+    return text.decode()
 
 
 def _declarations(directory: Path) -> str:
@@ -299,3 +306,20 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         signature=entry["signature"],
         library=_library(directory),
     )
+
+
+def kernel_in(directory: Path, name: str | None = None) -> Kernel:
+    """The kernel of a folder of generated C; `name` is needed if it holds several.
+
+    Raises `KernelError`, also when the folder has changed since this process loaded it.
+    """
+    entries = manifest(directory)
+    if name is None and len(entries) > 1:
+        raise MissingKernelsError(f"{directory.name} holds {', '.join(entries)}: name one of them")
+    kernel = load_kernel(name or next(iter(entries)), directory)
+    if _built_from(kernel.library) != _sources_signature(directory):
+        raise StaleKernelsError(
+            f"{directory.name}/ has changed since it was loaded: start Python anew, or load the "
+            "model file itself"
+        )
+    return kernel

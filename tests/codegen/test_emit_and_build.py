@@ -398,7 +398,7 @@ def test_a_library_that_was_not_built(tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.mkdir()
     write(fields_model(a="xi"), other)
-    with pytest.raises(MissingKernelsError, match=r"not built: run `python -m codegen\.build`"):
+    with pytest.raises(MissingKernelsError, match=r"not built: run `softehl generate`"):
         load_kernel("places", other)
 
 
@@ -408,7 +408,7 @@ def test_a_stale_library_is_refused(changed: str, tmp_path: Path) -> None:
     build.build(tmp_path, extra=("-O0",))
     with (tmp_path / changed).open("a", encoding="utf-8") as file:
         file.write("\n")
-    with pytest.raises(StaleKernelsError, match=r"was built from other sources .*codegen\.build"):
+    with pytest.raises(StaleKernelsError, match=r"was built from other sources .*softehl generate"):
         load_kernel("places", tmp_path)
 
 

@@ -1,0 +1,221 @@
+"""The cache: by content; processes at once, one that is killed, what is damaged."""
+
+from __future__ import annotations
+
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from codegen import build, cache, library
+from codegen.build import LIBRARY
+
+ROOT = Path(__file__).parents[2]
+MODEL = """
+from softehl import Definition, Model, quadrature
+
+def spring() -> Definition:
+    m = Model("spring", nodes=1, rule=quadrature.point_rule(), unroll=True, doc="A spring.")
+    m.coordinates("X")
+    ((u,),) = m.nodal_unknowns("u")
+    (k,) = m.parameters(k="stiffness [N/mm]")
+    m.potential(k * u**2 / 2)
+    return m.finish()
+"""
+LOAD = """
+import softehl, numpy
+kernel = softehl.load_kernel("spring.py")
+print(kernel.residual(numpy.zeros((1, 1)), numpy.ones((1, 1)), parameters=[7.0])[0, 0])
+"""
+SLOW_COMPILER = """#!/bin/sh
+case "$*" in *-dM*) ;; *) echo $$ >> "{log}"; sleep {delay};; esac
+exec cc "$@"
+"""
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a model in it, and a cache of its own."""
+    (tmp_path / "spring.py").write_text(MODEL)
+    monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def slow_compiler(place: Path, delay: float) -> Path:
+    """A compiler that takes its time, and notes in `compiled` when it has begun."""
+    script = place / "slow-cc"
+    script.write_text(SLOW_COMPILER.format(log=place / "compiled", delay=delay))
+    script.chmod(0o755)
+    return script
+
+
+def loading(place: Path, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", LOAD],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def finished(process: subprocess.Popen[str]) -> str:
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, err) == (0, "")
+    return out
+
+
+def left(place: Path) -> list[Path]:
+    """Temporary files anywhere in the cache."""
+    return sorted((place / "cache").rglob(".part-*"))
+
+
+def compilations(place: Path) -> int:
+    return len((place / "compiled").read_text().splitlines())
+
+
+def wait_for(path: Path) -> None:
+    end = time.monotonic() + 60
+    while not path.exists():
+        assert time.monotonic() < end, f"{path} never came"
+        time.sleep(0.02)
+
+
+def test_processes_that_build_at_once_all_succeed(place: Path) -> None:
+    slow = str(slow_compiler(place, 0.5))
+    processes = [loading(place, CC=slow) for _ in range(3)]
+    assert [finished(p) for p in processes] == ["7.0\n"] * 3
+    assert compilations(place) > 3  # they did overlap: one alone calls the compiler three times
+    (folder,) = (place / "cache" / "built").iterdir()
+    assert (folder / LIBRARY).is_file()
+    assert left(place) == []
+    before = compilations(place)
+    assert finished(loading(place, CC=slow)) == "7.0\n"
+    assert compilations(place) == before
+
+
+def test_a_killed_process_leaves_no_lock_and_no_half_file(place: Path) -> None:
+    slow = str(slow_compiler(place, 60.0))
+    victim = loading(place, CC=slow)
+    wait_for(place / "compiled")
+    os.killpg(victim.pid, signal.SIGKILL)
+    victim.communicate()
+    assert list((place / "cache" / "built").glob("[!.]*")) == []
+    (rest,) = left(place)[:1]
+    slow_compiler(place, 0.0)  # the same command, hence the same key
+    assert finished(loading(place, CC=slow)) == "7.0\n"
+    assert rest.exists()  # it might belong to a process that is alive
+    os.utime(rest, (0, 0))
+    with cache._scratch(rest.parent):
+        assert not rest.exists()
+    assert left(place) == []
+
+
+def test_a_second_load_derives_nothing_and_loads_no_sympy(place: Path) -> None:
+    assert finished(loading(place)) == "7.0\n"
+    again = LOAD + "import sys; print(sorted({'sympy', 'mpmath'} & set(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", again],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == "7.0\n[]\n"
+
+
+def test_the_key_of_a_library_holds_all_that_it_is_built_from(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders = [library.folder_of(Path("spring.py"))]
+    assert library.folder_of(Path("spring.py")) == folders[0]
+    (place / "spring.py").write_text(MODEL.replace("u**2", "u**4"))
+    folders.append(library.folder_of(Path("spring.py")))
+    monkeypatch.setattr("codegen.abi.VERSION", 999)
+    folders.append(library.folder_of(Path("spring.py")))
+    monkeypatch.setattr(build, "FLAGS", (*build.FLAGS, "-DNOTHING"))
+    folders.append(library.folder_of(Path("spring.py")))
+    monkeypatch.setenv("CC", str(slow_compiler(place, 0.0)))
+    folders.append(library.folder_of(Path("spring.py")))
+    assert len(set(folders)) == len(folders)
+
+
+@pytest.mark.parametrize("damage", ["edited", "library gone", "source gone", "emptied"])
+def test_what_is_damaged_is_built_anew(damage: str) -> None:
+    folder = library.folder_of(Path("spring.py"))
+    original = {p.name: p.read_bytes() for p in folder.iterdir() if p.name != LIBRARY}
+    if damage == "edited":
+        (folder / "spring.c").write_text("int edited;\n")
+    elif damage == "library gone":
+        (folder / LIBRARY).unlink()
+    elif damage == "source gone":
+        (folder / "spring.c").unlink()
+    else:
+        for path in folder.iterdir():
+            path.write_bytes(b"")
+    assert library.folder_of(Path("spring.py")) == folder
+    assert {p.name: p.read_bytes() for p in folder.iterdir() if p.name != LIBRARY} == original
+    assert (folder / LIBRARY).stat().st_size > 1000
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"files": {}}', '{"content": "0", "files": {}}'])
+def test_a_damaged_record_of_derived_files_is_not_believed(place: Path, text: str) -> None:
+    cache.remember("key", {"a.c": "int a;\n"})
+    assert cache.recall("key") == {"a.c": "int a;\n"}
+    (place / "cache" / "derived" / "key.json").write_text(text)
+    assert cache.recall("key") is None
+
+
+@pytest.fixture
+def no_fallback() -> Iterator[None]:
+    cache._fallback.cache_clear()
+    yield
+    cache._fallback.cache_clear()
+
+
+@pytest.mark.usefixtures("no_fallback")
+def test_a_cache_that_cannot_be_written_is_replaced_with_one_warning(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (place / "file").write_text("not a folder")
+    monkeypatch.setenv("SOFTEHL_CACHE", str(place / "file" / "cache"))
+    with pytest.warns(RuntimeWarning, match=r"file/cache cannot be written .*set SOFTEHL_CACHE"):
+        first = library.folder_of(Path("spring.py"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert library.folder_of(Path("spring.py")) == first
+    assert (first / LIBRARY).is_file()
+    assert not first.is_relative_to(place)
+
+
+def test_the_place_of_the_cache(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert cache._wanted() == place / "cache"
+    monkeypatch.delenv("SOFTEHL_CACHE")
+    monkeypatch.setenv("HOME", str(place))
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(place / "xdg"))
+    assert cache._wanted() == place / "xdg" / "softehl"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    assert cache._wanted() == place / ".cache" / "softehl"
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert cache._wanted() == place / "Library" / "Caches" / "softehl"
+
+
+def test_files_have_the_usual_permissions(place: Path) -> None:
+    folder = library.folder_of(Path("spring.py"))
+    (place / "plain").write_text("")
+    usual = stat.S_IMODE((place / "plain").stat().st_mode)
+    records = list((place / "cache" / "derived").iterdir())
+    assert records
+    for path in (*records, folder / "spring.c"):
+        assert stat.S_IMODE(path.stat().st_mode) == usual

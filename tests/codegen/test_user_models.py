@@ -1,0 +1,374 @@
+"""Models from files outside the repository: found, written, compiled, checked, loaded."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import softehl
+from codegen import cache, cli, cli_files, library, model_text, user, verify
+from codegen.build import LIBRARY
+from codegen.model_text import ModelFileError
+from runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
+
+SPRING = """
+from softehl import Definition, Model, quadrature
+
+def {name}() -> Definition:
+    m = Model("{name}", nodes=1, rule=quadrature.point_rule(), unroll=True, doc="A spring.")
+    m.coordinates("X")
+    ((u,),) = m.nodal_unknowns("u")
+    (k,) = m.parameters(k="stiffness [N/mm]")
+    m.potential({energy})
+    return m.finish()
+"""
+
+
+def spring(name: str = "spring", energy: str = "k * u**2 / 2") -> str:
+    return SPRING.format(name=name, energy=energy)
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Every test has a cache of its own, and stands in a folder of its own."""
+    monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return tmp_path / "cache"
+
+
+def model_file(text: str, name: str = "mine.py") -> Path:
+    path = Path(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def run(*arguments: str) -> int:
+    return softehl.main(["generate", *arguments])
+
+
+# ------------------------------------------------------------------------------- finding models
+
+
+def names(text: str) -> list[str]:
+    return [d.name for d in user.definitions(model_file(text))]
+
+
+def test_annotated_functions_without_arguments_are_models_in_the_order_of_the_file() -> None:
+    more = "def with_argument(n) -> Definition: raise SystemError\ndef main(): raise SystemError\n"
+    hidden = "def _hidden() -> 'Definition': raise SystemError\n"
+    assert names(spring("b") + spring("a") + more + hidden) == ["b", "a"]
+    assert names("from __future__ import annotations" + spring("later")) == ["later"]
+
+
+def test_definitions_and_models_mappings_are_models() -> None:
+    assert names(spring("_made").replace("_made", "made") + "x = made()\ndel made\n") == ["made"]
+    assert names(spring("a") + spring("b") + "MODELS = {'only': b}\n") == ["b"]
+    assert names(spring("a") + spring("b") + "MODELS = [b, a]\n") == ["b", "a"]
+
+
+def test_imported_models_are_not_those_of_the_file() -> None:
+    model_file(spring("theirs"), "theirs.py")
+    assert names("from theirs import theirs\n" + spring("mine")) == ["mine"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = 1\n", r"mine.py has no model: write `def my_model\(\) -> Definition:`"),
+        ("def it(): return 1\n", r"has no model: annotate `def it\(\) -> Definition:`"),
+        (spring() + "x = spring()\n", "two models are called spring; rename one"),
+        (spring().replace('"spring"', '"a-b"'), "a model is called 'a-b'; use letters, digits"),
+        ("x = 1\ndef f(:\n", "mine.py:2: invalid syntax"),
+        ("x = 1\ny = x / 0\n", "mine.py:2: ZeroDivisionError: division by zero"),
+        ("import no_such_thing\n", "mine.py:1: ModuleNotFoundError: No module named 'no_such"),
+        (spring(energy="k * q"), "mine.py:9: NameError: name 'q' is not defined"),
+        (spring(energy="0.1 * k"), r"mine.py:9: 0\.1.* is a rounded number; write an exact one"),
+        ("from softehl import Definition\ndef f() -> Definition: return 3\n", "f gives int, not a"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line_with_the_line(
+    text: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(ModelFileError, match=message):
+        user.definitions(model_file(text))
+    assert run("mine.py") == 2
+    printed = capsys.readouterr()
+    assert printed.err.startswith("softehl: ")
+    assert len(printed.err.splitlines()) == 1
+    assert not Path("generated").exists()
+
+
+def test_files_that_cannot_be_read_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("missing.py") == 2
+    assert "cannot read" in capsys.readouterr().err
+    Path("binary.py").write_bytes(b"\xff\xfe\x00")
+    assert run("binary.py") == 2
+    assert "it is not UTF-8 text" in capsys.readouterr().err
+
+
+def test_running_a_model_leaves_no_trace() -> None:
+    model_file("K = 1\n", "helper_of_mine.py")
+    path, modules, places = (
+        model_file("import helper_of_mine\n" + spring()),
+        set(sys.modules),
+        [*sys.path],
+    )
+    user.definitions(path)
+    assert set(sys.modules) == modules
+    assert sys.path == places
+    assert not Path("__pycache__").exists()
+
+
+def test_sources_are_the_file_and_what_it_imports_from_its_folder() -> None:
+    model_file("import sympy\nfrom b import x\nimport pack.inner\nif 0:\n    import late\n", "a.py")
+    model_file("from c import *\nx = 1\n", "b.py")
+    model_file("import a\n", "c.py")
+    model_file("", "pack/__init__.py")
+    model_file("from . import beside\nfrom .beside import y\n", "pack/inner.py")
+    model_file("y = 1\n", "pack/beside.py")
+    model_file("", "late.py")
+    model_file("", "unrelated.py")
+    expected = ["a.py", "b.py", "c.py", "late.py"]
+    expected += ["pack/__init__.py", "pack/beside.py", "pack/inner.py"]
+    assert list(model_text.sources(Path("a.py"))) == expected
+    before = model_text.digest(Path("a.py"))
+    model_file("y = 2\n", "pack/beside.py")
+    assert model_text.digest(Path("a.py")) != before
+    model_file("y = 1\n", "pack/beside.py")
+    model_file("z = 1\n", "unrelated.py")
+    assert model_text.digest(Path("a.py")) == before
+
+
+# ------------------------------------------------------------------------------- the command line
+
+
+def test_generate_writes_compiles_and_checks(capsys: pytest.CaptureFixture[str]) -> None:
+    model_file(spring("soft") + spring("hard", "k * u**4 / 4"), "models/mine.py")
+    assert run("models/mine.py") == 0
+    folder = Path("models/generated/mine")
+    written = {p.name for p in folder.iterdir()}
+    assert written == {
+        *("soft.c", "hard.c", "signature.c", "softehl_kernels.h", "manifest.json", LIBRARY)
+    }
+    printed = capsys.readouterr().out
+    assert "6 files in models/generated/mine, 6 of them new or changed" in printed
+    rows = [line.split() for line in printed.splitlines()]
+    for name in ("soft", "hard"):
+        (row,) = [r for r in rows if r[:2] == [name, "energy"]]
+        assert int(row[2]) > 0
+        assert int(row[3]) == (folder / f"{name}.c").stat().st_size
+        assert all(0.0 < float(v) < 60.0 for v in row[4:6])
+        assert all(0.0 <= float(v) < 1e-14 for v in row[6:8])
+    before = {p.name: p.stat().st_mtime_ns for p in folder.iterdir()}
+    assert run("models/mine.py") == 0
+    assert {p.name: p.stat().st_mtime_ns for p in folder.iterdir()} == before
+    again = capsys.readouterr().out
+    assert "0 of them new or changed" in again
+    assert again.count("cached") == 4
+
+
+def test_several_files_go_apart_or_together() -> None:
+    model_file(spring("a"), "a.py")
+    model_file(spring("b"), "b.py")
+    assert run("a.py", "b.py") == 0
+    assert Path("generated/a/a.c").exists()
+    assert Path("generated/b/b.c").exists()
+    assert run("a.py", "b.py", "--out", "both") == 0
+    assert {"a.c", "b.c"} < {p.name for p in Path("both").iterdir()}
+    model_file(spring("a"), "b.py")
+    assert run("a.py", "b.py", "--out", "both") == 2
+
+
+def test_check_names_what_is_stale_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    model_file(spring())
+    assert run("mine.py", "--check") == 1
+    assert not Path("generated").exists()
+    assert run("mine.py") == run("mine.py", "--check") == 0
+    folder = Path("generated/mine")
+    capsys.readouterr()
+
+    source = folder / "spring.c"
+    source.write_text(source.read_text().replace("0.5", "0.6"))
+    assert run("mine.py", "--check") == 1
+    *named, remedy = capsys.readouterr().err.splitlines()
+    assert named == [f"stale: {folder}/spring.c", f"stale: {folder}/{LIBRARY}"]
+    assert remedy == "mend it with: softehl generate mine.py"
+    assert run("mine.py") == run("mine.py", "--check") == 0
+
+    model_file(spring(energy="k * u**2"))
+    capsys.readouterr()
+    assert run("mine.py", "--check") == 1
+    named = capsys.readouterr().err.splitlines()[:-1]
+    assert named == [f"stale: {folder}/{n}" for n in ("spring.c", "manifest.json")]
+    assert run("mine.py") == 0
+    (folder / LIBRARY).unlink()
+    assert run("mine.py", "--check") == 1
+
+
+def test_a_renamed_model_leaves_nothing_behind_and_files_of_others_are_left_alone(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(str(model_file(spring("old")))) == 0
+    assert run(str(model_file(spring("new")))) == 0
+    assert {p.name for p in Path("generated/mine").glob("*.c")} == {"new.c", "signature.c"}
+    Path("own").mkdir()
+    Path("own/solver.c").write_text("int solver;\n")
+    capsys.readouterr()
+    assert run("mine.py", "--out", "own") == 2
+    assert "own holds solver.c, which softehl did not write" in capsys.readouterr().err
+    assert [p.name for p in Path("own").iterdir()] == ["solver.c"]
+
+
+def test_trace_shows_the_passes_of_a_users_model(capsys: pytest.CaptureFixture[str]) -> None:
+    model_file(spring())
+    assert run("mine.py", "--trace", "spring") == 0
+    assert "spring tangent" in capsys.readouterr().out
+    assert run("mine.py", "--trace", "other") == 2
+    assert "no model 'other'; there are spring" in capsys.readouterr().err
+
+
+def test_out_needs_a_model(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--out", "somewhere") == 2
+    assert "--out needs a MODEL.py" in capsys.readouterr().err
+    assert cli.generate(out=Path("somewhere")) == 2
+
+
+def test_a_failed_compilation_shows_the_command_and_the_compilers_words(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    compiler = Path("broken-cc").absolute()
+    compiler.write_text('#!/bin/sh\ncase "$*" in *-dM*) exit 0;; esac\necho no way >&2\nexit 3\n')
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    model_file(spring())
+    assert run("mine.py") == 2
+    printed = capsys.readouterr().err
+    assert "the C compiler failed (3)" in printed
+    assert "broken-cc" in printed
+    assert "no way" in printed
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert run("mine.py") == 2
+    assert "no C compiler: 'no-such-compiler' is not on the PATH" in capsys.readouterr().err
+
+
+# ------------------------------------------------------------------------------ the tangent check
+
+
+def test_a_wrong_kernel_is_caught_whichever_task_is_wrong(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The check must fail on C that is wrong: one number is changed in one function at a time."""
+    model_file(spring(energy="k * u**3 / 5"))
+    definitions, made = library.of_files([Path("mine.py")])
+    derived = dict(made.files)
+    for task in ("energy", "residual", "tangent"):
+        text = derived["spring.c"]
+        start = text.index(f"softehl_spring_{task}_group")
+        wrong = text[:start] + text[start:].replace("* v", "* 1.0000001 * v", 1)
+        assert wrong != text
+        files = {**derived, "spring.c": wrong}
+        folder, _ = library._compile(files)
+        errors = verify.errors(definitions[0], ("energy", "residual", "tangent"), folder / LIBRARY)
+        assert {t for t, e in errors.items() if e > verify.BOUND} == {task}
+        assert errors[task] < 1e-6
+        assert cli_files._judge("spring", errors) == 1
+        assert f"spring: {task} is off by" in capsys.readouterr().err
+
+
+def test_derivatives_that_a_page_gives_itself_are_not_compared(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    energy = "m.define('half', k * u**2 / 2, derivative={u: k * u / 3})"
+    model_file(spring(energy=energy))
+    assert run("mine.py") == 0
+    assert "spring gives derivatives of its own: residual and tangent" in capsys.readouterr().out
+
+
+def test_not_a_number_fails_the_check() -> None:
+    assert cli_files._judge("it", {"tangent": float("inf")}) == 1
+    assert verify._finite(float("nan")) == float("inf")
+
+
+def test_a_model_far_from_its_domain_says_what_to_give(capsys: pytest.CaptureFixture[str]) -> None:
+    energy = "m.integral('Pi', sp.log(m.define('slack', k - 40)) * u**2)"
+    text = "import sympy as sp" + spring(energy=energy)
+    model_file(text)
+    assert run("mine.py") == 2
+    printed = capsys.readouterr().err
+    assert "spring cannot be checked: log(.. slack ..) has no real value" in printed
+    assert "m.example(k=...)" in printed
+    model_file(text.replace("    return", "    m.example(k=50)\n    return"))
+    assert run("mine.py") == 0
+    model_file(text.replace("    return", "    m.example(q=50)\n    return"))
+    assert run("mine.py") == 2
+    assert "example: q is no argument of spring" in capsys.readouterr().err
+
+
+# ------------------------------------------------------------------------------------- loading
+
+
+def test_a_model_file_is_loaded_and_follows_its_text(capsys: pytest.CaptureFixture[str]) -> None:
+    X, u = np.zeros((2, 1)), np.array([[2.0], [3.0]])
+    path = model_file(spring())
+    kernel = softehl.load_kernel("mine.py")
+    np.testing.assert_array_equal(kernel.residual(X, u, parameters={"k": 10.0}), 10.0 * u)
+    assert softehl.load_kernel(path) is kernel
+    model_file(spring(energy="2 * k * u**2"))
+    other = softehl.load_kernel("mine.py")
+    np.testing.assert_array_equal(other.residual(X, u, parameters={"k": 10.0}), 40.0 * u)
+    np.testing.assert_array_equal(kernel.residual(X, u, parameters={"k": 10.0}), 10.0 * u)
+    with pytest.raises(ArgumentError, match=r"dofs has shape \(2, 2\), must be \(2, 1\)"):
+        kernel.residual(X, np.zeros((2, 2)), parameters=[1.0])
+    with pytest.raises(ArgumentError, match="dofs holds complex128, must be real numbers"):
+        kernel.residual(X, np.full((2, 1), 1j), parameters=[1.0])
+
+
+def test_an_imported_file_that_changes_is_noticed() -> None:
+    X, u = np.zeros((1, 1)), np.ones((1, 1))
+    model_file("FACTOR = 3\n", "constants.py")
+    model_file("from constants import FACTOR\n" + spring(energy="FACTOR * k * u"))
+    assert softehl.load_kernel("mine.py").residual(X, u, parameters=[1.0]) == 3.0
+    model_file("FACTOR = 5\n", "constants.py")
+    assert softehl.load_kernel("mine.py").residual(X, u, parameters=[1.0]) == 5.0
+
+
+def test_one_of_several_models_is_named() -> None:
+    model_file(spring("a") + spring("b"))
+    assert softehl.load_kernel("mine.py", "b").name == "b"
+    with pytest.raises(MissingKernelsError, match="holds a, b: name one of them"):
+        softehl.load_kernel("mine.py")
+    with pytest.raises(MissingKernelsError, match="no kernel 'c'; there are a, b"):
+        softehl.load_kernel("mine.py", "c")
+
+
+def test_definitions_shipped_names_and_folders_are_loaded() -> None:
+    (definition,) = user.definitions(model_file(spring()))
+    kernel = softehl.load_kernel(definition)
+    assert kernel.name == "spring"
+    assert softehl.load_kernel("solid_q4").name == "solid_q4"
+    assert run("mine.py") == 0
+    again = softehl.load_kernel("generated/mine")
+    assert again.signature == kernel.signature
+    source = Path("generated/mine/spring.c")
+    source.write_text(source.read_text().replace("0.5", "0.6"))
+    with pytest.raises(StaleKernelsError, match="mine/ has changed since it was loaded"):
+        softehl.load_kernel("generated/mine")
+    shutil.copytree("generated/mine", "edited")
+    with pytest.raises(StaleKernelsError, match=r"other sources .* run `softehl generate`"):
+        softehl.load_kernel("edited")
+    with pytest.raises(MissingKernelsError, match="no kernel 'nothing'; there are solid_q4"):
+        softehl.load_kernel("nothing")
+
+
+def test_equal_definitions_have_one_fingerprint_and_different_ones_differ() -> None:
+    texts = [spring(), spring(), spring(energy="k * u**2 / 3"), spring().replace("[N/mm]", "[N]")]
+    prints = [library.fingerprint(user.definitions(model_file(t))[0]) for t in texts]
+    assert prints[0] == prints[1]
+    assert len(set(prints)) == 3
+    assert cache.root().name == "cache"

@@ -1,0 +1,65 @@
+"""The tutorial does what it says: every block is run in order, every number it shows comes out."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.docs.pages import Block, Reader, blocks
+
+DOCS = Path(__file__).parents[2] / "docs"
+TUTORIAL = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+CHAPTERS = dict(re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", TUTORIAL, re.MULTILINE | re.DOTALL))
+
+
+@pytest.fixture
+def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
+    """In an empty folder, with an empty cache and a window of 100 columns."""
+    monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("COLUMNS", "100")
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return Reader(DOCS / "models")
+
+
+@pytest.mark.parametrize("chapter", CHAPTERS)
+def test_a_chapter_runs_in_order_and_prints_what_it_shows(chapter: str, reader: Reader) -> None:
+    for block in blocks(CHAPTERS[chapter]):
+        reader.read(block)
+
+
+def test_the_chapters_hold_the_whole_page_and_every_model() -> None:
+    inside = [b for text in CHAPTERS.values() for b in blocks(text)]
+    assert len(inside) == len(blocks(TUTORIAL))
+    assert TUTORIAL.count("\n```") == 2 * len(inside)
+    shown = {b.name for b in inside if b.kind == "python" and b.name}
+    assert shown == {p.name for p in (DOCS / "models").glob("*.py")}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        [Block("python", "gent.py", "x = 1\n", 1)],
+        [Block("python", "", "print(1 + 1)\n", 1), Block("text", "", "3\n", 2)],
+        [Block("console", "", "$ softehl kernels --no\n", 1)],
+        [Block("console", "", "$ softehl generate --trace contact\nsomething else\n", 1)],
+        [Block("console", "", "$ rm it\n", 1)],
+        [Block("yaml", "", "", 1)],
+    ],
+)
+def test_a_page_that_is_wrong_is_noticed(wrong: list[Block], reader: Reader) -> None:
+    *before, last = wrong
+    for block in before:
+        reader.read(block)
+    with pytest.raises(AssertionError, match="line "):
+        reader.read(last)
+
+
+def test_the_table_of_contents_names_every_page_and_no_other() -> None:
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    linked = set(re.findall(r"\]\(([^)#:]+)\)", index))
+    pages = {p.relative_to(DOCS).as_posix() for p in DOCS.rglob("*.md")} - {"index.md"}
+    assert pages <= linked
+    assert all((DOCS / target).exists() for target in linked)
