@@ -40,6 +40,7 @@ def stretches(energy: Any = None) -> Definition:
 
     W = m.principal("W", C, energy or mixed)
     m.potential(W)
+    m.fields(W=W, mu=mu, alpha=alpha, beta=beta)  # another energy may leave them unused
     m.offer(derivatives=[alpha])
     return m.finish()
 
