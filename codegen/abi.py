@@ -25,7 +25,8 @@ not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped 
 | `parameters`  | nparameters          | constants of the call, in the manifest's order           |
 | `direction`   | n, ndof              | vector that task `product` multiplies by the tangent     |
 | `rule`        | points, dimension + 1| parent coordinates of each point, then its weight        |
-| `basis`       | points, modes, 2     | value and xi-derivative of the interpolating shapes      |
+| `basis`       | points, modes,       | value and xi-derivative of the interpolating shapes, one |
+|               | components           | pair for each interpolated field (2 components a field)  |
 | `values`      | see task             | written, never accumulated                               |
 | `tangent`     | n, ndof, ndof        | written by task `tangent` only, row-major dR_i/du_j      |
 

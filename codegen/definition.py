@@ -43,6 +43,8 @@ class Definition:
     derivatives: tuple[tuple[str, Node], ...] = ()
     example: tuple[tuple[str, float], ...] = ()
     tasks: tuple[str, ...] | None = None
+    components: int = 2
+    """Basis values of the interpolated field: value and derivative, on each side of a facet."""
     nodal: tuple[tuple[int, int], ...] = ()
     """First unknown and number of components of every field with unknowns at the nodes."""
 

@@ -47,6 +47,7 @@ class Model:
         self._coordinates: tuple[str, ...] = ()
         self._unknowns: list[str] = []
         self._interpolated: str | None = None
+        self._components = 2
         self._directions: list[Node] = []
         self._nodal: list[tuple[int, int]] = []
         self._arguments: dict[str, list[Argument]] = {
@@ -102,15 +103,23 @@ class Model:
 
     def interpolated(self, name: str) -> tuple[sp.Symbol, sp.Symbol]:
         """Value and xi-derivative of a field with any number of element unknowns (`modes`)."""
+        return self.interpolated_sides(name)[0]
+
+    def interpolated_sides(self, *names: str) -> list[tuple[sp.Symbol, sp.Symbol]]:
+        """Value and xi-derivative of several fields that share the `modes` unknowns.
+
+        An interior facet has two: the traces from its sides.  The basis holds both components
+        of each field for every mode, zero where a mode belongs to another field.
+        """
         if self._interpolated:
-            raise ModelError(f"{name}: the element interpolates {self._interpolated} already")
-        self._interpolated = name
-        pair = [
-            self._input(label, "interpolated", k, varying=True)
-            for k, label in enumerate((name, f"{name}_xi"))
+            raise ModelError(f"{names[0]}: the element interpolates {self._interpolated} already")
+        self._interpolated, self._components = ", ".join(names), 2 * len(names)
+        labels = [label for name in names for label in (name, f"{name}_xi")]
+        symbols = [
+            self._input(label, "interpolated", k, varying=True) for k, label in enumerate(labels)
         ]
-        self._directions.extend(self._bound[s] for s in pair)
-        return pair[0], pair[1]
+        self._directions.extend(self._bound[s] for s in symbols)
+        return list(zip(symbols[::2], symbols[1::2], strict=True))
 
     def parameters(self, **meanings: str) -> list[sp.Symbol]:
         """Arguments that are the same for all elements of a call."""
@@ -321,6 +330,7 @@ class Model:
             example=tuple(self._example.items()),
             tasks=self._tasks,
             nodal=tuple(self._nodal),
+            components=self._components,
         )
 
         chosen = definition.tasks or ()

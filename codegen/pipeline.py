@@ -148,6 +148,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "coordinates": list(d.coordinates),
         "unknowns": list(d.unknowns),
         "interpolated": d.interpolated,
+        "components": d.components,
         "parameters": {a.name: a.meaning for a in d.parameters},
         "data": {a.name: a.meaning for a in d.data},
         "point_data": {a.name: a.meaning for a in d.point_data},

@@ -66,6 +66,14 @@ def chain_dofs(segments: int, order: int, first: int) -> Integers:
     return start[:, None] + np.arange(order + 1)[None, :]
 
 
+def separate_dofs(segments: int, order: int, first: int) -> Integers:
+    """Unknowns of a discontinuous piecewise polynomial along a chain: (segments, order + 1).
+
+    Neighbours share none, so `(order + 1) * segments` are used.
+    """
+    return first + np.arange(segments * (order + 1)).reshape(segments, order + 1)
+
+
 def gather_rows(*parts: Integers) -> Integers:
     """Element dof map (n, ndof) from maps that stand side by side; each (n, k) or (n,)."""
     columns: Sequence[Integers] = [p[:, None] if p.ndim == 1 else p for p in parts]

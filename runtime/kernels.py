@@ -73,6 +73,7 @@ class Kernel:
     unrolled: bool
     signature: str
     library: Any
+    components: int = 2
 
     def energy(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Potential of each element, (n,)."""
@@ -174,9 +175,11 @@ class _Call:
                 "a basis, e.g. runtime.rules.film_rule(m_p)"
             )
         shape = np.shape(self.rule.basis)
-        if len(shape) != 3 or shape[0] != len(self.rule.weights) or shape[2] != 2:
+        components = self.kernel.components
+        if len(shape) != 3 or shape[0] != len(self.rule.weights) or shape[2] != components:
             raise ArgumentError(
-                f"{self.kernel.name}: basis has shape {shape}, must be (points, modes, 2)"
+                f"{self.kernel.name}: basis has shape {shape}, "
+                f"must be (points, modes, {components})"
             )
         return int(shape[1])
 
@@ -305,6 +308,7 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         default_rule=Rule(np.array(rule["points"]), np.array(rule["weights"]), None),
         signature=entry["signature"],
         library=_library(directory),
+        components=entry["components"],
     )
 
 

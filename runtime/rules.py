@@ -1,4 +1,4 @@
-"""Quadrature rules on [-1, 1] and the pressure shape functions of the film segment, eq. (27)."""
+"""Quadrature rules on [-1, 1] and the pressure shape functions of the film, eqs. (23) and (27)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ class Rule:
     """A quadrature rule and, for the film, the pressure shape functions at its points.
 
     points: (q, dim) reference coordinates; weights: (q,); basis: (q, modes, 2) value and d/dxi of
-    every pressure shape function at every point, or None. All arrays are read-only.
+    every pressure shape function at every point, or None; a facet has two such pairs, (q, modes,
+    4). All arrays are read-only.
     """
 
     points: Array
@@ -87,3 +88,35 @@ def film_rule(m_p: int, kind: Kind = "gauss", points: int | None = None) -> Rule
     count = automatic_points(m_p, kind) if points is None else points
     rule = gauss(count) if kind == "gauss" else lobatto(count)
     return Rule(rule.points, rule.weights, lagrange(pressure_nodes(m_p), rule.points[:, 0]))
+
+
+@cache
+def facet_rule(m_p: int) -> Rule:
+    """Traces at a facet between two segments of order m_p >= 1: one point, 2 (m_p + 1) modes.
+
+    The first m_p + 1 modes are those of the segment that ends at the facet (minus), then come
+    those of the segment that begins there (plus); basis (1, modes, 4): value and d/dxi of the trace
+    from minus, then of the trace from plus.
+    """
+    if m_p < 1:
+        raise ValueError(f"facet_rule: pressure order {m_p} is not allowed, it is at least 1")
+    ends = lagrange(pressure_nodes(m_p), np.array([1.0, -1.0]))
+    basis = np.zeros((1, 2 * (m_p + 1), 4))
+    basis[0, : m_p + 1, :2] = ends[0]
+    basis[0, m_p + 1 :, 2:] = ends[1]
+    return Rule(np.empty((1, 0)), np.ones(1), basis)
+
+
+@cache
+def trace_rule(m_p: int, kind: Kind = "gauss", points: int | None = None) -> Rule:
+    """The film rule with both ends of the segment added, of weight 0 where they were missing.
+
+    For looking at fields that differ between the sides of a facet.
+    """
+    rule = film_rule(m_p, kind, points)
+    inner = rule.points[:, 0]
+    missing = [end for end in (-1.0, 1.0) if end not in inner]
+    xi = np.concatenate([inner, missing])
+    order = np.argsort(xi)
+    weights = np.concatenate([rule.weights, np.zeros(len(missing))])
+    return _line(xi[order], weights[order], lagrange(pressure_nodes(m_p), xi[order]))

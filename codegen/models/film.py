@@ -1,4 +1,9 @@
-"""Lubricant film on a segment of the deformed boundary: Reynolds equation and its tractions."""
+"""Lubricant film on the deformed boundary: Reynolds equation, its tractions, its DG facets.
+
+The continuous (21) and the discontinuous (22) treatment share the segment; the pressure unknowns
+are joined at the nodes in the one, belong to one segment each in the other, which adds the facets.
+The boundary conditions (15) prescribe the end unknowns in both: dp vanishes there.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +14,7 @@ from codegen.model import Definition, Model
 
 
 def reynolds_segment() -> Definition:
-    """Continuous film segment (14), (21), (25)-(28) with tractions (17)-(18), any pressure order.
+    """Film segment (14), (21), (25)-(28) with tractions (17)-(18), any pressure order.
 
     The solid is on the left of the segment, the rod below it; xbar = z and h = r - R_rod on the
     deformed segment.  Cavitation by the penalty (25), viscosity by (13).
@@ -66,4 +71,50 @@ def reynolds_segment() -> Definition:
         tau_rod=couette + poiseuille,
         eta=eta,
     )
+    return m.finish()
+
+
+def reynolds_facet() -> Definition:
+    """Interior facet of the discontinuous Galerkin film (22)-(24), Baumann and Oden (1999).
+
+    Adds + [p n] <dq> - [dp n] <q> with (24)'s dq: partial integration of (14) leaves - [dp n] <q>,
+    and the other term must have the opposite sign for the diffusive parts to be skew. The paper
+    prints both signs reversed, which is not consistent with its cell term: pressures then jump by
+    several MPa. Node 2 is the facet; minus is the segment 1-2, plus is 2-3; n points from minus
+    to plus on the minus side. h is continuous, dp/dxbar differs by each segment's own dxbar/dxi.
+    """
+    m = Model(
+        "film_facet", nodes=3, rule=quadrature.point_rule(), doc=reynolds_facet.__doc__ or ""
+    )
+    X = m.coordinates("Z", "R")
+    u = m.nodal_unknowns("u_z", "u_r")
+    sides = m.interpolated_sides("p_minus", "p_plus")
+    R_rod, U, eta_0, alpha = m.parameters(
+        rod_radius="radius of the rod [mm]",
+        rod_speed="rod speed U, positive towards the air side [mm/s]",
+        viscosity="viscosity at zero pressure [MPa s]",
+        pressure_viscosity="coefficient alpha of (13) [1/MPa]",
+    )
+    z = [a + b for a, b in zip(X[0], u[0], strict=True)]
+    # Subtract the radii of the undeformed ring and rod first: h is 1e-5 of either.
+    h = m.define("h", m.define("clearance", X[1][1] - R_rod) + u[1][1])
+    mobilities, fluxes = [], []
+    for k, (name, (p, p_xi)) in enumerate(zip(("minus", "plus"), sides, strict=True)):
+        z_xi = m.define(f"z_xi_{name}", (z[k + 1] - z[k]) / 2)
+        eta = m.define(f"eta_{name}", eta_0 * sp.exp(alpha * p))
+        # dq of (24) for a unit xi-derivative of dp
+        mobilities.append(m.define(f"mobility_{name}", -(h**3) / (12 * eta * z_xi)))
+        fluxes.append(m.define(f"q_{name}", U / 2 * h + mobilities[k] * p_xi))
+    (p_minus, p_minus_xi), (p_plus, p_plus_xi) = sides
+    jump = m.define("jump", p_minus - p_plus)
+    q = m.define("q", (fluxes[0] + fluxes[1]) / 2)
+    m.weak_form(
+        [
+            (jump * mobilities[0] / 2, p_minus_xi),
+            (jump * mobilities[1] / 2, p_plus_xi),
+            (-q, p_minus),
+            (q, p_plus),
+        ]
+    )
+    m.fields(x=z[1], h=h, jump=jump, flux=q, flux_jump=fluxes[0] - fluxes[1])
     return m.finish()
