@@ -143,12 +143,7 @@ def run(
     settings: PathSettings | None = None,
     walker: Walker | None = None,
 ) -> Outcome:
-    """Solve the O-ring and report to the observer; failure is in the outcome's status.
-
-    Raises NotImplementedError for reynolds = "dg".
-    """
-    if parameters.reynolds != "fe":
-        raise NotImplementedError('reynolds = "dg" is not available yet: use "fe"')
+    """Solve the O-ring and report to the observer; failure is in the outcome's status."""
     section = build_section(parameters)
     progress = _Run(section, observer, settings or PathSettings(), walker or Walker())
     strokes: tuple[Stroke, ...] = ("out", "in")

@@ -32,7 +32,7 @@ class ORing(BaseModel):
     )
     reynolds: Literal["fe", "dg"] = Field(
         default="fe",
-        description='treatment of the Reynolds equation; "fe" ("dg" is not available yet)',
+        description='treatment of the Reynolds equation; "fe" (continuous pressure) or "dg"',
     )
     quadrature: Literal["gauss", "lobatto"] = Field(
         default="gauss", description='quadrature rule of the film; "gauss" or "lobatto"'

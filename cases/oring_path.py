@@ -106,18 +106,22 @@ def film_problem(section: OringSection, settings: PathSettings, film: Film) -> P
     the contact pressure: forces that fade without a constraint that would outlive them.
     """
     p, p_s, w = section.parameters, film.sealed_pressure, film.weight
+    flow = {
+        "rod_radius": section.rod_radius,
+        "rod_speed": film.rod_speed,
+        "viscosity": p.viscosity,
+        "pressure_viscosity": p.pressure_viscosity,
+    }
     problem = contact_problem(section, settings, p_s).with_parameters(
         rod={"force_weight": 1.0 - w} if w < 1.0 else None,
         sealed_arc={"pressure": p_s * (1.0 - w)},
         film={
-            "rod_radius": section.rod_radius,
-            "rod_speed": film.rod_speed,
-            "viscosity": p.viscosity,
-            "pressure_viscosity": p.pressure_viscosity,
+            **flow,
             "cavitation_penalty": p.cavitation_penalty,
             "force_weight": w,
             "shear_weight": film.shear,
         },
+        **({"facet": flow} if p.reynolds == "dg" else {}),
     )
     fixed = [section.film_ends, section.layout.dofs("rod")]
     values: list[Array | float] = [np.array([p_s, 0.0]), film.multipliers]

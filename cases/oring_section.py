@@ -22,11 +22,11 @@ from runtime.contact import (
     plane,
     tributary_areas,
 )
-from runtime.dofs import DofLayout, chain_dofs, displacement_dofs, gather_rows
+from runtime.dofs import DofLayout, chain_dofs, displacement_dofs, gather_rows, separate_dofs
 from runtime.kernels import load_kernel
 from runtime.mesh import Disc, SectionMesh, disc_mesh
 from runtime.problem import KeepsOrientation, Problem, StaysPositive
-from runtime.rules import film_rule
+from runtime.rules import facet_rule, film_rule
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -61,7 +61,7 @@ class OringSection:
 
     @property
     def film_ends(self) -> Integers:
-        """Pressure unknowns at the sealed and the air end of the arc, eq. (15)."""
+        """Pressure unknowns at the sealed and the air end of the arc, (15), for "fe" and "dg"."""
         pressures = self.layout.dofs("pressure")
         return pressures[[0, -1]]
 
@@ -85,7 +85,7 @@ def build_section(p: ORing) -> OringSection:
     centre_r = 0.5 * p.inner_diameter + radius
     disc = Disc(0.0, centre_r, radius, p.arc_start, p.arc_end)
     mesh = disc_mesh(disc, p.density)
-    layout = number_unknowns(mesh, p.pressure_order)
+    layout = number_unknowns(mesh, p)
     obstacles = {o.name: o for o in _obstacles(p)}
     assembler = Assembler.build(layout.total, _blocks(p, mesh, layout, obstacles))
     problem = Problem(
@@ -101,12 +101,16 @@ def build_section(p: ORing) -> OringSection:
     return replace(section, problem=problem.with_fixed([layout.dofs("pressure")], [0.0]))
 
 
-def number_unknowns(mesh: SectionMesh, pressure_order: int) -> DofLayout:
-    """Displacements, pressures, rod and housing multipliers, moment: one vector for all stages."""
-    outer = len(mesh.outer_nodes)
+def number_unknowns(mesh: SectionMesh, p: ORing) -> DofLayout:
+    """Displacements, pressures, rod and housing multipliers, moment: one vector for all stages.
+
+    Pressures: m_p a segment and one more where they are continuous, m_p + 1 a segment in (22).
+    """
+    outer, m_p = len(mesh.outer_nodes), p.pressure_order
+    continuous = p.reynolds == "fe"
     return DofLayout.of(
         displacement=2 * len(mesh.points),
-        pressure=pressure_order * mesh.arc + 1,
+        pressure=m_p * mesh.arc + 1 if continuous else (m_p + 1) * mesh.arc,
         rod=mesh.arc + 1,
         housing=outer,
         sealed_wall=outer,
@@ -146,7 +150,8 @@ def _blocks(
     quad_dofs = displacement_dofs(mesh.quads)
     moment = np.full(len(mesh.quads), layout.dofs("rotation")[0])
     arc = mesh.arc_segments
-    pressures = chain_dofs(mesh.arc, p.pressure_order, layout.part("pressure").start)
+    number = chain_dofs if p.reynolds == "fe" else separate_dofs
+    pressures = number(mesh.arc, p.pressure_order, layout.part("pressure").start)
     rule = film_rule(p.pressure_order, p.quadrature, p.quadrature_points)
     follower, contact = load_kernel("follower_pressure"), load_kernel("contact")
     outer = _sealed_side(p, mesh)
@@ -170,11 +175,25 @@ def _blocks(
             gather_rows(displacement_dofs(arc), pressures),
             rule=rule,
         ),
+        *([_facets(p, mesh, pressures)] if p.reynolds == "dg" else []),
         ElementBlock(
             "rotation", load_kernel("mean_rotation"), quads, gather_rows(quad_dofs, moment)
         ),
         ElementBlock("spring", load_kernel("axial_spring"), quads, quad_dofs),
     ]
+
+
+def _facets(p: ORing, mesh: SectionMesh, pressures: Integers) -> ElementBlock:
+    """Interior facets (22): the nodes between two segments of the arc, with both neighbours."""
+    nodes = mesh.arc_nodes
+    triples = np.stack([nodes[:-2], nodes[1:-1], nodes[2:]], axis=1)
+    return ElementBlock(
+        "facet",
+        load_kernel("film_facet"),
+        _flat(mesh.points, triples),
+        gather_rows(displacement_dofs(triples), pressures[:-1], pressures[1:]),
+        rule=facet_rule(p.pressure_order),
+    )
 
 
 def _flat(points: Array, segments: Integers) -> Array:

@@ -26,8 +26,6 @@ def run_case(case: Case, folder: Path, *, resume: bool, jobs: int, quiet: bool) 
 
     Raises BadInput where the parameters, the folder or the kernels cannot be used.
     """
-    if case.parameters.reynolds == "dg":
-        raise BadInput('reynolds = "dg": not available yet; allowed: reynolds = "fe"')
     record = RunRecord(folder, case, resume=resume)
     runs = plan(case.parameters, record, jobs)
     with make_display(quiet=quiet) as display, _recorded(record):

@@ -83,9 +83,7 @@ def reynolds_facet() -> Definition:
     several MPa. Node 2 is the facet; minus is the segment 1-2, plus is 2-3; n points from minus
     to plus on the minus side. h is continuous, dp/dxbar differs by each segment's own dxbar/dxi.
     """
-    m = Model(
-        "film_facet", nodes=3, rule=quadrature.point_rule(), doc=reynolds_facet.__doc__ or ""
-    )
+    m = Model("film_facet", nodes=3, rule=quadrature.point_rule(), doc=reynolds_facet.__doc__ or "")
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
     sides = m.interpolated_sides("p_minus", "p_plus")

@@ -13,10 +13,26 @@ TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16:
 
 @pytest.mark.parametrize("d", TABLE_2)
 def test_unknowns_of_table_2(d: int) -> None:
-    layout = number_unknowns(disc_mesh(Disc(0.0, 26.96, 1.765, -34.0, 43.0), d), 4)
+    mesh = disc_mesh(Disc(0.0, 26.96, 1.765, -34.0, 43.0), d)
+    layout = number_unknowns(mesh, oring(density=1))
     total, pressures = TABLE_2[d]
     assert layout.count("pressure") == pressures == 108 * d + 1
     assert layout.total == pytest.approx(total, rel=0.03)
+
+
+@pytest.mark.parametrize("m_p", range(1, 6))
+def test_discontinuous_pressures_have_all_their_unknowns(m_p: int) -> None:
+    section = build_section(oring(density=1, pressure_order=m_p, reynolds="dg"))
+    assert section.layout.count("pressure") == 27 * (m_p + 1)
+    first = section.layout.part("pressure").start
+    assert section.film_ends.tolist() == [first, first + 27 * (m_p + 1) - 1]
+    film, facet = (section.problem.assembler.block(name) for name in ("film", "facet"))
+    assert np.unique(film.dofs[:, 4:]).size == 27 * (m_p + 1)
+    assert facet.dofs.shape == (26, 6 + 2 * (m_p + 1))
+    # a facet sees the displacements and pressures of the segments on its two sides
+    assert np.array_equal(facet.dofs[:, :4], film.dofs[:-1, :4])
+    assert np.array_equal(facet.dofs[:, 2:6], film.dofs[1:, :4])
+    assert np.array_equal(facet.dofs[:, 6:], np.hstack([film.dofs[:-1, 4:], film.dofs[1:, 4:]]))
 
 
 @pytest.mark.parametrize("m_p", range(1, 6))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from codegen.evaluate import State
 from runtime.kernels import Kernel, load_kernel
-from runtime.rules import Kind, Rule, film_rule
+from runtime.rules import Kind, Rule, facet_rule, film_rule
 
 Array = npt.NDArray[np.float64]
 MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))
@@ -137,6 +137,20 @@ def films(rng: np.random.Generator, m_p: int, kind: Kind) -> Iterator[Case]:
         yield replace(plain, rule=film_rule(m_p, kind, points))
 
 
+def facets(rng: np.random.Generator, m_p: int) -> Iterator[Case]:
+    """Interior facet of order `m_p`, unequal segments: both strokes, with and without (13)."""
+    for label, speed, alpha in (("out", 400.0, 0.02), ("in", -100.0, 0.0)):
+        X = np.array([[-0.1, 25.4], [0.02, 25.45], [0.07, 25.46]]) + rng.uniform(
+            -0.01, 0.01, (3, 2)
+        )
+        u = rng.uniform(-0.01, 0.01, (3, 2))
+        u[1, 1] = 25.0 + rng.uniform(0.004, 0.03) - X[1, 1]
+        p = rng.uniform(-1, 4, 2 * (m_p + 1))
+        parameters = [25.0, speed, 6.6e-8, alpha]
+        plain = _case("film_facet", f"m_p={m_p} {label}", X, [*u.ravel(), *p], parameters)
+        yield replace(plain, rule=facet_rule(m_p))
+
+
 def all_cases() -> list[Case]:
     """Every case of every family: the same in every run."""
     rng = np.random.default_rng(20251)
@@ -145,4 +159,5 @@ def all_cases() -> list[Case]:
     for m_p in range(1, 6):
         for kind in kinds:
             cases += films(rng, m_p, kind)
+        cases += facets(rng, m_p)
     return cases

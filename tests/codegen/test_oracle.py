@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 LIMIT = 1e-12
 CASES = {f"{c.family}: {c.label}": c for c in all_cases()}
 ENERGIES = ("solid_q4", "solid_taylor", "mean_rotation", "axial_spring")
-FIELDS = ("solid_q4", "solid_fbar", "solid_taylor", "film")
+FIELDS = ("solid_q4", "solid_fbar", "solid_taylor", "film", "film_facet")
 
 
 @cache
@@ -177,7 +177,17 @@ def test_one_entry_wrong_by_1e9_is_refused(family: str) -> None:
 
 @pytest.mark.parametrize(
     ("family", "forgotten"),
-    [("solid_fbar", "a"), ("film", "h"), ("film", "ring"), ("film", "eta"), ("contact", "gap")],
+    [
+        ("solid_fbar", "a"),
+        ("film", "h"),
+        ("film", "ring"),
+        ("film", "eta"),
+        ("film_facet", "h"),
+        ("film_facet", "z_xi_minus"),
+        ("film_facet", "eta_plus"),
+        ("film_facet", "jump"),
+        ("contact", "gap"),
+    ],
 )
 def test_a_kernel_that_forgets_a_dependence_is_refused(
     family: str, forgotten: str, tmp_path: Path

@@ -156,6 +156,9 @@ def test_tangent_without_a_term_is_rejected() -> None:
         (pick("film", "m3-gauss-out-pressed"), film_on_a_fixed_domain),
         (pick("film", "m4-gauss-in-crossing"), film_without_penalty),
         (pick("film", "m2-lobatto-out-pressed"), film_without_barus),
+        (pick("film_facet", "m3-out"), facet_on_a_fixed_domain),
+        (pick("film_facet", "m3-out"), facet_with_the_printed_signs),
+        (pick("film_facet", "m4-thin"), facet_without_barus),
     ):
         kernel = call("tangent", state)[1][0]
         errors = oracles.tangent_errors(kernel, dropped(state), state.family)
@@ -217,6 +220,21 @@ def film_without_penalty(state: State) -> Matrix:
 
 def film_without_barus(state: State) -> Matrix:
     return film_variant(state, pressure_viscosity=0.0)
+
+
+def facet_on_a_fixed_domain(state: State) -> Matrix:
+    exact = [list(row) for row in oracles.tangent(state)]
+    for row in exact[6:]:
+        row[0] = row[2] = row[4] = numbers([0])[0]
+    return exact
+
+
+def facet_with_the_printed_signs(state: State) -> Matrix:
+    return [[-entry for entry in row] for row in oracles.tangent(state)]
+
+
+def facet_without_barus(state: State) -> Matrix:
+    return oracles.tangent(replace(state, parameters=(*state.parameters[:3], 0.0)))
 
 
 # ------------------------------------------------------------- the references are tested on theory

@@ -14,6 +14,8 @@ from tests.reference.states import State
 
 def rule_of(state: State) -> Any:
     """The double-precision rule that goes with a state (None: the kernel's own)."""
+    if state.family == "film_facet":
+        return rules.facet_rule((len(state.dofs) - 6) // 2 - 1)
     if state.family != "film":
         return None
     return rules.film_rule(len(state.dofs) - 5, state.kind, state.count)

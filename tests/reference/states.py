@@ -158,6 +158,24 @@ def film_states(orders: tuple[int, ...] = ORDERS) -> Iterator[State]:
                 )
 
 
+def facet_states(orders: tuple[int, ...] = ORDERS) -> Iterator[State]:
+    """Segments of unequal length, jumps of either sign, both strokes; a film of 0.3 micrometres."""
+    rng = np.random.default_rng(1999)
+    for order in orders:
+        for label, speed, alpha, gap in (
+            ("out", 400.0, 0.02, 0.012),
+            ("in", -100.0, 0.0, 0.007),
+            ("thin", 25.0, 0.5, 0.0003),
+        ):
+            X = np.array([-0.1, 25.42, 0.02, 25.45, 0.09, 25.47])
+            u = 0.01 * rng.uniform(-1, 1, 6)
+            u[3] = (25.0 - 25.45) + gap  # R - R_rod first, as for the segments
+            p = 2.0 + 1.5 * rng.uniform(-1, 1, 2 * (order + 1))
+            dofs = _tuple(np.concatenate([u, p]))
+            parameters = (25.0, speed, 6.59e-8, alpha)
+            yield State("film_facet", f"m{order}-{label}", _tuple(X), dofs, parameters)
+
+
 def thin_film_states() -> Iterator[State]:
     """A film of about 0.3 micrometres at a radius of 25 mm: h must not be lost in r - R_rod."""
     for state in film_states((4,)):
@@ -168,4 +186,5 @@ def thin_film_states() -> Iterator[State]:
 
 def all_states() -> list[State]:
     """Every state of every family."""
-    return [*solid_states(), *boundary_states(), *section_states(), *film_states()]
+    bodies = [*solid_states(), *boundary_states(), *section_states()]
+    return [*bodies, *film_states(), *facet_states()]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from runtime.dofs import DofLayout, chain_dofs, displacement_dofs, gather_rows
+from runtime.dofs import DofLayout, chain_dofs, displacement_dofs, gather_rows, separate_dofs
 
 
 def test_fields_follow_each_other_without_gaps() -> None:
@@ -29,6 +29,10 @@ def test_neighbours_in_a_chain_share_one_unknown(segments: int, order: int) -> N
     assert dofs.shape == (segments, order + 1)
     assert np.array_equal(dofs[1:, 0], dofs[:-1, -1])
     assert np.unique(dofs).tolist() == list(range(100, 100 + order * segments + 1))
+
+
+def test_neighbours_may_share_no_unknown() -> None:
+    assert separate_dofs(2, 3, 10).tolist() == [[10, 11, 12, 13], [14, 15, 16, 17]]
 
 
 def test_columns_are_joined() -> None:

@@ -17,7 +17,7 @@ from runtime.kernels import (
     load_kernel,
     manifest,
 )
-from runtime.rules import Rule, film_rule, gauss
+from runtime.rules import Rule, facet_rule, film_rule, gauss
 
 Array = npt.NDArray[np.float64]
 FAMILIES = tuple(manifest())
@@ -49,12 +49,14 @@ def arguments(name: str, n: int, rng: np.random.Generator) -> tuple[tuple[Array,
     kernel = load_kernel(name)
     corners = {
         4: [[-0.1, 25.3], [0.1, 25.3], [0.1, 25.5], [-0.1, 25.5]],
+        3: [[-0.1, 25.4], [0.0, 25.42], [0.1, 25.45]],
         2: [[-0.1, 25.4], [0.1, 25.45]],
         1: [[0.1, 25.4]],
     }[kernel.nodes]
     X = np.array(corners)[None] + rng.uniform(-0.02, 0.02, (n, kernel.nodes, 2))
-    rule = film_rule(3) if kernel.interpolated else None
-    ndof = len(kernel.unknowns) + (4 if rule else 0)
+    rule = {None: None, "p": film_rule(3), "p_minus, p_plus": facet_rule(3)}[kernel.interpolated]
+    modes = 0 if rule is None or rule.basis is None else rule.basis.shape[1]
+    ndof = len(kernel.unknowns) + modes
     u = rng.uniform(-0.01, 0.01, (n, ndof))
     data = rng.uniform(0.5, 1.5, (n, len(kernel.data)))
     named = {"parameters": {p: VALUES[p] for p in kernel.parameters}, "data": data, "rule": rule}
@@ -82,6 +84,7 @@ def test_families_offer_what_the_contract_says() -> None:
         "follower_pressure": (2, 4),
         "contact": (1, 3),
         "film": (2, 4),
+        "film_facet": (3, 6),
         "mean_rotation": (4, 9),
         "axial_spring": (4, 8),
     }
@@ -107,7 +110,10 @@ def test_names_are_in_the_order_of_the_arrays() -> None:
         "shear_weight",
     )
     assert film.unknowns == ("u_z1", "u_r1", "u_z2", "u_r2")
-    assert film.interpolated == "p"
+    assert (film.interpolated, film.components) == ("p", 2)
+    facet = load_kernel("film_facet")
+    assert (facet.interpolated, facet.components) == ("p_minus, p_plus", 4)
+    assert facet.fields == ("x", "h", "jump", "flux", "flux_jump")
     assert film.fields == ("x", "dx", "h", "p", "tau", "flux", "tau_rod", "eta")
     assert contact.data == ("n_z", "n_r", "c", "area", "rho")
     assert contact.unknowns[-1] == "lambda"

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from runtime.rules import film_rule, gauss, lagrange, lobatto, pressure_nodes
+from runtime.rules import (
+    facet_rule,
+    film_rule,
+    gauss,
+    lagrange,
+    lobatto,
+    pressure_nodes,
+    trace_rule,
+)
 
 
 def _error(points: np.ndarray, weights: np.ndarray, degree: int) -> float:
@@ -66,6 +74,28 @@ def test_automatic_rule_is_the_smallest_that_is_exact(m_p: int, kind: str) -> No
     assert _error(fewer.points[:, 0], fewer.weights, degree - 1) > 1e-6
 
 
+@pytest.mark.parametrize("m_p", range(1, 8))
+def test_a_facet_sees_the_end_of_one_segment_and_the_start_of_the_next(m_p: int) -> None:
+    basis = facet_rule(m_p).basis
+    assert basis is not None
+    minus, plus = Polynomial(np.linspace(1.0, -0.7, m_p + 1)), Polynomial(np.arange(m_p + 1.0))
+    nodes = pressure_nodes(m_p)
+    traces = np.concatenate([minus(nodes), plus(nodes)]) @ basis[0]
+    expected = [minus(1.0), minus.deriv()(1.0), plus(-1.0), plus.deriv()(-1.0)]
+    assert traces == pytest.approx(expected, rel=1e-11, abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["gauss", "lobatto"])
+def test_the_trace_rule_adds_the_missing_ends_without_weight(kind: str) -> None:
+    plain, traces = film_rule(3, kind), trace_rule(3, kind)
+    assert traces.points[[0, -1], 0].tolist() == [-1.0, 1.0]
+    assert traces.weights.sum() == pytest.approx(2.0)
+    assert set(plain.points[:, 0]) <= set(traces.points[:, 0])
+    assert len(traces.weights) == len(plain.weights) + (2 if kind == "gauss" else 0)
+    assert traces.basis is not None
+    assert traces.basis.shape == (len(traces.weights), 4, 2)
+
+
 def test_rules_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         gauss(3).weights[0] = 1.0
@@ -78,3 +108,5 @@ def test_impossible_rules_are_refused() -> None:
         lobatto(1)
     with pytest.raises(ValueError, match="at least 1"):
         film_rule(0)
+    with pytest.raises(ValueError, match="at least 1"):
+        facet_rule(0)
