@@ -36,6 +36,8 @@ class CurveRow:
     flux_variation: float
     moment_N_mm: float
     contact_p_max_MPa: float
+    oscillation_index: float
+    inlet_segments: float
     verdict: str
 
     @classmethod

@@ -18,6 +18,10 @@ OK = "ok"
 """Verdict of a state that may be used as a result."""
 COLLAPSED = "collapsed"
 """Verdict of a state on the spurious collapsed branch of a too coarse mesh: never a result."""
+UNDER_RESOLVED = "under-resolved"
+"""Verdict of a state whose inlet is shorter than the mesh can show: h* may be far off."""
+OSCILLATING = "oscillating"
+"""Verdict of a state whose film zigzags from node to node: h* is sound, the profile is not."""
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -70,10 +74,11 @@ class FilmState:
 
     rod_speed: U in mm/s, + = outstroke.  h_star_um: h* of (16) from the element-mean flux.
     leak_rate_mm3_s: 2 pi R_rod q.  flux_variation: relative spread of the element-mean flux outside
-    cavitation (zero in exact arithmetic).  pressure_jump_max_MPa: 0 for continuous pressure.
+    cavitation (zero in exact arithmetic).  pressure_jump_max_MPa: largest at a facet, 0 for
+    continuous pressure.  oscillation_index, inlet_segments: `cases.oring_results` defines them.
     moment_N_mm: torque that holds the mean rotation.  contact_p_max_MPa: the maximum of the
-    frictionless contact stage.  verdict: :data:`OK`, :data:`COLLAPSED` or another word; advice:
-    what to do about a verdict that is not :data:`OK`.
+    frictionless contact stage.  verdict: :data:`OK`, :data:`COLLAPSED`, :data:`UNDER_RESOLVED` or
+    :data:`OSCILLATING`; advice: what to do about a verdict that is not :data:`OK`.
     """
 
     sealed_pressure: float
@@ -90,6 +95,8 @@ class FilmState:
     flux_variation: float
     moment_N_mm: float
     contact_p_max_MPa: float
+    oscillation_index: float
+    inlet_segments: float
     verdict: str
     advice: str
     profile: Profile

@@ -22,8 +22,9 @@ from cases.oring_path import (
     squeeze_stage,
     weight_stage,
 )
-from cases.oring_results import Verdict, contact_state, film_numbers, film_state
+from cases.oring_results import contact_state, film_numbers, film_state
 from cases.oring_section import OringSection, build_section
+from cases.oring_verdict import Verdict
 from cases.stages import Stage, Walker
 from runtime.continuation import Branch, Point
 from runtime.solution import Status

@@ -1,26 +1,29 @@
-"""What a converged O-ring state means: h*, pressure, friction, leakage, limits, verdict."""
+"""What a converged O-ring state means: h*, pressure, friction, leakage, limits, resolution."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import inf, pi
+from dataclasses import replace
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cases.observer import COLLAPSED, OK, ContactState, FilmState, Profile, Section
+from cases.observer import ContactState, FilmState, Profile, Section
 from cases.oring_path import Film
 from cases.oring_section import OringSection
+from cases.oring_verdict import FilmNumbers, Verdict
 from runtime.contact import tributary_areas
 from runtime.postprocess import (
+    alternating_difference,
     element_means,
+    first_below,
     interval_below,
-    local_exponent,
     nodal_average,
     relative_spread,
     run_around,
 )
 from runtime.problem import Problem
+from runtime.rules import trace_rule
 
 Array = NDArray[np.float64]
 
@@ -29,95 +32,71 @@ CONTACT_FILM = 0.02
 
 MICROMETRE = 1e-3  # mm
 
-EXCESS_PRESSURE = 0.1
-"""Largest credible excess of the film's maximum pressure over the contact's, relative."""
+INLET = (10.0, 1.5)
+"""Film thicknesses, in h*, between which the segments of the inlet are counted."""
 
-LARGEST_EXPONENT = 0.85
-"""Largest credible d log h* / d log U: theory and fine meshes give 0.55 to 0.65."""
-
-FINER_MESH = "the film collapsed on this mesh; use a finer mesh (larger density)"
-
-
-@dataclass(frozen=True)
-class FilmNumbers:
-    """Scalars of a film: mm, MPa, N, s; flux per circumference in mm^2/s, signed like U."""
-
-    speed: float
-    flux: float
-    h_star: float
-    h_min: float
-    p_max: float
-    friction: float
-    flux_variation: float
+MID_CONTACT = 0.1
+"""Share of the contact that is left out at either end where oscillations are looked for."""
 
 
 def film_numbers(section: OringSection, problem: Problem, film: Film, x: Array) -> FilmNumbers:
     """Scalars of a converged film with the unknowns x.
 
-    The flux is the mean over the element of the largest pressure; its relative spread is taken
-    over the neighbours on both sides up to where the film cavitates, eqs. (16) and (25).
+    The flux is that at the largest pressure: the mean over the segment for continuous, the mean
+    of (23) at the facets of the segment for discontinuous pressures, which (21) and (22) make
+    constant. Its relative spread is taken over the neighbours on both sides up to where the film
+    cavitates, eqs. (16) and (25).
     """
     at = problem.fields("film", x)
-    flux = element_means(at["flux"], at["dx"])
     top = int(np.argmax(at["p"].max(axis=1)))
     whole = run_around(at["p"].min(axis=1) >= 0.0, top)
-    h = section.deformed(x)[section.mesh.arc_nodes, 1] - section.rod_radius
+    jump = 0.0
+    if section.parameters.reynolds == "dg":
+        facets = problem.fields("facet", x)
+        flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
+        around, whole = slice(max(top - 1, 0), top + 1), slice(max(whole.start - 1, 0), whole.stop)
+    else:
+        flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
+    q = float(flux[around].mean())
+    h_star = q / (0.5 * film.rod_speed)
+    arc = section.deformed(x)[section.mesh.arc_nodes]
+    h = arc[:, 1] - section.rod_radius
     return FilmNumbers(
         speed=film.speed,
-        flux=float(flux[top]),
-        h_star=float(flux[top] / (0.5 * film.rod_speed)),
+        flux=q,
+        h_star=h_star,
         h_min=float(h.min()),
         p_max=float(at["p"].max()),
         friction=float(2.0 * pi * section.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
         flux_variation=relative_spread(flux[whole]),
+        jump=jump,
+        oscillation=oscillation(arc[:, 0], h),
+        inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
     )
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """Whether the films met so far on a path of falling speed can be believed.
+def oscillation(x: Array, h: Array) -> float:
+    """Oscillation index of the nodal film thickness h (nodes,) at x (nodes,), dimensionless.
 
-    reference: maximum contact pressure without film, MPa. last: the latest film. collapsed: what
-    gave a spurious collapsed film away, if anything did: a pressure well above the contact's, a
-    friction that rises while the speed falls, or a thickness that falls too fast. A path that
-    has once collapsed does not recover.
+    The largest alternating second difference over the mid contact relative to the median of h
+    there: D_i = h_(i-1) - 2 h_i + h_(i+1), and a pair of neighbours of opposite sign counts with
+    the smaller of |D_i|, |D_(i+1)|. A zigzag of amplitude a about h has the index 4 a / h, a
+    smooth film next to none. The mid contact is the middle four fifths of where h < 20 um.
     """
+    start, end = interval_below(x, h, CONTACT_FILM)
+    margin = MID_CONTACT * (end - start)
+    inside = h[(x >= start + margin) & (x <= end - margin)]
+    return alternating_difference(inside) / float(np.median(inside)) if len(inside) else 0.0
 
-    reference: float
-    last: FilmNumbers | None = None
-    collapsed: str = ""
 
-    def after(self, film: FilmNumbers) -> Verdict:
-        """The verdict that includes one more film; `collapsed` says what gave it away."""
-        reason = self.collapsed or self._suspicion(film)
-        return Verdict(self.reference, film, reason)
+def inlet_segments(h: Array, h_star: float) -> float:
+    """Length of the inlet in segments; h (nodes,) from the inlet on.
 
-    @property
-    def word(self) -> str:
-        """OK or COLLAPSED."""
-        return COLLAPSED if self.collapsed else OK
-
-    @property
-    def advice(self) -> str:
-        """What to do, empty for OK."""
-        return f"{FINER_MESH}: {self.collapsed}" if self.collapsed else ""
-
-    def _suspicion(self, film: FilmNumbers) -> str:
-        excess = film.p_max - self.reference
-        if excess > EXCESS_PRESSURE * self.reference:
-            return f"the maximum pressure is {excess:.2f} MPa above that of frictionless contact"
-        if self.last is None or not film.speed < self.last.speed:
-            return ""
-        if abs(film.friction) > abs(self.last.friction):
-            return "the friction on the rod rises while the speed falls"
-        if film.h_star <= 0.0 or self._exponent(film) > LARGEST_EXPONENT:
-            return "its thickness falls too fast with the speed"
-        return ""
-
-    def _exponent(self, film: FilmNumbers) -> float:
-        if self.last is None or self.last.h_star <= 0.0:
-            return inf
-        return local_exponent(self.last.speed, self.last.h_star, film.speed, film.h_star)
+    From where h, coming from outside, first falls below ten times h* to where it first falls below
+    one and a half times h*: there the pressure rises that makes the film.
+    """
+    outer, inner = (first_below(h, level * h_star) for level in INLET)
+    return inner - outer
 
 
 def contact_state(
@@ -170,7 +149,7 @@ def film_state(
         h_star_um=numbers.h_star / MICROMETRE,
         h_min_um=numbers.h_min / MICROMETRE,
         p_max_MPa=numbers.p_max,
-        pressure_jump_max_MPa=0.0,
+        pressure_jump_max_MPa=numbers.jump,
         rod_friction_N=numbers.friction,
         leak_rate_mm3_s=2.0 * pi * section.rod_radius * numbers.flux,
         contact_start_mm=limits[0],
@@ -179,9 +158,11 @@ def film_state(
         flux_variation=numbers.flux_variation,
         moment_N_mm=float(x[section.layout.part("rotation")][0]),
         contact_p_max_MPa=verdict.reference,
+        oscillation_index=numbers.oscillation,
+        inlet_segments=numbers.inlet_segments,
         verdict=verdict.word,
         advice=verdict.advice,
-        profile=_profile(problem, x),
+        profile=_profile(section, problem, x),
         section=section_view(section, problem, x),
     )
 
@@ -203,9 +184,17 @@ def section_view(section: OringSection, problem: Problem, x: Array) -> Section:
     )
 
 
-def _profile(problem: Problem, x: Array) -> Profile:
-    """Fields at the quadrature points of the film, from the sealed to the air side."""
-    at = {name: value.ravel() for name, value in problem.fields("film", x).items()}
+def _profile(section: OringSection, problem: Problem, x: Array) -> Profile:
+    """Fields at the quadrature points of the film, from the sealed to the air side.
+
+    Discontinuous pressures are also shown at both ends of each segment: a facet has two rows.
+    """
+    block, p = problem.assembler.block("film"), section.parameters
+    if p.reynolds == "dg":
+        traces = trace_rule(p.pressure_order, p.quadrature, p.quadrature_points)
+        block = replace(block, rule=traces)
+    values = block.fields(x, problem.parameters["film"])
+    at = {name: value.ravel() for name, value in values.items()}
     return Profile(
         x_mm=at["x"],
         h_um=at["h"] / MICROMETRE,

@@ -10,22 +10,23 @@ import os
 import platform
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from cases.case_file import BadInput, Case
 from cases.curve import CurveFolder, CurveRow, write_section
+from cases.leakage import LEAKAGE_COLUMNS, net_leakage
 from cases.observer import COLLAPSED, ContactState, FilmState, Outcome, StageRecord
 from cases.oring_parameters import ORing
-from runtime.io import number_text, read_json, write_columns, write_json
+from runtime.io import number_text, read_json, write_columns, write_csv, write_json
 
 SELECTION = ("speeds", "stroke")
 """Parameters that choose rows of a curve and do not change a row: a resumed run may change them."""
 SIGNS = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
 _OURS = (
-    "run.json",
+    *("run.json", "leakage.csv"),
     *(f"{name}.{kind}" for name in ("curve", "profiles") for kind in ("csv", "png", "svg")),
     *("profile_*.csv", "section_*.vtu", "contact_*.csv", "contact_*.vtu"),
 )
@@ -152,7 +153,10 @@ class RunRecord:
         self._stages = [stage for outcome in outcomes for stage in outcome.stages]
 
     def save(self, status: str, message: str) -> None:
-        """Write run.json."""
+        """Write leakage.csv if a speed has both strokes, then run.json."""
+        leakage = net_leakage(self.curve.rows)
+        if leakage:
+            write_csv(self.folder / "leakage.csv", LEAKAGE_COLUMNS, map(astuple, leakage))
         seconds = 0.0 if self._began is None else time.perf_counter() - self._began
         stages = self._stages if self._stages is not None else [log.record() for log in self._logs]
         content = {
@@ -164,6 +168,7 @@ class RunRecord:
             **self._size,
             "seconds": seconds + self._earlier.get("seconds", 0.0),
             "stages": [*self._earlier.get("stages", ()), *map(_stage_json, stages)],
+            "leakage": [asdict(row) for row in leakage],
             "states": [_state_json(row, ".") for row in self.curve.rows],
             "rejected": [_state_json(row, "rejected") for row in self.rejected.rows],
         }

@@ -10,7 +10,14 @@ import click
 from cases import report
 from cases.case_file import BadInput, Case
 from cases.curve import CurveRow
-from cases.observer import ContactState, FilmState, Observer, Outcome
+from cases.observer import (
+    OSCILLATING,
+    UNDER_RESOLVED,
+    ContactState,
+    FilmState,
+    Observer,
+    Outcome,
+)
 from cases.oring_parameters import ORing
 from cases.parallel import solve_side_by_side
 from cases.progress import Display, make_display
@@ -127,6 +134,8 @@ def _finish(record: RunRecord, outcomes: Sequence[Outcome], *, quiet: bool) -> i
     report.write_plots(record.folder, record.curve.profiles())
     if not quiet and (record.curve.rows or record.rejected.rows):
         report.print_curve(record.curve.rows, record.rejected.rows)
+        for note in _notes(record.curve.rows):
+            click.echo(note)
     if not quiet:
         click.echo(f"written to {record.folder}")
     if not complaints:
@@ -156,6 +165,20 @@ def _gaps(record: RunRecord) -> list[str]:
         advice = " ".join(sorted(record.advice))
         gaps.append(f"collapsed film, not a result: {_named(rejected)}. {advice}")
     return gaps
+
+
+def _notes(rows: Sequence[CurveRow]) -> list[str]:
+    """What is to be known of states that are kept but are not plain results."""
+    doubts = {
+        UNDER_RESOLVED: "the inlet is too short for this mesh, h* may be far off",
+        OSCILLATING: "the film zigzags from node to node; h* holds, the profile does not",
+    }
+    chosen = [(word, [row for row in rows if row.verdict == word]) for word in doubts]
+    return [
+        f"{word}: {doubts[word]}: {_named(some)}; use a finer mesh (larger density)"
+        for word, some in chosen
+        if some
+    ]
 
 
 def _named(rows: Sequence[CurveRow]) -> str:

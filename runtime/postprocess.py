@@ -54,6 +54,28 @@ def _crossing(x: Array, values: Array, level: float, i: int) -> float:
     return float(x[i] + t * (x[i + 1] - x[i]))
 
 
+def alternating_difference(values: Array) -> float:
+    """Largest second difference of values (n,) that changes sign to its neighbour; 0 if none does.
+
+    A pair counts with the smaller of its two magnitudes, so that a single kink does not count.
+    """
+    second = np.diff(values, 2)
+    pairs = np.minimum(np.abs(second[:-1]), np.abs(second[1:]))
+    return float(np.max(pairs, initial=0.0, where=second[:-1] * second[1:] < 0.0))
+
+
+def first_below(values: Array, level: float) -> float:
+    """Index, in fractions, at which the piecewise linear `values` (n,) first fall to `level`.
+
+    0 where they begin below it, n - 1 where they never fall so far.
+    """
+    below = np.flatnonzero(values < level)
+    if not len(below):
+        return float(len(values) - 1)
+    i = int(below[0])
+    return i - float((level - values[i]) / (values[i - 1] - values[i])) if i else 0.0
+
+
 def nodal_average(cells: Integers, values: Mapping[str, Array], nodes: int) -> dict[str, Array]:
     """Nodal values (nodes,) of each field: mean over the cells of a node of their point means.
 

@@ -35,12 +35,12 @@ from runtime.solution import Status
 HEADER = (
     "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_min_um,p_max_MPa,pressure_jump_max_MPa,"
     "rod_friction_N,leak_rate_mm3_s,contact_start_mm,contact_end_mm,newton_iterations,"
-    "flux_variation,moment_N_mm,contact_p_max_MPa,verdict"
+    "flux_variation,moment_N_mm,contact_p_max_MPa,oscillation_index,inlet_segments,verdict"
 )
 FAST = ("--set", "speeds=[400, 100]")
 PLOTS = {"curve.png", "curve.svg", "profiles.png", "profiles.svg"}
 FILES = {
-    *("run.json", "curve.csv"),
+    *("run.json", "curve.csv", "leakage.csv"),
     *("contact_1.csv", "contact_1.vtu"),
     *(f"profile_1_{u}.csv" for u in (400, 100, -400, -100)),
     *(f"section_1_{u}.vtu" for u in (400, 100, -400, -100)),
@@ -73,6 +73,8 @@ def film_state(parameters: ORing, speed: float, verdict: str = OK) -> FilmState:
         flux_variation=1e-12,
         moment_N_mm=7.0,
         contact_p_max_MPa=4.1,
+        oscillation_index=0.01,
+        inlet_segments=4.2,
         verdict=verdict,
         advice="" if verdict == OK else "Use a finer mesh.",
         profile=Profile(x, h_star + 50 * x**2, 4 - 4 * x**2, 0.01 * x, h_star * speed + 0 * x),
@@ -212,7 +214,6 @@ BAD = {
     "no TOML value": (["oring", "--set", "speeds=[100"], "not a TOML value"),
     "no value": (["oring", "--set", "density"], "KEY=VALUE"),
     "geometry": (["oring", "--set", "rod_diameter=40"], "gap between rod and housing"),
-    "not available": (["oring", "--set", "reynolds=dg"], "not available yet"),
     "unknown case": (["o-ring"], "did you mean 'oring'"),
     "missing file": (["missing.toml"], "no case or file 'missing.toml'"),
     "folder for file": (["."], "cannot read the case file"),

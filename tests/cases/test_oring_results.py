@@ -7,8 +7,9 @@ import pytest
 
 from cases.observer import COLLAPSED, OK
 from cases.oring_path import Film, PathSettings, contact_problem, film_problem
-from cases.oring_results import FilmNumbers, Verdict, contact_pressure, film_numbers, film_state
+from cases.oring_results import contact_pressure, film_numbers, film_state
 from cases.oring_section import build_section
+from cases.oring_verdict import FilmNumbers, Verdict
 from tests.cases.oring_cases import oring
 
 HEALTHY = FilmNumbers(
@@ -19,6 +20,9 @@ HEALTHY = FilmNumbers(
     p_max=3.71,
     friction=5.0,
     flux_variation=1e-10,
+    jump=0.0,
+    oscillation=0.03,
+    inlet_segments=5.0,
 )
 SLOWER = replace(HEALTHY, speed=200.0, h_star=1.36e-3 * 0.5**0.6, friction=3.7)
 
