@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cases.observer import FilmState, Observer, Outcome, StageRecord
+from cases.oring_order import REFERENCE_ORDER, OrderPair, transferred
 from cases.oring_parameters import ORing
 from cases.oring_path import (
     Film,
@@ -24,7 +26,7 @@ from cases.oring_path import (
 )
 from cases.oring_results import contact_state, film_numbers, film_state
 from cases.oring_section import OringSection, build_section
-from cases.oring_verdict import Verdict
+from cases.oring_verdict import FilmNumbers, Verdict
 from cases.stages import Stage, Walker
 from runtime.continuation import Branch, Point
 from runtime.solution import Status
@@ -34,6 +36,14 @@ Array = NDArray[np.float64]
 FOLD = (
     "the path ends or turns back there, as it does when the film collapses on a mesh that is too "
     "coarse: use a finer mesh (larger density)"
+)
+
+CLOSED = 0.05
+"""Least film thickness, in h*, below which a path ends because the film closes."""
+
+CLOSING = (
+    "the film closes: at a node it is only {:.2g} um thick there, and would be negative beyond; "
+    "use a finer mesh (larger density) or a higher pressure_order"
 )
 
 ROLLING = (
@@ -47,6 +57,7 @@ class _Stopped(Exception):  # noqa: N818 (control flow inside this module)
     def __init__(self, stage: Stage, branch: Branch) -> None:
         super().__init__(stage.name)
         self.stage, self.branch = stage, branch
+        self.last: FilmNumbers | None = None
 
     @property
     def message(self) -> str:
@@ -60,7 +71,9 @@ class _Stopped(Exception):  # noqa: N818 (control flow inside this module)
 
     @property
     def advice(self) -> str:
-        """What may help, for a path that ends on the way."""
+        """Why a path ends on the way, and what may help."""
+        if self.last is not None and self.last.h_min < CLOSED * self.last.h_star:
+            return CLOSING.format(1e3 * self.last.h_min)
         return FOLD if self.branch.points else self.branch.status.advice
 
     def explain(self, where: str, rotation: str) -> tuple[Status, str]:
@@ -80,9 +93,11 @@ class _Run:
     records: list[StageRecord] = field(default_factory=list)
     states: list[FilmState] = field(default_factory=list)
     stopped: list[tuple[Status, str]] = field(default_factory=list)
+    prefix: str = ""
 
     def walk(self, stage: Stage, x: Array) -> Array:
         """Unknowns at the end of a stage; raises _Stopped if it is not reached."""
+        stage = replace(stage, name=self.prefix + stage.name)
         branch, record = self.walker.walk(stage, x, self.observer)
         self.records.append(record)
         if not branch.converged:
@@ -102,21 +117,57 @@ class _Run:
     def stroke(self, stroke: Stroke, x: Array) -> None:
         """Second and third stage of one stroke, from the contact state x."""
         section, settings, p = self.section, self.settings, self.section.parameters
+        reference = contact_state(
+            section, contact_problem(section, settings, p.sealed_pressure), p.sealed_pressure, x
+        ).p_max_MPa
+        judge = _Judge(self, Verdict(reference))
+        film, start = self.build_film(stroke, x)
+        try:
+            self.walk(speed_stage(section, settings, film, p.speeds, judge), start)
+        except _Stopped as stop:
+            stop.last = judge.verdict.last
+            self.from_higher_order(film, x, judge)
+            if judge.missing:
+                raise
+
+    def build_film(self, stroke: Stroke, x: Array) -> tuple[Film, Array]:
+        """Second stage: the film at its highest speed, from the contact state x."""
+        section, settings, p = self.section, self.settings, self.section.parameters
         speed = max(settings.start_speed, *p.speeds)
         multipliers = x[section.layout.part("rod")].copy()
         shear = 1.0 if p.shear_traction else 0.0
         film = Film(p.sealed_pressure, stroke, speed, multipliers, shear=shear)
-        reference = contact_state(
-            section, contact_problem(section, settings, p.sealed_pressure), p.sealed_pressure, x
-        ).p_max_MPa
         x = self.walk(weight_stage(section, settings, film), x)
         if p.rotation == "free":
             x = self.walk(release_stage(section, settings, film, x), x)
             film = replace(film, moment=0.0)
         if p.shear_traction:
             x = self.walk(shear_stage(section, settings, film), x)
-        judge = _Judge(self, Verdict(reference))
-        self.walk(speed_stage(section, settings, film, p.speeds, judge), x)
+        return film, x
+
+    def from_higher_order(self, film: Film, contact: Array, judge: _Judge) -> None:
+        """The speeds that a low pressure order did not reach by itself, as far as possible."""
+        section, settings, missing = self.section, self.settings, judge.missing
+        if section.parameters.pressure_order >= REFERENCE_ORDER:
+            return
+        pair = OrderPair.of(section)
+        prefix = f"order {REFERENCE_ORDER}: "
+        other = _Run(pair.high, self.observer, settings, self.walker, self.records, prefix=prefix)
+        found: dict[float, tuple[Film, Array]] = {}
+
+        def keep(at: Film, point: Point) -> None:
+            if at.speed in missing:
+                found[at.speed] = (at, point.solution.x)
+
+        with suppress(_Stopped):
+            film, x = other.build_film(film.stroke, transferred(contact, section, pair.high))
+            other.walk(speed_stage(pair.high, settings, film, missing, keep), x)
+        for at, x in found.values():
+            with suppress(_Stopped):
+                x = pair.low_part(self.walk(pair.stage(settings, at), pair.start(x)))
+                solution = self.walker.newton.solve(film_problem(section, settings, at), x)
+                if solution.converged:
+                    judge(at, Point(1.0, solution))
 
 
 @dataclass
@@ -125,6 +176,13 @@ class _Judge:
 
     run: _Run
     verdict: Verdict
+    reached: list[float] = field(default_factory=list)
+
+    @property
+    def missing(self) -> tuple[float, ...]:
+        """Requested speeds that were not reached, falling."""
+        speeds = self.run.section.parameters.speeds
+        return tuple(sorted(set(speeds) - set(self.reached), reverse=True))
 
     def __call__(self, film: Film, point: Point) -> None:
         run, x = self.run, point.solution.x
@@ -132,6 +190,7 @@ class _Judge:
         self.verdict = self.verdict.after(film_numbers(run.section, problem, film, x))
         if film.speed not in run.section.parameters.speeds:
             return
+        self.reached.append(film.speed)
         iterations = point.solution.iterations
         state = film_state(run.section, problem, film, x, self.verdict, iterations)
         run.states.append(state)

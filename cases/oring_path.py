@@ -41,6 +41,7 @@ class PathSettings:
     load_steps: StepRule = field(default_factory=lambda: StepRule(0.2, 1e-3, 0.6))
     weight_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-5))
     shear_steps: StepRule = field(default_factory=lambda: StepRule(1.0, 1e-3))
+    order_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-4))
     release_steps: StepRule = field(default_factory=lambda: StepRule(0.1, 1e-3))
     speed_steps: StepRule = field(
         default_factory=lambda: StepRule(math.log(2.0), 4e-3, math.log(2.0) + 1e-9)
