@@ -6,10 +6,29 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from cases.observer import COLLAPSED, OK, ContactState, FilmState, Outcome, Silent
-from cases.oring import run
-from runtime.solution import Status
+from cases.observer import (
+    COLLAPSED,
+    OK,
+    OSCILLATING,
+    UNDER_RESOLVED,
+    ContactState,
+    FilmState,
+    Outcome,
+    Silent,
+)
+from cases.oring import _Stopped, run
+from cases.oring_path import PathSettings, squeeze_stage
+from cases.oring_section import build_section
+from cases.oring_verdict import FilmNumbers
+from runtime.continuation import Branch, Point
+from runtime.solution import Solution, Status
 from tests.cases.oring_cases import oring
+
+ENDED = Branch(
+    (Point(0.5, Solution(np.zeros(1), Status.CONVERGED, "", (1e-12,), 1, 0)),),
+    Status.STEP_TOO_SMALL,
+    "",
+)
 
 
 class Recorder(Silent):
@@ -61,7 +80,18 @@ def test_every_requested_state_converges_and_is_told(default: tuple[Outcome, Rec
     assert recorder.stages.count("falling speed out") == 1
     assert min(recorder.fractions) == 0.0
     assert max(recorder.fractions) == 1.0
-    assert {str(s.verdict) for s in outcome.states} == {OK}
+
+
+def test_states_of_a_coarse_mesh_are_labelled(default: tuple[Outcome, Recorder]) -> None:
+    """Density 2: outstroke is sound, instroke oscillates, its slow end has too short an inlet."""
+    out, back = default[0].states[:5], default[0].states[5:]
+    assert [s.verdict for s in out] == [OK] * 5
+    assert [s.verdict for s in back[-3:]] == [OSCILLATING, OSCILLATING, UNDER_RESOLVED]
+    assert max(s.oscillation_index for s in out) < 0.2 < back[2].oscillation_index
+    for states in (out, back):  # the inlet shortens as the film thins
+        segments = [s.inlet_segments for s in states]
+        assert segments == sorted(segments, reverse=True)
+    assert all(bool(s.advice) == (s.verdict != OK) for s in default[0].states)
 
 
 def test_cost(default: tuple[Outcome, Recorder]) -> None:
@@ -178,6 +208,61 @@ def test_shear_stress_can_be_switched_off() -> None:
     assert with_shear.moment_N_mm > without.moment_N_mm + 5.0  # the film turns the section
 
 
-def test_discontinuous_galerkin_is_refused() -> None:
-    with pytest.raises(NotImplementedError, match='use "fe"'):
-        run(oring(reynolds="dg"), Recorder())
+@pytest.fixture(scope="module")
+def discontinuous() -> Outcome:
+    """The same with discontinuous pressures, outstroke."""
+    speeds = (1600.0, 400.0, 100.0)
+    return run(oring(density=2, reynolds="dg", stroke="out", speeds=speeds), Recorder())
+
+
+def test_discontinuous_pressures_give_the_film_of_continuous_ones(
+    default: tuple[Outcome, Recorder], discontinuous: Outcome
+) -> None:
+    assert discontinuous.converged, discontinuous.message
+    assert discontinuous.unknowns_pressure == 5 * 54
+    continuous = {s.rod_speed: s for s in default[0].states}
+    for state, limit in zip(discontinuous.states, (0.0005, 0.0015, 0.006), strict=True):
+        other = continuous[state.rod_speed]
+        assert state.h_star_um == pytest.approx(other.h_star_um, rel=limit)
+        assert state.flux_variation < 1e-6
+        assert 1e-3 < state.pressure_jump_max_MPa < 0.15
+        assert other.pressure_jump_max_MPa == 0.0
+
+
+def test_a_profile_shows_both_sides_of_a_facet(discontinuous: Outcome) -> None:
+    for state in discontinuous.states:
+        profile = state.profile
+        x, p, h = (values.reshape(54, 7) for values in (profile.x_mm, profile.p_MPa, profile.h_um))
+        assert x[1:, 0] == pytest.approx(x[:-1, -1], abs=1e-12)
+        assert h[1:, 0] == pytest.approx(h[:-1, -1], rel=1e-9)
+        jumps = np.abs(p[1:, 0] - p[:-1, -1])
+        assert jumps.max() == pytest.approx(state.pressure_jump_max_MPa, rel=1e-9)
+        assert p[0, 0] == pytest.approx(1.0)
+        assert p[-1, -1] == pytest.approx(0.0, abs=1e-12)
+        assert np.all(np.diff(profile.x_mm) >= -1e-12)
+
+
+def test_jumps_fall_with_the_order(discontinuous: Outcome) -> None:
+    parameters = {"density": 2, "reynolds": "dg", "stroke": "out", "speeds": (1600.0,)}
+    low = run(oring(pressure_order=2, **parameters), Recorder()).states[0]
+    assert low.pressure_jump_max_MPa > 3.0 * discontinuous.states[0].pressure_jump_max_MPa
+
+
+@pytest.mark.slow
+def test_a_low_order_is_reached_from_a_higher_one() -> None:
+    """Its own path ends at 249 mm/s; the solutions beyond are those of an order of its own."""
+    parameters = {"density": 2, "reynolds": "dg", "stroke": "in", "speeds": (1600.0, 200.0)}
+    recorder = Recorder()
+    outcome = run(oring(pressure_order=3, **parameters), recorder)
+    assert outcome.converged, outcome.message
+    assert "order 4 to 3 in" in recorder.stages
+    assert outcome.states[-1].h_star_um == pytest.approx(0.725083, rel=1e-4)
+
+
+def test_a_film_that_closes_is_named() -> None:
+    last = FilmNumbers(889.1, -0.7, 1.67e-3, 6.1e-6, 3.7, -9.0, 1e-9, 0.0, 1.0, 2.5)
+    stop = _Stopped(squeeze_stage(build_section(oring(density=1)), PathSettings()), ENDED)
+    assert "turns back" in stop.advice
+    stop.last = last
+    assert "closes: at a node it is only 0.0061 um" in stop.advice
+    assert "pressure_order" in stop.advice

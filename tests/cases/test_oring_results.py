@@ -5,9 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cases.observer import COLLAPSED, OK
+from cases.observer import COLLAPSED, OK, OSCILLATING, UNDER_RESOLVED
 from cases.oring_path import Film, PathSettings, contact_problem, film_problem
-from cases.oring_results import contact_pressure, film_numbers, film_state
+from cases.oring_results import (
+    contact_pressure,
+    film_numbers,
+    film_state,
+    inlet_segments,
+    oscillation,
+)
 from cases.oring_section import build_section
 from cases.oring_verdict import FilmNumbers, Verdict
 from tests.cases.oring_cases import oring
@@ -57,6 +63,47 @@ def test_each_sign_of_collapse_is_seen(change: dict[str, float], reason: str, si
     assert verdict.word == COLLAPSED
     assert reason in verdict.advice
     assert "finer mesh" in verdict.advice
+
+
+@pytest.mark.parametrize(
+    ("change", "word", "reason"),
+    [
+        ({"oscillation": 0.9}, OSCILLATING, "index 0.9"),
+        ({"inlet_segments": 1.2}, UNDER_RESOLVED, "only 1.2 segments"),
+        ({"inlet_segments": 1.2, "oscillation": 0.9}, UNDER_RESOLVED, "needs 1.5"),
+        ({"inlet_segments": 1.2, "p_max": 4.8}, COLLAPSED, "above"),
+    ],
+)
+def test_doubtful_films_are_labelled_each_for_itself(
+    change: dict[str, float], word: str, reason: str
+) -> None:
+    verdict = _verdict(HEALTHY, replace(SLOWER, **change))
+    assert verdict.word == word
+    assert reason in verdict.advice
+    assert "larger density" in verdict.advice
+    slower = replace(SLOWER, speed=100.0, h_star=0.6e-3, friction=2.7)
+    assert verdict.after(slower).word == (COLLAPSED if word == COLLAPSED else OK)
+
+
+def test_the_oscillation_index_of_a_zigzag_is_four_amplitudes() -> None:
+    x = np.linspace(-1.0, 1.0, 41)
+    flat = np.full(41, 1e-3)
+    zigzag = flat + 1e-5 * (-1.0) ** np.arange(41)
+    assert oscillation(x, zigzag) == pytest.approx(4e-5 / 1.01e-3)  # the median is h + a
+    assert oscillation(x, flat) == 0.0
+    assert oscillation(x, flat + 2e-4 * np.cos(3.0 * x)) < 1e-3  # smooth: next to none
+    ends = np.where(np.abs(x) > 0.85, zigzag, flat)  # not in the mid contact
+    assert oscillation(x, ends) == 0.0
+    kink = flat - 1e-4 * np.maximum(0.0, 1.0 - 10.0 * np.abs(x - 0.5))  # one dip of one sign
+    assert oscillation(x, kink) <= 0.11
+    assert oscillation(x, np.full(41, 1.0)) == 0.0  # no contact anywhere
+
+
+def test_the_inlet_is_counted_in_segments() -> None:
+    h = np.array([300.0, 100.0, 10.0, 6.0, 2.0, 1.0, 1.0, 1.1, 50.0])
+    assert inlet_segments(h, 1.0) == pytest.approx(4.5 - 2.0)
+    assert inlet_segments(h[:5], 1.0) == pytest.approx(2.0)  # never down to 1.5 h*: up to the end
+    assert inlet_segments(h, -1.0) == 0.0
 
 
 def test_a_collapsed_path_stays_collapsed() -> None:

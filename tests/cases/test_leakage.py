@@ -1,0 +1,60 @@
+"""Net leakage of a cycle from the rows of a curve."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from cases.case_file import Case
+from cases.curve import CurveRow
+from cases.leakage import LEAKAGE_COLUMNS, net_leakage
+from cases.observer import OK, OSCILLATING, UNDER_RESOLVED
+from cases.oring_parameters import ORing
+from cases.record import RunRecord
+from runtime.io import read_csv, read_json
+from tests.cases.test_cli import film_state
+
+RADIUS = 25.0
+
+
+def row(speed: float, film: float, verdict: str = OK, sealed_pressure: float = 1.0) -> CurveRow:
+    """A row with the leak rate that goes with h* in micrometres, (16)."""
+    state = film_state(ORing(sealed_pressure=sealed_pressure), speed, verdict)
+    base = CurveRow.of(state)
+    leak = math.pi * RADIUS * speed * film * 1e-3
+    changes = {"h_star_um": film, "leak_rate_mm3_s": leak}
+    values = {name: getattr(base, name) for name in base.__dataclass_fields__}
+    return CurveRow(**{**values, **changes})
+
+
+def test_net_leakage_is_the_difference_of_the_two_films() -> None:
+    rows = [row(100.0, 0.6), row(400.0, 1.4, OSCILLATING), row(-400.0, 1.1), row(-100.0, 0.5)]
+    fast, slow = net_leakage(rows)
+    assert (fast.speed_mm_s, slow.speed_mm_s) == (400.0, 100.0)
+    assert fast.net_film_um == pytest.approx(0.3)
+    assert fast.net_mm3_per_mm == pytest.approx(math.pi * RADIUS * 0.3e-3)
+    assert slow.net_mm3_per_mm == pytest.approx(math.pi * RADIUS * 0.1e-3)
+    assert fast.leak_out_mm3_s > 0.0 > fast.leak_in_mm3_s
+    assert (fast.verdict, slow.verdict) == (OSCILLATING, OK)
+
+
+def test_only_speeds_with_both_strokes_at_one_pressure_count() -> None:
+    rows = [row(100.0, 0.6), row(-200.0, 0.8), row(-100.0, 0.5, sealed_pressure=2.0)]
+    assert net_leakage(rows) == []
+
+
+def test_the_worse_verdict_of_the_two_is_kept() -> None:
+    rows = [row(100.0, 0.6, OSCILLATING), row(-100.0, 0.5, UNDER_RESOLVED)]
+    assert net_leakage(rows)[0].verdict == UNDER_RESOLVED
+
+
+def test_a_run_of_both_strokes_writes_the_table(tmp_path: Path) -> None:
+    case = Case("oring", ORing(speeds=(400.0, 100.0)))
+    record = RunRecord(tmp_path / "both", case, resume=False)
+    for speed in (400.0, -400.0, 100.0):
+        record.film(film_state(case.parameters, speed))
+        assert (record.folder / "leakage.csv").exists() == (speed != 400.0)
+    (only,) = read_csv(record.folder / "leakage.csv", LEAKAGE_COLUMNS)
+    assert only[1] == "400"
+    (entry,) = read_json(record.folder / "run.json")["leakage"]
+    assert entry["net_film_um"] == 0.0
