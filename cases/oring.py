@@ -26,7 +26,7 @@ from cases.oring_path import (
 )
 from cases.oring_results import contact_state, film_numbers, film_state
 from cases.oring_section import OringSection, build_section
-from cases.oring_verdict import FilmNumbers, Verdict
+from cases.oring_verdict import FilmNumbers, Verdict, fewest_inlet_segments
 from cases.stages import Stage, Walker
 from runtime.continuation import Branch, Point
 from runtime.solution import Status
@@ -120,7 +120,8 @@ class _Run:
         reference = contact_state(
             section, contact_problem(section, settings, p.sealed_pressure), p.sealed_pressure, x
         ).p_max_MPa
-        judge = _Judge(self, Verdict(reference))
+        fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
+        judge = _Judge(self, Verdict(reference, fewest=fewest))
         film, start = self.build_film(stroke, x)
         try:
             self.walk(speed_stage(section, settings, film, p.speeds, judge), start)

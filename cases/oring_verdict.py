@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 from cases.observer import COLLAPSED, OK, OSCILLATING, UNDER_RESOLVED
@@ -15,8 +15,11 @@ LARGEST_EXPONENT = 0.85
 """Largest credible d log h* / d log U: theory and fine meshes give 0.55 to 0.65."""
 
 FEWEST_INLET_SEGMENTS = 1.5
-"""Segments that the inlet needs: with more, h* was within 6 % of a finer mesh in all cases tried
-(docs/oscillations.md); with fewer, anything between -99 % and +80 % occurs."""
+"""Segments that the inlet needs: with more, h* was within 4 % of a finer mesh in all cases tried
+(docs/film-resolution.md); with fewer, anything between -94 % and +59 % occurs."""
+
+INLET_SEGMENTS_OF_LOW_ORDERS = {("fe", 1): 3.0, ("dg", 1): 5.0, ("dg", 2): 2.0}
+"""The same for low orders m_p, by treatment of the Reynolds equation: they need more."""
 
 STRONG_OSCILLATION = 0.2
 """Oscillation index from which on a profile is not to be taken at face value: about 5 % of h."""
@@ -45,6 +48,11 @@ class FilmNumbers:
     inlet_segments: float
 
 
+def fewest_inlet_segments(reynolds: str, m_p: int) -> float:
+    """Segments that the inlet needs with pressures of order m_p, "fe" or "dg"."""
+    return INLET_SEGMENTS_OF_LOW_ORDERS.get((reynolds, m_p), FEWEST_INLET_SEGMENTS)
+
+
 @dataclass(frozen=True)
 class Verdict:
     """Whether the films met so far on a path of falling speed can be believed.
@@ -53,17 +61,18 @@ class Verdict:
     gave a spurious collapsed film away, if anything did: a pressure well above the contact's, a
     friction that rises while the speed falls, or a thickness that falls too fast. A path that
     has once collapsed does not recover; too few segments in the inlet or an oscillating film
-    are judged for each film alone.
+    are judged for each film alone. fewest: segments that the inlet needs.
     """
 
     reference: float
     last: FilmNumbers | None = None
     collapsed: str = ""
+    fewest: float = FEWEST_INLET_SEGMENTS
 
     def after(self, film: FilmNumbers) -> Verdict:
         """The verdict that includes one more film; `collapsed` says what gave it away."""
         reason = self.collapsed or self._suspicion(film)
-        return Verdict(self.reference, film, reason)
+        return replace(self, last=film, collapsed=reason)
 
     @property
     def word(self) -> str:
@@ -72,7 +81,7 @@ class Verdict:
             return COLLAPSED
         if self.last is None:
             return OK
-        if self.last.inlet_segments < FEWEST_INLET_SEGMENTS:
+        if self.last.inlet_segments < self.fewest:
             return UNDER_RESOLVED
         return OSCILLATING if self.last.oscillation > STRONG_OSCILLATION else OK
 
@@ -87,7 +96,7 @@ class Verdict:
         if word == UNDER_RESOLVED:
             return (
                 f"the inlet is only {last.inlet_segments:.2g} segments long, it needs "
-                f"{FEWEST_INLET_SEGMENTS:g}: h* may be wrong by tens of per cent; "
+                f"{self.fewest:g} with this pressure_order: h* may be wrong by tens of per cent; "
                 "use a finer mesh (larger density)"
             )
         return (

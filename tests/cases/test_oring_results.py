@@ -15,7 +15,7 @@ from cases.oring_results import (
     oscillation,
 )
 from cases.oring_section import build_section
-from cases.oring_verdict import FilmNumbers, Verdict
+from cases.oring_verdict import FilmNumbers, Verdict, fewest_inlet_segments
 from tests.cases.oring_cases import oring
 
 HEALTHY = FilmNumbers(
@@ -83,6 +83,14 @@ def test_doubtful_films_are_labelled_each_for_itself(
     assert "larger density" in verdict.advice
     slower = replace(SLOWER, speed=100.0, h_star=0.6e-3, friction=2.7)
     assert verdict.after(slower).word == (COLLAPSED if word == COLLAPSED else OK)
+
+
+def test_low_orders_need_a_longer_inlet() -> None:
+    film = replace(HEALTHY, inlet_segments=2.5)
+    needs = {(k, m): fewest_inlet_segments(k, m) for k in ("fe", "dg") for m in (1, 2, 3, 4)}
+    words = {key: Verdict(3.74, fewest=fewest).after(film).word for key, fewest in needs.items()}
+    assert [key for key, word in words.items() if word == UNDER_RESOLVED] == [("fe", 1), ("dg", 1)]
+    assert needs["dg", 2] > needs["dg", 3] == needs["fe", 4]
 
 
 def test_the_oscillation_index_of_a_zigzag_is_four_amplitudes() -> None:
