@@ -85,7 +85,8 @@ def reynolds_facet() -> Definition:
     """
     m = Model("film_facet", nodes=3, rule=quadrature.point_rule(), doc=reynolds_facet.__doc__ or "")
     X = m.coordinates("Z", "R")
-    u = m.nodal_unknowns("u_z", "u_r")
+    # of the radii only that of the facet matters
+    u = m.nodal_unknowns("u_z", "u_r", idle=["u_r"])
     sides = m.interpolated_sides("p_minus", "p_plus")
     R_rod, U, eta_0, alpha = m.parameters(
         rod_radius="radius of the rod [mm]",
