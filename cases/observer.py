@@ -109,7 +109,8 @@ class StageRecord:
 
     residual_histories: for each converged step the norms Newton went through.  parameters: the path
     parameter of each of those steps (load factor, weighting factor or rod speed).  factorisations:
-    None where it is not known, because the run was cut short.
+    None where it is not known, because the run was cut short.  method: how it was solved, and why
+    not faster if a faster way gave up.
     """
 
     name: str
@@ -120,6 +121,7 @@ class StageRecord:
     parameters: tuple[float, ...] = ()
     sealed_pressure: float | None = None
     stroke: str | None = None
+    method: str = "newton"
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,7 @@ class Outcome:
     """What a run reached; `status` and `message` say why it is not more, if it is not.
 
     kernel_signatures: kernel name -> signature of the compiled kernel.
+    solvers: "linear" -> the linear solver in use, "solver" -> the way that was asked for.
     """
 
     states: tuple[FilmState, ...]
@@ -136,6 +139,7 @@ class Outcome:
     unknowns_pressure: int
     kernel_signatures: Mapping[str, str]
     stages: tuple[StageRecord, ...]
+    solvers: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def converged(self) -> bool:

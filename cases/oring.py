@@ -29,6 +29,8 @@ from cases.oring_section import OringSection, build_section
 from cases.oring_verdict import FilmNumbers, Verdict, fewest_inlet_segments
 from cases.stages import Stage, Walker
 from runtime.continuation import Branch, Point
+from runtime.linear import choose
+from runtime.newton import Newton
 from runtime.solution import Status
 
 Array = NDArray[np.float64]
@@ -206,7 +208,8 @@ def run(
 ) -> Outcome:
     """Solve the O-ring and report to the observer; failure is in the outcome's status."""
     section = build_section(parameters)
-    progress = _Run(section, observer, settings or PathSettings(), walker or Walker())
+    walker = walker or Walker(Newton(max_iterations=10, linear=choose(parameters.linear)))
+    progress = _Run(section, observer, settings or PathSettings(), walker)
     strokes: tuple[Stroke, ...] = ("out", "in")
     wanted = strokes if parameters.stroke == "both" else (parameters.stroke,)
     try:
@@ -233,4 +236,8 @@ def _outcome(progress: _Run) -> Outcome:
         unknowns_pressure=section.layout.count("pressure"),
         kernel_signatures={b.kernel.name: b.kernel.signature for b in blocks},
         stages=tuple(progress.records),
+        solvers={
+            "solver": section.parameters.solver,
+            "linear": progress.walker.newton.linear.name,
+        },
     )

@@ -66,6 +66,14 @@ class ORing(BaseModel):
         default="fixed",
         description='mean rotation of the section; "fixed" (held at zero) or "free"',
     )
+    solver: Literal["auto", "monolithic"] = Field(
+        default="auto",
+        description='way to the solution; "auto" (fast, checks itself) or "monolithic" (reference)',
+    )
+    linear: Literal["auto", "superlu", "pardiso"] = Field(
+        default="auto",
+        description='linear solver; "superlu", "pardiso" or "auto" (pardiso where installed)',
+    )
 
     inner_diameter: Positive = Field(
         default=50.39, description="inner diameter of the seal D_inner [mm]; > 0"

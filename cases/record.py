@@ -21,8 +21,8 @@ from cases.observer import COLLAPSED, ContactState, FilmState, Outcome, StageRec
 from cases.oring_parameters import ORing
 from runtime.io import number_text, read_json, write_columns, write_csv, write_json
 
-SELECTION = ("speeds", "stroke")
-"""Parameters that choose rows of a curve and do not change a row: a resumed run may change them."""
+SELECTION = ("speeds", "stroke", "solver", "linear")
+"""Parameters that do not change a row of a curve: a resumed run may change them."""
 SIGNS = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
 _OURS = (
@@ -31,7 +31,7 @@ _OURS = (
     *("profile_*.csv", "section_*.vtu", "contact_*.csv", "contact_*.vtu"),
 )
 _PACKAGES = (
-    *("softehl", "numpy", "scipy", "cffi"),
+    *("softehl", "numpy", "scipy", "cffi", "pypardiso"),
     *("pydantic", "click", "rich", "meshio", "matplotlib"),
 )
 
@@ -84,7 +84,7 @@ class RunRecord:
         self.rejected = CurveFolder(folder / "rejected")
         self._began: float | None = None
         self._earlier: dict[str, Any] = {}
-        self._size: dict[str, Any] = {"kernels": None, "unknowns": None}
+        self._size: dict[str, Any] = {"kernels": None, "unknowns": None, "solvers": None}
         self._logs: list[StageLog] = []
         self._stages: list[StageRecord] | None = None
         self.advice: set[str] = set()
@@ -149,7 +149,8 @@ class RunRecord:
         """What is known only at the end: the size, the kernels and the cost of each stage."""
         for outcome in outcomes:
             unknowns = {"total": outcome.unknowns_total, "pressure": outcome.unknowns_pressure}
-            self._size = {"kernels": dict(outcome.kernel_signatures), "unknowns": unknowns}
+            kernels, solvers = dict(outcome.kernel_signatures), dict(outcome.solvers)
+            self._size = {"kernels": kernels, "unknowns": unknowns, "solvers": solvers}
         self._stages = [stage for outcome in outcomes for stage in outcome.stages]
 
     def save(self, status: str, message: str) -> None:
@@ -245,6 +246,7 @@ def _stage_json(stage: StageRecord) -> dict[str, Any]:
         "name": stage.name,
         "sealed_pressure_MPa": stage.sealed_pressure,
         "stroke": stage.stroke,
+        "method": stage.method,
         "seconds": stage.seconds,
         "factorisations": stage.factorisations,
         "iterations": stage.iterations,

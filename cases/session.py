@@ -23,6 +23,7 @@ from cases.parallel import solve_side_by_side
 from cases.progress import Display, make_display
 from cases.record import RunRecord, StageLog, strokes_of
 from runtime.kernels import MissingKernelsError, StaleKernelsError
+from runtime.linear import Backend, MissingBackend, choose
 
 NOT_CONVERGED = 3
 """Exit code of a run that did not reach everything it was asked for."""
@@ -33,6 +34,7 @@ def run_case(case: Case, folder: Path, *, resume: bool, jobs: int, quiet: bool) 
 
     Raises BadInput where the parameters, the folder or the kernels cannot be used.
     """
+    _require_backend(case.parameters.linear)
     record = RunRecord(folder, case, resume=resume)
     runs = plan(case.parameters, record, jobs)
     with make_display(quiet=quiet) as display, _recorded(record):
@@ -100,6 +102,13 @@ class Reporter(Observer):
         with _writing(self.record.folder):
             row = self.record.film(state)
         self.display.state(row)
+
+
+def _require_backend(linear: Backend) -> None:
+    try:
+        choose(linear)
+    except MissingBackend as error:
+        raise BadInput(str(error)) from None
 
 
 @contextmanager

@@ -1,9 +1,14 @@
-"""Direct solution of the sparse linear systems of Newton's method."""
+"""Direct solution of the sparse linear systems of Newton's method.
+
+`choose` names the backends: SuperLU comes with SciPy, PARDISO (`runtime.pardiso`) is several times
+faster and optional. Both check every solution they hand out.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from scipy.sparse import csc_array, csc_matrix
@@ -12,6 +17,7 @@ from scipy.sparse import linalg as sparse_linalg
 from runtime.solution import Vector
 
 SparseMatrix: TypeAlias = "csc_array[np.float64] | csc_matrix[np.float64]"
+Backend: TypeAlias = Literal["auto", "superlu", "pardiso"]
 Ordering: TypeAlias = Literal["NATURAL", "MMD_ATA", "MMD_AT_PLUS_A", "COLAMD"]
 
 
@@ -30,33 +36,51 @@ class Factors(Protocol):
 class LinearSolver(Protocol):
     """Anything that factorises a sparse matrix; raises SingularMatrix if it cannot."""
 
+    @property
+    def name(self) -> str:
+        """The backend, as it is written into records."""
+        ...
+
     def factorise(self, K: SparseMatrix) -> Factors:
         """Factors of K, shape (n, n)."""
         ...
+
+
+class MissingBackend(ValueError):  # noqa: N818 (named after what it is)
+    """The linear solver that was asked for is not installed; the message says what to do."""
 
 
 @dataclass(frozen=True, eq=False)
 class Factorisation:
     """Factors of `matrix`, with iterative refinement and a check of each solution.
 
-    row_sums: (n,) sums of |matrix| along rows, the scale of each row's rounding error.
+    factors: anything with `solve`, exact or of a matrix near by. row_sums: (n,) sums of |matrix|
+    along rows, the scale of each row's rounding error. accuracy: largest row-wise backward error
+    of a solution. settled: largest size of the last correction, relative to the solution; where
+    pivots were perturbed it does not shrink if the matrix is singular.
     """
 
     matrix: SparseMatrix
-    factors: sparse_linalg.SuperLU
+    factors: Any
     row_sums: Vector
     refinement: int
     accuracy: float
+    settled: float = math.inf
 
     def solve(self, b: Vector) -> Vector:
         """x of matrix x = b, shapes (n,); raises SingularMatrix if x is not finite or not a
-        solution to `accuracy` (row-wise backward error), as weak pivots may cause.
+        solution to `accuracy`, as weak pivots may cause.
         """
         x: Vector = self.factors.solve(b)
+        correction = 0.0
         for _ in range(self.refinement):
-            x = x + self.factors.solve(b - self.matrix @ x)
+            dx = self.factors.solve(b - self.matrix @ x)
+            x = x + dx
+            correction = float(np.abs(dx).max(initial=0.0))
         if not np.isfinite(x).all():
             raise SingularMatrix("the linear solution is not finite: a pivot vanished")
+        if correction > self.settled * float(np.abs(x).max(initial=0.0)):
+            raise SingularMatrix("the linear solution does not settle: the matrix is singular")
         error = self._backward_error(x, b)
         if error > self.accuracy:
             raise SingularMatrix(
@@ -74,6 +98,17 @@ class Factorisation:
         return float(ratio.max(initial=0.0))
 
 
+def checked_row_sums(K: SparseMatrix) -> Vector:
+    """Sums (n,) of |K| along rows; raises SingularMatrix for a zero row or entries not finite."""
+    if not np.isfinite(K.data).all():
+        raise SingularMatrix("the matrix has entries that are not finite")
+    sums = np.bincount(K.indices, weights=np.abs(K.data), minlength=K.shape[0])
+    if not sums.all():
+        row = int(np.flatnonzero(sums == 0.0)[0])
+        raise SingularMatrix(f"row {row} of the matrix is zero")
+    return np.asarray(sums, dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class SuperLU:
     """Sparse LU by SuperLU (Li and Demmel), set for a structurally symmetric matrix.
@@ -89,18 +124,15 @@ class SuperLU:
     pivot_threshold: float = 0.01
     refinement: int = 1
     accuracy: float = 1e-6
+    name: str = "superlu"
 
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
-        if not np.isfinite(K.data).all():
-            raise SingularMatrix("the matrix has entries that are not finite")
-        row_sums = np.asarray(abs(K) @ np.ones(K.shape[1]), dtype=np.float64)
-        if not row_sums.all():
-            row = int(np.flatnonzero(row_sums == 0.0)[0])
-            raise SingularMatrix(f"row {row} of the matrix is zero")
-        return Factorisation(K, self._factors(K), row_sums, self.refinement, self.accuracy)
+        row_sums = checked_row_sums(K)
+        return Factorisation(K, self.factors(K), row_sums, self.refinement, self.accuracy)
 
-    def _factors(self, K: SparseMatrix) -> sparse_linalg.SuperLU:
+    def factors(self, K: SparseMatrix) -> sparse_linalg.SuperLU:
+        """Factors of K, unchecked, with many right sides; raises SingularMatrix."""
         try:
             return sparse_linalg.splu(
                 K,
@@ -110,3 +142,20 @@ class SuperLU:
             )
         except RuntimeError as error:  # SuperLU's word for an exactly singular matrix
             raise SingularMatrix(f"no LU factors: {error}") from error
+
+
+def choose(backend: Backend) -> LinearSolver:
+    """The solver of that name; "auto" is PARDISO where it is installed and SuperLU elsewhere.
+
+    Raises MissingBackend if "pardiso" is asked for and not installed.
+    """
+    from runtime import pardiso  # late: it loads a large library
+
+    if backend == "superlu" or (backend == "auto" and not pardiso.available()):
+        return SuperLU()
+    if not pardiso.available():
+        raise MissingBackend(
+            'linear = "pardiso": it is not installed; allowed here: "auto" or "superlu", '
+            "or install the extra `fast` (pip install 'softehl[fast]')"
+        )
+    return pardiso.Pardiso()
