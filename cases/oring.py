@@ -24,6 +24,7 @@ from cases.oring_path import (
     squeeze_stage,
     weight_stage,
 )
+from cases.oring_refinement import DENSITIES, finer, refined_contact
 from cases.oring_results import contact_state, film_numbers, film_state
 from cases.oring_section import OringSection, build_section
 from cases.oring_verdict import FilmNumbers, Verdict, fewest_inlet_segments
@@ -109,11 +110,36 @@ class _Run:
     def contact(self) -> Array:
         """First stage, shared by both strokes."""
         p_s = self.section.parameters.sealed_pressure
-        x = self.walk(squeeze_stage(self.section, self.settings), self.section.at_rest())
-        if p_s > 0.0:
-            x = self.walk(load_stage(self.section, self.settings, p_s), x)
+        x = self._contact_unknowns()
         problem = contact_problem(self.section, self.settings, p_s)
         self.observer.contact_state(contact_state(self.section, problem, p_s, x))
+        return x
+
+    def _contact_unknowns(self) -> Array:
+        """By way of coarser meshes; on the mesh itself if that is asked for or the ways fail."""
+        p = self.section.parameters
+        coarser = [d for d in DENSITIES if d < p.density and p.solver == "auto"]
+        for coarsest in coarser:
+            with suppress(_Stopped):
+                return self._refined(coarsest)
+        return self._loaded(self.section)
+
+    def _loaded(self, section: OringSection) -> Array:
+        """Contact state of a section, from rest."""
+        p_s = section.parameters.sealed_pressure
+        x = self.walk(squeeze_stage(section, self.settings), section.at_rest())
+        return self.walk(load_stage(section, self.settings, p_s), x) if p_s > 0.0 else x
+
+    def _refined(self, coarsest: int) -> Array:
+        """Contact state of the section from that of a coarser mesh, density by density."""
+        p = self.section.parameters
+        section = build_section(p.model_copy(update={"density": coarsest}))
+        x = self._loaded(section)
+        while section is not self.section:
+            coarse, density = section, 2 * section.parameters.density
+            last = density == p.density
+            section = self.section if last else build_section(finer(coarse.parameters))
+            x = self.walk(*refined_contact(coarse, section, self.settings, x))
         return x
 
     def stroke(self, stroke: Stroke, x: Array) -> None:

@@ -25,7 +25,8 @@ class Stage:
     """A family of problems in one parameter, to be followed from `start` to `stop`.
 
     name, sealed_pressure, stroke: what observers and records call it. waypoints: parameters
-    hit exactly. shown: the parameter as it is reported (mm/s for a path in log |U|).
+    hit exactly. shown: the parameter as it is reported (mm/s for a path in log |U|). method: how
+    it is solved, for the record.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Stage:
     sealed_pressure: float
     stroke: str
     waypoints: tuple[float, ...] = ()
+    method: str = "newton"
     on_point: Callable[[Point], None] = _nothing
     shown: Callable[[float], float] = float
 
@@ -115,4 +117,5 @@ def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -
         parameters=tuple(stage.shown(p.parameter) for p in points),
         sealed_pressure=stage.sealed_pressure,
         stroke=stage.stroke,
+        method=stage.method,
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csc_array, csc_matrix
 from scipy.sparse import linalg as sparse_linalg
 
@@ -19,6 +20,9 @@ from runtime.solution import Vector
 SparseMatrix: TypeAlias = "csc_array[np.float64] | csc_matrix[np.float64]"
 Backend: TypeAlias = Literal["auto", "superlu", "pardiso"]
 Ordering: TypeAlias = Literal["NATURAL", "MMD_ATA", "MMD_AT_PLUS_A", "COLAMD"]
+
+
+_RIGHT_SIDES = 64  # at a time; all at once would need much memory
 
 
 class SingularMatrix(ArithmeticError):  # noqa: N818 (named after what it is)
@@ -43,6 +47,39 @@ class LinearSolver(Protocol):
 
     def factorise(self, K: SparseMatrix) -> Factors:
         """Factors of K, shape (n, n)."""
+        ...
+
+
+class Condensed(Protocol):
+    """K = [[K_II, K_IB], [K_BI, K_BB]] with the interior unknowns I eliminated; see `Condenser`.
+
+    boundary: (m,) numbers of the unknowns B. schur: (m, m) S = K_BB - K_BI K_II^-1 K_IB.
+    """
+
+    @property
+    def boundary(self) -> NDArray[np.int64]:
+        """See the class."""
+        ...
+
+    @property
+    def schur(self) -> NDArray[np.float64]:
+        """See the class."""
+        ...
+
+    def reduce(self, r: Vector) -> tuple[Vector, Vector]:
+        """r_B - K_BI K_II^-1 r_I, (m,), for r (n,), and what `extend` wants to know of it, (n,)."""
+        ...
+
+    def extend(self, reduced: Vector, x: Vector) -> Vector:
+        """(n,): x (m,) on the boundary and K_II^-1 (r_I - K_IB x) in the interior."""
+        ...
+
+
+class Condenser(LinearSolver, Protocol):
+    """A linear solver that can also eliminate all unknowns but a few."""
+
+    def condense(self, K: SparseMatrix, boundary: NDArray[np.int64]) -> Condensed:
+        """Condensation of K, (n, n), onto unknowns (m,) in rising order; raises SingularMatrix."""
         ...
 
 
@@ -143,8 +180,51 @@ class SuperLU:
         except RuntimeError as error:  # SuperLU's word for an exactly singular matrix
             raise SingularMatrix(f"no LU factors: {error}") from error
 
+    def condense(self, K: SparseMatrix, boundary: NDArray[np.int64]) -> SchurBySolves:
+        """See `Condenser`; the Schur complement takes a solve for each boundary unknown."""
+        checked_row_sums(K)
+        inner: NDArray[np.bool_] = np.ones(K.shape[0], dtype=bool)
+        inner[boundary] = False
+        interior = np.flatnonzero(inner)
+        rows = csc_array(K[boundary, :])
+        columns = csc_array(K[interior, :][:, boundary])
+        factors = self.factors(csc_array(K[interior, :][:, interior]))
+        coupling = csc_array(rows[:, interior])
+        schur = rows[:, boundary].toarray()
+        for first in range(0, len(boundary), _RIGHT_SIDES):
+            part = slice(first, first + _RIGHT_SIDES)
+            schur[:, part] -= np.asarray(coupling @ factors.solve(columns[:, part].toarray()))
+        return SchurBySolves(boundary, schur, interior, factors, (coupling, columns))
 
-def choose(backend: Backend) -> LinearSolver:
+
+@dataclass(frozen=True, eq=False)
+class SchurBySolves:
+    """A condensation by SuperLU; satisfies `Condensed`.
+
+    interior: (n - m,) eliminated unknowns. couplings: K_BI and K_IB.
+    """
+
+    boundary: NDArray[np.int64]
+    schur: NDArray[np.float64]
+    interior: NDArray[np.intp]
+    factors: sparse_linalg.SuperLU
+    couplings: tuple[SparseMatrix, SparseMatrix]
+
+    def reduce(self, r: Vector) -> tuple[Vector, Vector]:
+        """See `Condensed`."""
+        y = np.zeros(len(r))
+        y[self.interior] = self.factors.solve(r[self.interior])
+        return np.asarray(r[self.boundary] - self.couplings[0] @ y[self.interior]), y
+
+    def extend(self, reduced: Vector, x: Vector) -> Vector:
+        """See `Condensed`."""
+        full = reduced.copy()
+        full[self.interior] -= self.factors.solve(np.asarray(self.couplings[1] @ x))
+        full[self.boundary] = x
+        return full
+
+
+def choose(backend: Backend) -> Condenser:
     """The solver of that name; "auto" is PARDISO where it is installed and SuperLU elsewhere.
 
     Raises MissingBackend if "pardiso" is asked for and not installed.

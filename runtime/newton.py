@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -35,6 +35,15 @@ class NonlinearProblem(Protocol):
 
     def step_limit(self, x: Vector, dx: Vector) -> float:
         """Largest admissible fraction of the step dx from x, in (0, 1]."""
+        ...
+
+
+@runtime_checkable
+class EvolvingProblem(NonlinearProblem, Protocol):
+    """A problem whose tangent depends on the iterates so far (its residual must not)."""
+
+    def after(self, before: Vector, x: Vector) -> Self:
+        """The problem as it is after a step from `before` to x, shapes (n,)."""
         ...
 
 
@@ -91,7 +100,10 @@ class Newton:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             state = self.terminate(self.init(problem, x0))
             while state.status is None:
+                before = state.x
                 state = self.terminate(self.step(problem, state))
+                if isinstance(problem, EvolvingProblem):
+                    problem = problem.after(before, state.x)
         return Solution(
             x=state.x,
             status=state.status,

@@ -181,7 +181,7 @@ class _Lent:
 
 @dataclass(frozen=True, eq=False)
 class PartialFactors:
-    """Factors of all but the boundary unknowns; see `runtime.schur.Condensed`."""
+    """Factors of all but the boundary unknowns; see `runtime.linear.Condensed`."""
 
     handle: _Handle
     boundary: NDArray[np.int64]

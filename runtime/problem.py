@@ -104,7 +104,15 @@ class Problem:
         Where x does not yet have the prescribed values, their influence on the other equations
         is moved into R, so that -K^-1 R is the exact Newton step of the whole system.
         """
+        return self.linearise_with(x, None)
+
+    def linearise_with(
+        self, x: Array, addition: Array | None
+    ) -> tuple[Array, csc_array[np.float64]]:
+        """As `linearise`, with `addition` (nnz,) to the entries of K before the elimination."""
         r, K = self.assembler.linearise(x, self.parameters)
+        if addition is not None:
+            K.data += addition
         defect = np.zeros_like(r)
         defect[self.fixed] = x[self.fixed] - self.values
         if defect.any():

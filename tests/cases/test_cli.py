@@ -303,6 +303,7 @@ def test_run_json(here: Path, invoke: Invoke) -> None:
             "name": "contact",
             "sealed_pressure_MPa": 1.0,
             "stroke": "out",
+            "method": "newton",
             "seconds": 0.5,
             "factorisations": 4,
             "iterations": 3,
