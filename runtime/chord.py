@@ -60,6 +60,10 @@ class LayeredProblem(NonlinearProblem, Protocol):
         """L(x), (m + k,), and its tangent, (m + k, m + k), csc."""
         ...
 
+    def scaled(self, r: Vector) -> Vector:
+        """Dimensionless residual, (n,); its 2-norm is `norm`."""
+        ...
+
     def layer_limit(self, x: Vector, dx: Vector) -> float:
         """Largest fraction of the step dx that the layer admits, in (0, 1]."""
         ...
@@ -69,7 +73,7 @@ class LayeredProblem(NonlinearProblem, Protocol):
 class Chord:
     """Settings of the chord iteration.
 
-    tolerance: of the full residual, as for Newton. max_outer, max_inner: iterations of one solve
+    tolerance, stagnation: of the full residual, as for Newton. max_outer, max_inner: iterations of one solve
     and of one inner system. inner_gain: an inner system is solved to this fraction of the
     residual that the outer iteration has. contraction: slowest mean reduction of the residual
     over `patience` iterations; a slower one ends the solve. depth: of Anderson's mixing, 0 = none.
@@ -77,8 +81,9 @@ class Chord:
 
     tolerance: float = 1e-9
     max_outer: int = 25
+    stagnation: float = 100.0
     max_inner: int = 12
-    inner_gain: float = 0.02
+    inner_gain: float = 1e-3
     contraction: float = 0.6
     patience: int = 3
     depth: int = 4
@@ -89,24 +94,35 @@ class Chord:
             return self._solve(problem, condensed, problem.admissible(x0))
 
     def _solve(self, problem: LayeredProblem, condensed: Condensed, x: Vector) -> Solution:
-        mixing = _Mixing(self.depth)
-        r = problem.residual(x)
-        norms = [_size(problem, r)]
+        history = _History(problem, self.depth)
+        history.add(x, problem.residual(x))
+        norms = [_size(problem, history.latest.r)]
         while True:
             status = self._status(norms)
             if status is not None:
                 return _solution(x, status, norms)
-            target = max(0.1 * self.tolerance, self.inner_gain * norms[-1])
-            y = self._outer(problem, condensed, x, r, target)
+            start = history.latest if len(norms) < 3 else history.mixed()
+            y = self._outer(problem, condensed, start, self._target(norms[-1]))
             if y is None:
                 return _solution(x, Status.DIVERGED, norms, "the layer's own iteration failed")
-            x = mixing.next(x, y)
-            r = problem.residual(x)
-            norms.append(_size(problem, r))
+            if len(norms) == 1:
+                history.clear()  # the start does not fulfil the layer's equations, all others do
+            x = y
+            history.add(x, problem.residual(x))
+            norms.append(_size(problem, history.latest.r))
+
+    def _exhausted(self, before: float, norm: float) -> bool:
+        """Whether nothing but rounding is left."""
+        return 0.5 * before < norm <= self.stagnation * self.tolerance
+
+    def _target(self, norm: float) -> float:
+        return max(0.1 * self.tolerance, self.inner_gain * norm)
 
     def _status(self, norms: list[float]) -> Status | None:
         """How the solve ends at these norms, None if it goes on."""
         if norms[-1] <= self.tolerance:
+            return Status.CONVERGED
+        if len(norms) > 3 and self._exhausted(min(norms[-3:-1]), norms[-1]):
             return Status.CONVERGED
         if not math.isfinite(norms[-1]):
             return Status.NOT_FINITE
@@ -115,71 +131,75 @@ class Chord:
         # the first norm is that of the start, which the layer had not met yet
         before = len(norms) - 1 - self.patience
         if before >= 1 and norms[-1] > self.contraction**self.patience * norms[before]:
-            return Status.DIVERGED
+            return Status.MAX_ITERATIONS
         return None
 
     def _outer(
-        self, problem: LayeredProblem, condensed: Condensed, x: Vector, r: Vector, target: float
+        self, problem: LayeredProblem, condensed: Condensed, at: _Iterate, target: float
     ) -> Vector | None:
-        """The next iterate, None if the inner iteration fails; r: residual at x."""
-        m = len(problem.shared)
-        body = r.copy()
-        layer = problem.layer_residual(x)
-        body[problem.shared] -= layer[:m]
-        body[problem.own] = 0.0
-        g, reduced = condensed.reduce(body)
-        inner = _Inner(problem, condensed.schur, g, x, r)
-        y = self._inner(inner, x, target)
+        """The next iterate, None if the inner iteration fails."""
+        g, reduced = condensed.reduce(at.body)
+        y = self._inner(_Inner(problem, condensed.schur, g, at), at.x, target)
         if y is None:
             return None
-        dx = -condensed.extend(reduced, (x - y)[problem.shared])
-        dx[problem.own] = (y - x)[problem.own]
-        return x + dx
+        dx = -condensed.extend(reduced, (at.x - y)[problem.shared])
+        dx[problem.own] = (y - at.x)[problem.own]
+        return np.asarray(at.x + dx)
 
     def _inner(self, inner: _Inner, x: Vector, target: float) -> Vector | None:
-        """x with the shared and own unknowns that solve the small system."""
-        norm = math.inf
+        """x with the shared and own unknowns that solve the small system, or nearly do."""
+        best, least, before = x, math.inf, math.inf
         for _ in range(self.max_inner):
             r, L = inner.linearise(x)
             norm = inner.norm(r)
-            if norm <= target or not math.isfinite(norm):
+            if norm < least:
+                best, least = x, norm
+            exhausted = self._exhausted(before, norm)
+            if norm <= target or exhausted or not math.isfinite(norm):
                 break
             try:
                 step = inner.step(r, L)
             except SingularMatrix:
                 return None
-            x = x + inner.limit(x, step) * step
-        else:
-            norm = inner.norm(inner.linearise(x)[0])
-        return x if norm <= max(target, 0.5 * inner.start) else None
+            x, before = x + inner.limit(x, step) * step, norm
+        # an active set may cycle where the outer iterate is still rough: it need not be exact there
+        return best if least <= max(target, self.stagnation * self.tolerance, 0.1 * inner.start) else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """An outer iterate x with the residual r and the body's part of it, all (n,)."""
+
+    x: Vector
+    r: Vector
+    body: Vector
 
 
 @dataclass(frozen=True, eq=False)
 class _Inner:
-    """The small system at the outer iterate x with the residual r."""
+    """The small system at the outer iterate `at`, with its condensed residual g (m,)."""
 
     problem: LayeredProblem
     schur: Matrix
     g: Vector
-    x: Vector
-    r: Vector
+    at: _Iterate
 
     @property
     def start(self) -> float:
         """Size of the residual at the outer iterate."""
-        return _size(self.problem, self.r)
+        return _size(self.problem, self.at.r)
 
     def linearise(self, y: Vector) -> tuple[Vector, SparseMatrix]:
         """Residual (m + k,) and the layer's part of the tangent."""
         r, L = self.problem.layer_linearise(y)
         shared = self.problem.shared
         r = r.copy()
-        r[: len(shared)] += self.g + self.schur @ (y - self.x)[shared]
+        r[: len(shared)] += self.g + self.schur @ (y - self.at.x)[shared]
         return r, L
 
     def norm(self, r: Vector) -> float:
         """Size of r as a part of a full residual."""
-        full, m = np.zeros_like(self.x), len(self.problem.shared)
+        full, m = np.zeros_like(self.at.x), len(self.problem.shared)
         full[self.problem.shared] = r[:m]
         full[self.problem.own] = r[m:]
         return _size(self.problem, full)
@@ -196,7 +216,7 @@ class _Inner:
             a = dense.lu_solve(dense.lu_factor(A, check_finite=False), b, check_finite=False)
         except (ValueError, np.linalg.LinAlgError) as error:
             raise SingularMatrix(f"the condensed system: {error}") from error
-        step = np.zeros_like(self.x)
+        step = np.zeros_like(self.at.x)
         step[self.problem.shared] = -a
         step[self.problem.own] = eliminated[:, :m] @ a - eliminated[:, m]
         if not np.isfinite(step).all():
@@ -222,26 +242,42 @@ def solve_banded(A: SparseMatrix, b: Matrix) -> Matrix:
 
 
 @dataclass
-class _Mixing:
-    """Anderson's mixing of fixed-point iterates x -> y(x), over the last `depth` differences."""
+class _History:
+    """The latest iterates, for Anderson's mixing."""
 
+    problem: LayeredProblem
     depth: int
-    steps: list[Vector] = field(default_factory=list)
-    images: list[Vector] = field(default_factory=list)
+    iterates: list[_Iterate] = field(default_factory=list)
 
-    def next(self, x: Vector, y: Vector) -> Vector:
-        """The next x, from the pair (x, y(x)) and those before."""
-        if not self.depth:
-            return y
-        self.steps.append(y - x)
-        self.images.append(y)
-        del self.steps[: -self.depth - 1], self.images[: -self.depth - 1]
-        if len(self.steps) == 1:
-            return y
-        change = np.stack([b - self.steps[-1] for b in self.steps[:-1]], axis=1)
-        images = np.stack([b - self.images[-1] for b in self.images[:-1]], axis=1)
-        weights = np.linalg.lstsq(change, -self.steps[-1], rcond=1e-10)[0]
-        return np.asarray(y + images @ weights)
+    @property
+    def latest(self) -> _Iterate:
+        return self.iterates[-1]
+
+    def add(self, x: Vector, r: Vector) -> None:
+        """Add x with its residual r, both (n,)."""
+        problem, body = self.problem, r.copy()
+        body[problem.shared] -= problem.layer_residual(x)[: len(problem.shared)]
+        body[problem.own] = 0.0
+        self.iterates.append(_Iterate(x, r, body))
+        del self.iterates[: -self.depth - 1]
+
+    def clear(self) -> None:
+        self.iterates.clear()
+
+    def mixed(self) -> _Iterate:
+        """The combination of the iterates with the smallest residual, were it linear in x."""
+        now, others = self.latest, self.iterates[:-1]
+        if not others:
+            return now
+        scaled = self.problem.scaled(now.r)
+        changes = np.stack([self.problem.scaled(o.r) - scaled for o in others], axis=1)
+        weights = np.linalg.lstsq(changes, -scaled, rcond=1e-10)[0]
+        x, r, body = now.x, now.r, now.body
+        for weight, other in zip(weights, others, strict=True):
+            x = x + weight * (other.x - now.x)
+            r = r + weight * (other.r - now.r)
+            body = body + weight * (other.body - now.body)
+        return _Iterate(x, r, body) if self.problem.layer_limit(now.x, x - now.x) == 1.0 else now
 
 
 def _size(problem: NonlinearProblem, r: Vector) -> float:

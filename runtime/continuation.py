@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array, hstack, vstack
 
 from runtime.linear import LinearSolver, SingularMatrix, SparseMatrix
-from runtime.newton import Newton, NonlinearProblem
+from runtime.newton import Corrector, Newton, NonlinearProblem
 from runtime.solution import Branch, LimitPoint, Point, Solution, Status, Vector
 
 __all__ = ["Arclength", "Branch", "Continuation", "LimitPoint", "Point", "StepRule"]
@@ -141,7 +141,7 @@ class Continuation:
     name: what messages call the parameter.
     """
 
-    newton: Newton
+    newton: Corrector
     steps: StepRule
     predictor: Literal["secant", "previous"] = "secant"
     keep_all: bool = False

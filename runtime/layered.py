@@ -57,7 +57,7 @@ def _renumbered(block: ElementBlock, compact: Integers) -> ElementBlock:
 class Layered:
     """A problem with its layer; satisfies `LayeredProblem`.
 
-    guards: those of the problem's that concern the layer.
+    guards: those of the problem that concern the layer.
     """
 
     problem: Problem
@@ -85,6 +85,10 @@ class Layered:
     def norm(self, r: Array) -> float:
         """See `Problem`."""
         return self.problem.norm(r)
+
+    def scaled(self, r: Array) -> Array:
+        """See `Problem`."""
+        return self.problem.scaled(r)
 
     def step_limit(self, x: Array, dx: Array) -> float:
         """See `Problem`."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -35,6 +35,14 @@ class NonlinearProblem(Protocol):
 
     def step_limit(self, x: Vector, dx: Vector) -> float:
         """Largest admissible fraction of the step dx from x, in (0, 1]."""
+        ...
+
+
+class Corrector(Protocol):
+    """Anything that solves R(x) = 0 from a guess: Newton's method, or a cheaper relative."""
+
+    def solve(self, problem: Any, x0: Vector) -> Solution:
+        """The solution from x0, shape (n,); failure is its status."""
         ...
 
 

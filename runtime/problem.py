@@ -127,6 +127,13 @@ class Problem:
         ]
         return float(np.linalg.norm(parts))
 
+    def scaled(self, r: Array) -> Array:
+        """Residual (n,) over the reference size of its field; `norm` is the 2-norm of it."""
+        result = np.zeros_like(r)
+        for name, scale in self.scales.items():
+            result[self.layout.part(name)] = r[self.layout.part(name)] / scale
+        return result
+
     def step_limit(self, x: Array, dx: Array) -> float:
         """Largest fraction of the step that every guard admits."""
         return min((guard.limit(x, dx) for guard in self.guards), default=1.0)
