@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cases.observer import FilmState, Observer, Outcome, StageRecord
+from cases.oring_fast import FastFilm
 from cases.oring_order import REFERENCE_ORDER, OrderPair, transferred
 from cases.oring_parameters import ORing
 from cases.oring_path import (
@@ -30,7 +31,7 @@ from cases.oring_section import OringSection, build_section
 from cases.oring_verdict import FilmNumbers, Verdict, fewest_inlet_segments
 from cases.stages import Stage, Walker
 from runtime.continuation import Branch, Point
-from runtime.linear import choose
+from runtime.linear import Condenser, choose
 from runtime.newton import Newton
 from runtime.solution import Status
 
@@ -150,22 +151,43 @@ class _Run:
         ).p_max_MPa
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
         judge = _Judge(self, Verdict(reference, fewest=fewest))
-        film, start = self.build_film(stroke, x)
+        film = self.first_film(stroke, x)
+        with suppress(_Stopped):
+            if self._fast_films(film, x, judge):
+                return
         try:
-            self.walk(speed_stage(section, settings, film, p.speeds, judge), start)
+            start, state = judge.position or self.build_film(film, x)
+            slower = [u for u in p.speeds if u < start.speed or judge.position is None]
+            self.walk(speed_stage(section, settings, start, slower, judge), state)
         except _Stopped as stop:
             stop.last = judge.verdict.last
             self.from_higher_order(film, x, judge)
             if judge.missing:
                 raise
 
-    def build_film(self, stroke: Stroke, x: Array) -> tuple[Film, Array]:
-        """Second stage: the film at its highest speed, from the contact state x."""
-        section, settings, p = self.section, self.settings, self.section.parameters
-        speed = max(settings.start_speed, *p.speeds)
-        multipliers = x[section.layout.part("rod")].copy()
+    def first_film(self, stroke: Stroke, x: Array) -> Film:
+        """The film at its highest speed, under the rod forces of the contact state x."""
+        p = self.section.parameters
+        speed = max(self.settings.start_speed, *p.speeds)
+        multipliers = x[self.section.layout.part("rod")].copy()
         shear = 1.0 if p.shear_traction else 0.0
-        film = Film(p.sealed_pressure, stroke, speed, multipliers, shear=shear)
+        return Film(p.sealed_pressure, stroke, speed, multipliers, shear=shear)
+
+    def _fast_films(self, film: Film, x: Array, judge: _Judge) -> bool:
+        """Second and third stage by chord iterations; False where these do not apply."""
+        section, settings, p = self.section, self.settings, self.section.parameters
+        linear = self.walker.newton.linear
+        fit = p.solver == "auto" and p.rotation == "fixed" and p.reynolds == "fe"
+        if not fit or not isinstance(linear, Condenser):
+            return False
+        fast = FastFilm.of(section, linear)
+        x = self.walk(fast.weight(weight_stage(section, settings, film)), x)
+        self.walk(fast.speed(speed_stage(section, settings, film, p.speeds, judge)), x)
+        return True
+
+    def build_film(self, film: Film, x: Array) -> tuple[Film, Array]:
+        """Second stage by Newton's method: from the contact state x to the film."""
+        section, settings, p = self.section, self.settings, self.section.parameters
         x = self.walk(weight_stage(section, settings, film), x)
         if p.rotation == "free":
             x = self.walk(release_stage(section, settings, film, x), x)
@@ -189,7 +211,8 @@ class _Run:
                 found[at.speed] = (at, point.solution.x)
 
         with suppress(_Stopped):
-            film, x = other.build_film(film.stroke, transferred(contact, section, pair.high))
+            x = transferred(contact, section, pair.high)
+            film, x = other.build_film(other.first_film(film.stroke, x), x)
             other.walk(speed_stage(pair.high, settings, film, missing, keep), x)
         for at, x in found.values():
             with suppress(_Stopped):
@@ -206,6 +229,7 @@ class _Judge:
     run: _Run
     verdict: Verdict
     reached: list[float] = field(default_factory=list)
+    position: tuple[Film, Array] | None = None
 
     @property
     def missing(self) -> tuple[float, ...]:
@@ -215,6 +239,9 @@ class _Judge:
 
     def __call__(self, film: Film, point: Point) -> None:
         run, x = self.run, point.solution.x
+        if self.position is not None and not film.speed < self.position[0].speed:
+            return  # where another way of solving sets in
+        self.position = film, x
         problem = film_problem(run.section, run.settings, film)
         self.verdict = self.verdict.after(film_numbers(run.section, problem, film, x))
         if film.speed not in run.section.parameters.speeds:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cases.observer import Observer, StageRecord
 from runtime.continuation import Branch, Continuation, Point, StepRule
-from runtime.newton import Newton, NonlinearProblem
+from runtime.newton import Corrector, Newton, NonlinearProblem
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ class Stage:
 
     name, sealed_pressure, stroke: what observers and records call it. waypoints: parameters
     hit exactly. shown: the parameter as it is reported (mm/s for a path in log |U|). method: how
-    it is solved, for the record.
+    it is solved, for the record. corrector: what solves it, None for the walker's Newton.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Stage:
     stroke: str
     waypoints: tuple[float, ...] = ()
     method: str = "newton"
+    corrector: Corrector | None = None
     on_point: Callable[[Point], None] = _nothing
     shown: Callable[[float], float] = float
 
@@ -82,7 +83,7 @@ class Walker:
 
     def _follow(self, stage: Stage, x0: Array, report: Callable[[Point], None]) -> Branch:
         patient = replace(self.newton, max_iterations=self.patience)
-        first = patient.solve(stage.problem_at(stage.start), x0)
+        first = (stage.corrector or patient).solve(stage.problem_at(stage.start), x0)
         spent = (first.factorisations, first.iterations)
         if not first.converged:
             message = f"{stage.name}: no solution at the start ({first.message})"
@@ -92,7 +93,7 @@ class Walker:
             point = Point(stage.start, first)
             return Branch((point,), first.status, f"reached {stage.start:.9g}", *spent)
         known = iter([_nothing])  # the first point is reported above, with its own history
-        branch = Continuation(self.newton, stage.steps, name=stage.name).follow(
+        branch = Continuation(stage.corrector or self.newton, stage.steps, name=stage.name).follow(
             stage.problem_at,
             stage.start,
             stage.stop,

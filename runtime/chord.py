@@ -15,7 +15,7 @@ layer has being eliminated by a banded factorisation. Outer iterates are mixed a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from scipy import linalg as dense
 from scipy.sparse import csc_array
 
-from runtime.linear import Condensed, Condenser, SingularMatrix, SparseMatrix
-from runtime.newton import Newton, NonlinearProblem
+from runtime.linear import Condensed, SingularMatrix, SparseMatrix
+from runtime.newton import NonlinearProblem
 from runtime.solution import Solution, Status, Vector
 
 Integers = NDArray[np.int64]
@@ -73,8 +73,8 @@ class LayeredProblem(NonlinearProblem, Protocol):
 class Chord:
     """Settings of the chord iteration.
 
-    tolerance, stagnation: of the full residual, as for Newton. max_outer, max_inner: iterations of one solve
-    and of one inner system. inner_gain: an inner system is solved to this fraction of the
+    tolerance, stagnation: of the full residual, as for Newton. max_outer, max_inner: iterations
+    of one solve and of one inner system. inner_gain: an inner system is solved to this fraction of the
     residual that the outer iteration has. contraction: slowest mean reduction of the residual
     over `patience` iterations; a slower one ends the solve. depth: of Anderson's mixing, 0 = none.
     """
@@ -163,7 +163,8 @@ class Chord:
                 return None
             x, before = x + inner.limit(x, step) * step, norm
         # an active set may cycle where the outer iterate is still rough: it need not be exact there
-        return best if least <= max(target, self.stagnation * self.tolerance, 0.1 * inner.start) else None
+        enough = max(target, self.stagnation * self.tolerance, 0.1 * inner.start)
+        return best if least <= enough else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,10 @@ from dataclasses import dataclass, field, replace
 
 from runtime.chord import Chord, LayeredProblem
 from runtime.linear import Condensed, Condenser, SingularMatrix
+from runtime.newton import Newton
 from runtime.solution import Solution, Status, Vector
+
+_HELD_UP = 5.0  # times the tolerance
 
 
 @dataclass
@@ -29,12 +32,14 @@ class FrozenBody:
 
     linear: makes the condensations. chord: the iteration. wear: mean reduction of the residual in
     an outer iteration above which the condensation counts as worn. A solve that is too slow with
-    an old condensation is tried once more with one of the last accepted state.
+    an old condensation is tried once more with one of the last accepted state. closing: exact
+    Newton steps for a solution whose residual rounding holds up more than it does Newton's.
     """
 
     linear: Condenser
     chord: Chord = field(default_factory=Chord)
     wear: float = 0.35
+    closing: Newton | None = None
     memory: Memory = field(default_factory=Memory)
 
     def loosely(self, tolerance: float) -> FrozenBody:
@@ -59,13 +64,31 @@ class FrozenBody:
             spent = solution.iterations + (first.iterations if first else 0)
             solution = replace(solution, factorisations=made, iterations=spent)
             if solution.converged:
+                rate = _rate(solution)
+                solution = self._closed(problem, solution)
                 memory.settled = solution.x
-                memory.worn = _rate(solution) > self.wear
+                memory.worn = rate > self.wear
                 return solution
             slow = solution.status is Status.MAX_ITERATIONS  # else age is not to blame
             if not slow or first is not None or memory.place is memory.settled:
                 return solution
             first, memory.worn = solution, True
+
+    def _closed(self, problem: LayeredProblem, solution: Solution) -> Solution:
+        """The solution, after exact Newton steps if its residual was held up."""
+        norms = solution.residual_norms
+        if self.closing is None or norms[-1] <= _HELD_UP * self.chord.tolerance:
+            return solution
+        exact = self.closing.solve(problem, solution.x)
+        made, spent = exact.factorisations, exact.iterations
+        if exact.converged and exact.residual_norms[-1] < norms[-1]:
+            norms = (*norms, *exact.residual_norms[1:])
+            solution = replace(solution, x=exact.x, residual_norms=norms, message=exact.message)
+        return replace(
+            solution,
+            factorisations=solution.factorisations + made,
+            iterations=solution.iterations + spent,
+        )
 
     def _condense(self, problem: LayeredProblem) -> None:
         memory = self.memory

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,7 @@ class Condensed(Protocol):
         ...
 
 
+@runtime_checkable
 class Condenser(LinearSolver, Protocol):
     """A linear solver that can also eliminate all unknowns but a few."""
 

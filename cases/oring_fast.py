@@ -1,0 +1,72 @@
+"""Film stages by chord iterations: the section is factorised a few times for a whole curve.
+
+At a fixed sealed pressure the section moves by micrometres from state to state. It is the body of
+`runtime.chord`; the film, the rod that fades out below it and the sealed pressure on the arc are
+the layer, the displacements of the arc and the moment are what both share.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cases.oring_section import OringSection, film_guard
+from cases.stages import Stage
+from runtime.chord import Chord
+from runtime.continuation import StepRule
+from runtime.frozen_body import FrozenBody
+from runtime.layered import Layer, Layered
+from runtime.linear import Condenser
+from runtime.newton import Newton
+from runtime.problem import Problem
+
+LAYER = ("film", "rod", "sealed_arc")
+METHOD = "chord iterations on a frozen section"
+
+_LOOSE = 1e-2  # of the states on the way from contact to film, which are no results
+_WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
+_SPEED_STEPS = StepRule(math.log(2.0), 0.04, math.log(2.0) + 1e-9, target_iterations=30)
+
+
+@dataclass(frozen=True, eq=False)
+class FastFilm:
+    """Turns the film stages of a section into ones that are solved by chord iterations."""
+
+    section: OringSection
+    layer: Layer
+    corrector: FrozenBody
+
+    @classmethod
+    def of(cls, section: OringSection, linear: Condenser) -> FastFilm:
+        """For one stroke; the factors of the section are kept from stage to stage."""
+        layout, nodes = section.layout, section.mesh.arc_nodes
+        shared = np.concatenate([2 * nodes, 2 * nodes + 1, layout.dofs("rotation")])
+        inner = np.setdiff1d(layout.dofs("pressure"), section.film_ends)
+        layer = Layer.of(section.problem.assembler, LAYER, shared, inner)
+        return cls(
+            section,
+            layer,
+            FrozenBody(linear, Chord(), closing=Newton(max_iterations=3, linear=linear)),
+        )
+
+    def weight(self, stage: Stage) -> Stage:
+        """The stage from contact to film, to a tolerance that is enough for a way."""
+        return self._stage(stage, self.corrector.loosely(_LOOSE), _WEIGHT_STEPS)
+
+    def speed(self, stage: Stage) -> Stage:
+        """The stage of falling speed; its start also puts the shear stress on."""
+        return self._stage(stage, self.corrector, _SPEED_STEPS)
+
+    def _stage(self, stage: Stage, corrector: FrozenBody, steps: StepRule) -> Stage:
+        guards = (film_guard(self.section),)
+
+        def problem_at(parameter: float) -> Layered:
+            problem = stage.problem_at(parameter)
+            assert isinstance(problem, Problem)
+            return Layered(problem, self.layer, guards)
+
+        return replace(
+            stage, problem_at=problem_at, steps=steps, corrector=corrector, method=METHOD
+        )
