@@ -45,11 +45,8 @@ class FastFilm:
         shared = np.concatenate([2 * nodes, 2 * nodes + 1, layout.dofs("rotation")])
         inner = np.setdiff1d(layout.dofs("pressure"), section.film_ends)
         layer = Layer.of(section.problem.assembler, LAYER, shared, inner)
-        return cls(
-            section,
-            layer,
-            FrozenBody(linear, Chord(), closing=Newton(max_iterations=3, linear=linear)),
-        )
+        closing = Newton(max_iterations=3, linear=linear)
+        return cls(section, layer, FrozenBody(linear, Chord(), closing=closing))
 
     def weight(self, stage: Stage) -> Stage:
         """The stage from contact to film, to a tolerance that is enough for a way."""

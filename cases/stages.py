@@ -118,5 +118,5 @@ def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -
         parameters=tuple(stage.shown(p.parameter) for p in points),
         sealed_pressure=stage.sealed_pressure,
         stroke=stage.stroke,
-        method=stage.method,
+        method=stage.method if branch.converged else f"{stage.method}; ended: {branch.message}",
     )

@@ -74,9 +74,10 @@ class Chord:
     """Settings of the chord iteration.
 
     tolerance, stagnation: of the full residual, as for Newton. max_outer, max_inner: iterations
-    of one solve and of one inner system. inner_gain: an inner system is solved to this fraction of the
-    residual that the outer iteration has. contraction: slowest mean reduction of the residual
-    over `patience` iterations; a slower one ends the solve. depth: of Anderson's mixing, 0 = none.
+    of one solve and of one inner system. inner_gain: an inner system is solved to this fraction
+    of the residual that the outer iteration has. contraction: slowest mean reduction of the
+    residual over `patience` iterations; a slower one ends the solve. depth: of Anderson's mixing,
+    0 = none.
     """
 
     tolerance: float = 1e-9

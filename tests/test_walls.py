@@ -20,8 +20,11 @@ ALLOWED = {
     "runtime": {"runtime", "generated"},
     "cases": {"cases", "runtime"},
 }
-SOLVERS = ("newton", "continuation", "linear", "solution")
-NOT_FOR_SOLVERS = {"runtime.mesh", "runtime.dofs", "runtime.assembly", "cases", "codegen"}
+SOLVERS = ("newton", "continuation", "linear", "solution", "pardiso", "chord", "frozen_body")
+NOT_FOR_SOLVERS = {
+    *("runtime.mesh", "runtime.dofs", "runtime.assembly", "runtime.problem", "runtime.layered"),
+    *("cases", "codegen"),
+}
 HEAVY = ("sympy", "mpmath", "jax")
 
 

@@ -1,0 +1,96 @@
+"""The fast route against the monolithic one, its cost, and what it says when it gives up."""
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from cases import oring_fast
+from cases.observer import Outcome
+from cases.oring import run
+from cases.oring_fast import METHOD, FastFilm
+from cases.oring_section import OringSection
+from runtime.chord import Chord
+from runtime.linear import Condenser, choose
+from tests.cases.oring_cases import oring
+from tests.cases.test_oring_path import Recorder
+
+SPEEDS = (1600.0, 400.0)
+
+
+@cache
+def solved(solver: str, sealed_pressure: float, linear: str = "auto", density: int = 2) -> Outcome:
+    return run(
+        oring(
+            density=density,
+            sealed_pressure=sealed_pressure,
+            solver=solver,
+            speeds=SPEEDS,
+            linear=linear,
+        ),
+        Recorder(),
+    )
+
+
+@pytest.mark.parametrize("sealed_pressure", [1.0, 5.0])
+def test_both_routes_give_the_same_films(sealed_pressure: float) -> None:
+    fast, reference = (solved(s, sealed_pressure) for s in ("auto", "monolithic"))
+    assert fast.converged, fast.message
+    assert len(fast.states) == len(reference.states) == 4
+    for a, b in zip(fast.states, reference.states, strict=True):
+        assert (a.rod_speed, a.verdict) == (b.rod_speed, b.verdict)
+        assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)
+        assert a.p_max_MPa == pytest.approx(b.p_max_MPa, rel=1e-7)
+        assert a.rod_friction_N == pytest.approx(b.rod_friction_N, rel=1e-7)
+        assert a.contact_p_max_MPa == pytest.approx(b.contact_p_max_MPa, rel=1e-8)
+
+
+def test_the_cost_of_the_fast_route() -> None:
+    stages = solved("auto", 1.0).stages
+    on_the_mesh = [s for s in stages if s.name == "contact at density 2"]
+    assert [s.method for s in on_the_mesh] == ["newton, prolonged from density 1"]
+    assert (on_the_mesh[0].factorisations or 99) <= 6
+    films = [s for s in stages if s.method == METHOD]
+    assert [s.name for s in films] == ["contact to film", "falling speed"] * 2
+    for stroke in ("out", "in"):
+        assert sum(s.factorisations or 0 for s in films if s.stroke == stroke) <= 5
+    final = [
+        norms[-1] for s in films if s.name == "falling speed" for norms in s.residual_histories
+    ]
+    assert max(final) < 1e-8
+
+
+def test_superlu_does_it_too() -> None:
+    superlu, default = solved("auto", 1.0, "superlu", density=1), solved("auto", 1.0, density=1)
+    assert superlu.solvers == {"solver": "auto", "linear": "superlu"}
+    assert default.solvers["linear"] == choose("auto").name
+    for a, b in zip(superlu.states, default.states, strict=True):
+        assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)
+
+
+@pytest.mark.parametrize("outer", [1, 7])
+def test_where_it_gives_up_newton_goes_on(monkeypatch: pytest.MonkeyPatch, outer: int) -> None:
+    made = FastFilm.of
+
+    def lazy(section: OringSection, linear: Condenser) -> FastFilm:
+        fast = made(section, linear)
+        corrector = replace(fast.corrector, chord=Chord(max_outer=outer, depth=0))
+        return replace(fast, corrector=corrector)
+
+    monkeypatch.setattr(oring_fast.FastFilm, "of", staticmethod(lazy))
+    parameters = oring(density=1, sealed_pressure=1.0, stroke="out", speeds=SPEEDS)
+    outcome = run(parameters, Recorder())
+    assert outcome.converged, outcome.message
+    assert [s.rod_speed for s in outcome.states] == list(SPEEDS)  # each of them once
+    methods = [s.method for s in outcome.stages]
+    assert any(m.startswith(f"{METHOD}; ended: ") for m in methods)
+    assert methods[-1] == "newton"
+    reference = solved("monolithic", 1.0, density=1)
+    for a, b in zip(outcome.states, reference.states, strict=False):
+        assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)
+
+
+def test_a_section_that_is_free_to_roll_takes_the_monolithic_route() -> None:
+    parameters = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (6400.0,)}
+    outcome = run(oring(rotation="free", shear_traction=False, **parameters), Recorder())
+    assert {s.method for s in outcome.stages} == {"newton"}

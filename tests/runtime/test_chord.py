@@ -1,0 +1,318 @@
+"""Chord iterations on a small algebraic problem: an elastic chain with an exponential layer.
+
+The problem is built around a solution that is chosen, so that the answer is known exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array
+
+from runtime import pardiso
+from runtime.chord import Chord, solve_banded
+from runtime.continuation import Continuation, StepRule
+from runtime.frozen_body import FrozenBody, Memory
+from runtime.linear import Condenser, SingularMatrix, SuperLU
+from runtime.newton import Newton
+from runtime.pardiso import Pardiso
+from runtime.solution import Status, Vector
+
+N, M, K = 30, 4, 5
+SHARED, OWN = np.arange(10, 10 + M), np.arange(N - K, N)
+BOTH = np.concatenate([SHARED, OWN])
+SOLVERS: Sequence[Any] = [
+    SuperLU(),
+    pytest.param(
+        Pardiso(), marks=pytest.mark.skipif(not pardiso.available(), reason="not installed")
+    ),
+]
+
+
+def answer(load: float) -> Vector:
+    """The solution at a load."""
+    return load * np.sin(1.0 + np.arange(float(N)))
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Body: a chain of springs with a cubic part; layer: exp of the shared and its own unknowns.
+
+    softening: size of the cubic part, by which the body differs from its frozen tangent.
+    """
+
+    load: float = 1.0
+    softening: float = 0.1
+    asked: list[str] = field(default_factory=list)
+    shared: np.ndarray[Any, np.dtype[np.int64]] = field(default_factory=lambda: SHARED)
+    own: np.ndarray[Any, np.dtype[np.int64]] = field(default_factory=lambda: OWN)
+
+    def _springs(self) -> Vector:
+        A = 3.0 * np.eye(N) - np.eye(N, k=1) - 0.8 * np.eye(N, k=-1)
+        A[OWN], A[:, OWN] = 0.0, 0.0
+        return A
+
+    def _body(self, x: Vector) -> Vector:
+        r = self._springs() @ x + self.softening * x**3
+        r[OWN] = 0.0
+        return np.asarray(r)
+
+    def _layer(self, x: Vector) -> tuple[Vector, Vector]:
+        a, p = x[SHARED], x[OWN]
+        couple = np.ones((M, K)) / K
+        r = np.concatenate([np.exp(2.0 * a) + 0.3 * couple @ p, 2.0 * p + p**3 - couple.T @ a])
+        A = np.zeros((M + K, M + K))
+        A[:M, :M] = np.diag(2.0 * np.exp(2.0 * a))
+        A[:M, M:], A[M:, :M] = 0.3 * couple, -couple.T
+        A[M:, M:] = np.diag(2.0 + 3.0 * p**2)
+        return r, A
+
+    def _sources(self) -> tuple[Vector, Vector]:
+        x = answer(self.load)
+        return self._body(x), self._layer(x)[0]
+
+    def admissible(self, x: Vector) -> Vector:
+        return x.copy()
+
+    def residual(self, x: Vector) -> Vector:
+        self.asked.append("residual")
+        r = self._body(x) - self._sources()[0]
+        r[BOTH] += self.layer_residual(x)
+        return r
+
+    def linearise(self, x: Vector) -> tuple[Vector, csc_array[np.float64]]:
+        A = self.body(x).toarray()
+        A[OWN, OWN] = 0.0
+        A[np.ix_(BOTH, BOTH)] += self._layer(x)[1]
+        return self.residual(x), csc_array(A)
+
+    def body(self, x: Vector) -> csc_array[np.float64]:
+        A = self._springs() + np.diag(3.0 * self.softening * x**2)
+        A[OWN] = 0.0
+        A[OWN, OWN] = 1.0
+        return csc_array(A)
+
+    def layer_residual(self, x: Vector) -> Vector:
+        return np.asarray(self._layer(x)[0] - self._sources()[1])
+
+    def layer_linearise(self, x: Vector) -> tuple[Vector, csc_array[np.float64]]:
+        return self.layer_residual(x), csc_array(self._layer(x)[1])
+
+    def scaled(self, r: Vector) -> Vector:
+        return r
+
+    def norm(self, r: Vector) -> float:
+        return float(np.linalg.norm(self.scaled(r)))
+
+    def step_limit(self, x: Vector, dx: Vector) -> float:
+        return 1.0
+
+    def layer_limit(self, x: Vector, dx: Vector) -> float:
+        return 1.0
+
+
+def condensed(linear: Condenser, problem: Chain, x: Vector) -> Any:
+    return linear.condense(problem.body(x), SHARED)
+
+
+@pytest.mark.parametrize("linear", SOLVERS)
+def test_condensation_against_dense_elimination(
+    linear: Condenser, rng: np.random.Generator
+) -> None:
+    A = Chain().body(rng.normal(size=N))
+    interior = np.setdiff1d(np.arange(N), SHARED)
+    dense = A.toarray()
+    inverse = np.linalg.inv(dense[np.ix_(interior, interior)])
+    C, D = dense[np.ix_(SHARED, interior)], dense[np.ix_(interior, SHARED)]
+    c = linear.condense(A, SHARED)
+    schur = dense[np.ix_(SHARED, SHARED)] - C @ inverse @ D
+    assert c.schur == pytest.approx(schur, rel=1e-12, abs=1e-13)
+    r, x = rng.normal(size=N), rng.normal(size=M)
+    g, reduced = c.reduce(r)
+    assert g == pytest.approx(r[SHARED] - C @ inverse @ r[interior], rel=1e-11)
+    full = c.extend(reduced, x)
+    assert full[SHARED] == pytest.approx(x)
+    assert full[interior] == pytest.approx(inverse @ (r[interior] - D @ x), rel=1e-10)
+    # with the solution of the condensed system it solves the whole
+    shared: Vector = np.asarray(np.linalg.solve(c.schur, g), dtype=np.float64)
+    assert dense @ c.extend(reduced, shared) == pytest.approx(r, abs=1e-11)
+
+
+@pytest.mark.parametrize("linear", SOLVERS)
+def test_a_singular_interior_is_refused(linear: Condenser) -> None:
+    A = Chain().body(np.zeros(N)).toarray()
+    A[3] = 0.0
+    with pytest.raises(SingularMatrix):
+        linear.condense(csc_array(A), SHARED)
+
+
+@pytest.mark.parametrize("linear", SOLVERS)
+def test_the_chosen_solution_is_found(linear: Condenser) -> None:
+    problem = Chain()
+    solution = Chord().solve(problem, condensed(linear, problem, np.zeros(N)), np.zeros(N))
+    assert solution.converged, solution.message
+    assert solution.x == pytest.approx(answer(1.0), abs=1e-9)
+    assert problem.norm(problem.residual(solution.x)) == solution.residual_norms[-1] <= 1e-9
+    assert solution.factorisations == 0
+
+
+def test_a_linear_body_needs_one_outer_iteration() -> None:
+    problem = Chain(softening=0.0)
+    solution = Chord(inner_gain=0.0).solve(
+        problem, condensed(SuperLU(), problem, np.zeros(N)), np.zeros(N)
+    )
+    assert solution.iterations == 1
+    assert solution.x == pytest.approx(answer(1.0), abs=1e-9)
+
+
+def test_mixing_saves_iterations_and_age_costs_them() -> None:
+    problem = Chain()
+    far, near = (condensed(SuperLU(), problem, x) for x in (np.zeros(N), 0.9 * answer(1.0)))
+    counts = {
+        (depth, name): Chord(depth=depth, max_outer=200, contraction=0.99)
+        .solve(problem, c, np.zeros(N))
+        .iterations
+        for depth in (0, 4)
+        for name, c in (("far", far), ("near", near))
+    }
+    assert counts[4, "far"] < 0.8 * counts[0, "far"]
+    assert counts[4, "near"] < counts[4, "far"]
+
+
+def test_a_wrong_schur_complement_costs_iterations_only() -> None:
+    problem = Chain()
+    right = condensed(SuperLU(), problem, answer(1.0))
+    wrong = replace(right, schur=1.2 * right.schur)
+    a, b = (Chord().solve(problem, c, np.zeros(N)) for c in (right, wrong))
+    assert a.converged
+    assert b.converged
+    assert b.iterations > a.iterations
+    assert b.x == pytest.approx(a.x, abs=1e-9)
+
+
+def test_a_layer_that_contradicts_the_residual_never_converges() -> None:
+    class Forged(Chain):
+        def layer_residual(self, x: Vector) -> Vector:
+            return super().layer_residual(x) + 0.1
+
+        def residual(self, x: Vector) -> Vector:
+            r = super().residual(x)
+            r[BOTH] -= 0.1
+            r[BOTH[0]] += 0.01
+            return r
+
+    solution = Chord().solve(Forged(), condensed(SuperLU(), Chain(), answer(1.0)), np.zeros(N))
+    assert solution.x != pytest.approx(answer(1.0), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("chord", "status"),
+    [
+        (Chord(max_outer=2), Status.MAX_ITERATIONS),
+        (Chord(contraction=1e-4, patience=1), Status.MAX_ITERATIONS),
+        (Chord(max_inner=1, stagnation=1.0), Status.DIVERGED),
+    ],
+)
+def test_failure_is_a_status(chord: Chord, status: Status) -> None:
+    problem = Chain()
+    solution = chord.solve(problem, condensed(SuperLU(), problem, np.zeros(N)), np.zeros(N))
+    assert solution.status is status
+
+
+def test_a_start_that_is_not_finite_is_named() -> None:
+    problem = Chain()
+    c = condensed(SuperLU(), problem, np.zeros(N))
+    assert Chord().solve(problem, c, np.full(N, 1e200)).status is Status.NOT_FINITE
+
+
+def test_banded_solve_against_a_dense_one(rng: np.random.Generator) -> None:
+    A = np.diag(rng.normal(size=8)) + np.diag(rng.normal(size=7), 1) + np.diag(np.ones(6), -2)
+    b = rng.normal(size=(8, 3))
+    assert solve_banded(csc_array(A), b) == pytest.approx(np.linalg.solve(A, b), rel=1e-9)
+    with pytest.raises(SingularMatrix):
+        solve_banded(csc_array(np.zeros((3, 3))), np.ones((3, 1)))
+
+
+# --- the corrector -----------------------------------------------------------------------------
+
+
+def test_one_condensation_serves_a_path() -> None:
+    points: list[float] = []
+    body = FrozenBody(SuperLU(), wear=0.9)
+    branch = Continuation(body, StepRule(0.2, 0.01, 0.2, target_iterations=20)).follow(
+        lambda load: Chain(load),
+        0.2,
+        1.0,
+        np.zeros(N),
+        on_point=lambda point: points.append(point.parameter),
+    )
+    assert branch.converged
+    assert branch.factorisations == 1
+    assert points[-1] == 1.0
+    assert branch.last.x == pytest.approx(answer(1.0), abs=1e-9)
+
+
+def test_a_worn_condensation_is_renewed_where_the_last_solution_was() -> None:
+    body = FrozenBody(SuperLU(), wear=0.0)
+    first = body.solve(Chain(0.5), np.zeros(N))
+    second = body.solve(Chain(0.6), first.x)
+    assert (first.factorisations, second.factorisations) == (1, 1)
+    assert body.memory.place is first.x
+
+
+def test_a_slow_solve_is_tried_again_with_a_new_condensation() -> None:
+    body = FrozenBody(SuperLU(), Chord(max_outer=6, depth=0), wear=1.0)
+    near = body.solve(Chain(0.9), 0.9 * answer(1.0))
+    assert near.converged
+    body.memory.condensed = condensed(SuperLU(), Chain(), np.full(N, 3.0))  # a useless one
+    body.memory.place = np.full(N, 3.0)
+    again = body.solve(Chain(0.92), near.x)
+    assert again.converged
+    assert again.factorisations == 1
+    assert again.iterations > 6
+
+
+def test_a_failure_with_a_new_condensation_is_handed_on() -> None:
+    body = FrozenBody(SuperLU(), Chord(max_outer=1))
+    solution = body.solve(Chain(), np.zeros(N))
+    assert solution.status is Status.MAX_ITERATIONS
+    assert solution.factorisations == 1
+
+
+def test_a_held_up_residual_is_closed_by_newton() -> None:
+    # a useless condensation makes it so slow that rounding seems to be reached
+    chord = Chord(tolerance=1e-10, stagnation=1e8, depth=0, contraction=0.999, max_outer=99)
+    memory = {"condensed": condensed(SuperLU(), Chain(), np.full(N, 3.0)), "settled": np.zeros(N)}
+    closing = Newton(tolerance=1e-12, max_iterations=6)
+    held, closed = (
+        FrozenBody(SuperLU(), chord, closing=newton, memory=Memory(**memory)).solve(
+            Chain(), np.zeros(N)
+        )
+        for newton in (None, closing)
+    )
+    assert held.converged
+    assert closed.residual_norms[-1] <= 1e-12 < held.residual_norms[-1]
+    assert closed.factorisations > held.factorisations
+
+
+def test_a_singular_body_is_a_status() -> None:
+    class Loose(Chain):
+        def body(self, x: Vector) -> csc_array[np.float64]:
+            A = super().body(x).toarray()
+            A[3] = 0.0
+            return csc_array(A)
+
+    assert FrozenBody(SuperLU()).solve(Loose(), np.zeros(N)).status is Status.SINGULAR
+
+
+def test_a_looser_view_shares_the_condensation() -> None:
+    body = FrozenBody(SuperLU())
+    loose = body.loosely(1e-2).solve(Chain(0.5), np.zeros(N))
+    tight = body.solve(Chain(0.5), loose.x)
+    assert loose.residual_norms[-1] > 1e-6
+    assert (loose.factorisations, tight.factorisations) == (1, 0)
+    assert tight.x == pytest.approx(answer(0.5), abs=1e-9)

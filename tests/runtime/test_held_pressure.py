@@ -1,0 +1,88 @@
+"""The tangent with a pressure that is held: consistency, the volume's derivatives, evolution."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cases.oring_path import PathSettings, contact_problem
+from cases.oring_section import OringSection, build_section
+from runtime.held_pressure import HeldPressure, element_pressures
+from runtime.kernels import load_kernel
+from runtime.problem import Problem
+from runtime.solution import Vector
+from tests.cases.oring_cases import oring
+
+KAPPA = 500.0
+
+
+@pytest.fixture(scope="module")
+def section() -> OringSection:
+    return build_section(oring(density=1))
+
+
+@pytest.fixture(scope="module")
+def problem(section: OringSection) -> Problem:
+    return contact_problem(section, PathSettings(), 1.0)
+
+
+@pytest.fixture
+def state(section: OringSection, rng: np.random.Generator) -> Vector:
+    x = section.at_rest()
+    u = 0.02 * (section.mesh.points - section.mesh.points.mean(axis=0))
+    x[section.layout.part("displacement")] = u.ravel() + 1e-4 * rng.normal(size=u.size)
+    return x
+
+
+def held(problem: Problem, pressures: Vector) -> HeldPressure:
+    return HeldPressure.of(problem, "solid", load_kernel("follower_pressure"), pressures, KAPPA)
+
+
+def volumes(section: OringSection, x: Vector) -> Vector:
+    """Volumes of the rings by Pappus: area times the path of the centroid, in closed form."""
+    a = section.deformed(x)[section.mesh.quads]
+    b = np.roll(a, -1, axis=1)
+    cross = a[..., 0] * b[..., 1] - b[..., 0] * a[..., 1]
+    return np.asarray(2.0 * np.pi * ((a[..., 1] + b[..., 1]) * cross).sum(axis=1) / 6.0)
+
+
+def test_with_the_true_pressures_the_tangent_is_the_problem_s(
+    problem: Problem, state: Vector
+) -> None:
+    own = held(problem, element_pressures(problem, "solid", state))
+    r, K = own.linearise(state)
+    r0, K0 = problem.linearise(state)
+    assert np.array_equal(r, r0)
+    assert np.array_equal(r, own.residual(state)) or r == pytest.approx(own.residual(state))
+    assert K.data == pytest.approx(K0.data, rel=1e-12, abs=1e-9)
+
+
+def test_an_excess_pressure_adds_the_second_derivative_of_the_volume(
+    section: OringSection, problem: Problem, state: Vector, rng: np.random.Generator
+) -> None:
+    excess = rng.normal(size=len(section.mesh.quads))
+    pressures = element_pressures(problem, "solid", state)
+    dx = np.zeros_like(state)
+    part = section.layout.part("displacement")
+    dx[part] = rng.normal(size=part.stop - part.start)
+    added = held(problem, pressures + excess).linearise(state)[1] @ dx
+    added = added - problem.linearise(state)[1] @ dx
+    h = 1e-3
+    second = volumes(section, state + h * dx) - 2 * volumes(section, state)
+    second = (second + volumes(section, state - h * dx)) / h**2
+    assert dx @ added == pytest.approx(excess @ second, rel=1e-6)
+
+
+def test_pressures_follow_the_linearised_volume(
+    section: OringSection, problem: Problem, state: Vector, rng: np.random.Generator
+) -> None:
+    start = held(problem, np.zeros(len(section.mesh.quads)))
+    assert start.volumes == pytest.approx(volumes(section, section.at_rest()), rel=1e-3)
+    dx = np.zeros_like(state)
+    part = section.layout.part("displacement")
+    dx[part] = 1e-7 * rng.normal(size=part.stop - part.start)
+    change = KAPPA * (volumes(section, state + dx) - volumes(section, state)) / start.volumes
+    pressures = start.after(state, state + dx).pressures
+    before = element_pressures(problem, "solid", state)
+    assert pressures - before == pytest.approx(change, rel=1e-4, abs=1e-8)
+    assert np.abs(change).max() > 1e-5  # there was something to see
