@@ -13,6 +13,9 @@ from codegen.model import Definition
 from codegen.narrow import narrow, quadratic_waist
 from codegen.waists import Waist, linear_waist, strip, substitute
 
+SMALL = 100
+"""Values of a potential so simple that its waists may cost more than they save."""
+
 
 def tasks(d: Definition) -> list[str]:
     """What a model offers: an energy only where the residual is its gradient, or what it chose."""
@@ -45,7 +48,7 @@ def variants(d: Definition, task: str) -> Iterator[list[Entry]]:
         waisted = list(_modal(d))
         for modal in waisted:
             yield modal.residual() + (modal.tangent() if task == Task.TANGENT else [])
-        if not waisted:
+        if not waisted or len(reachable([d.potential])) <= SMALL:
             yield _plain(d, task)
 
 

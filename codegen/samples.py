@@ -63,7 +63,7 @@ def admissible(definition: Definition, count: int) -> list[State]:
         raise NoStateError(
             f"{definition.name} cannot be checked: {name or 'it'} has no real value at "
             "random states near the undeformed element with parameters about 1; say where it has "
-            f"one, e.g. m.example({_suggestion(definition)})"
+            f"one, e.g. m.example({suggestion(definition)})"
         )
     return found
 
@@ -153,6 +153,7 @@ def _real(walk: Walk, n: Node, state: State) -> bool:
     return all(isinstance(v, mpmath.mpf) and mpmath.isfinite(v) for v in values)
 
 
-def _suggestion(d: Definition) -> str:
+def suggestion(d: Definition) -> str:
+    """Arguments of `example` that a model may need."""
     names = [a.name for a in (*d.parameters, *d.data, *d.point_data)] or list(d.unknowns[:2])
     return ", ".join(f"{n}=..." for n in names)

@@ -24,7 +24,7 @@ from typing import Any
 
 from codegen import abi, samples
 from codegen.evaluate import Oracle, State
-from codegen.graph import Input
+from codegen.graph import Input, Op, reachable
 from codegen.model import Definition
 
 BOUND = 1e-10
@@ -50,6 +50,11 @@ def errors(definition: Definition, tasks: Iterable[str], library: Path) -> dict[
     ndof = len(states[0].dofs)
     along = [[rng.choice((-1, 1)) * rng.uniform(0.5, 1) for _ in range(ndof)] for _ in states]
     called = _Batch(definition, ctypes.CDLL(str(library)), states, along)
+    if any(called.silent(t) for t in tasks):
+        raise samples.NoStateError(
+            f"{definition.name} cannot be checked: its local iteration finds no solution at random "
+            f"states; say where it does, e.g. m.example({samples.suggestion(definition)})"
+        )
     compared = _Compared(definition, states, along, called)
     return {t: max(map(_finite, compared.errors(t)), default=0.0) for t in tasks}
 
@@ -92,6 +97,12 @@ class _Batch:
         sizes = (ctypes.c_ssize_t(v) for v in (n, self.points, self.modes))
         function(*sizes, *self.arrays, values, tangent)
         return _split(values, wide, n), _split(tangent, square, n)
+
+    def silent(self, task: str) -> bool:
+        """Whether a model with routines is not-a-number in a whole element: its way to say no."""
+        if all(n.op is not Op.CALL for n in reachable([self.d.potential])):
+            return False
+        return any(all(map(math.isnan, v)) for v in self.call(task)[0])
 
 
 def _doubles(values: Iterable[Any]) -> Any:

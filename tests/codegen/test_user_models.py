@@ -310,6 +310,21 @@ def test_a_model_far_from_its_domain_says_what_to_give(capsys: pytest.CaptureFix
     assert "example: q is no argument of spring" in capsys.readouterr().err
 
 
+def test_a_local_iteration_without_a_solution_asks_for_an_example(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The oracle takes 200 steps, the kernel 25 at most: here one, which is not enough."""
+    local = "m.implicit('s', lambda s: s**3 + s - k - u, start=5, iterations=ITERATIONS)"
+    text = spring(energy=f"{local} ** 2")
+    model_file(text.replace("ITERATIONS", "1"))
+    assert run("mine.py") == 2
+    printed = capsys.readouterr().err
+    assert "its local iteration finds no solution at random states" in printed
+    assert "m.example(k=...)" in printed
+    model_file(text.replace("ITERATIONS", "25"))
+    assert run("mine.py") == 0
+
+
 # ------------------------------------------------------------------------------------- loading
 
 
