@@ -22,7 +22,7 @@ from time import perf_counter
 GENERATED = Path(__file__).resolve().parent.parent / "generated"
 FLAGS = (
     "-std=c11",
-    "-O3",
+    "-O2",
     "-march=native",
     "-fno-math-errno",
     "-ffp-contract=fast",
