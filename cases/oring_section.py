@@ -177,9 +177,13 @@ def _blocks(
         ),
         *([_facets(p, mesh, pressures)] if p.reynolds == "dg" else []),
         ElementBlock(
-            "rotation", load_kernel("mean_rotation"), quads, gather_rows(quad_dofs, moment)
+            "rotation",
+            load_kernel("mean_rotation"),
+            quads,
+            gather_rows(quad_dofs, moment),
+            constant=True,
         ),
-        ElementBlock("spring", load_kernel("axial_spring"), quads, quad_dofs),
+        ElementBlock("spring", load_kernel("axial_spring"), quads, quad_dofs, constant=True),
     ]
 
 

@@ -7,7 +7,7 @@ is then one gather, one kernel call and one `bincount` for each block of like el
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Protocol
 
@@ -19,6 +19,8 @@ from runtime.rules import Rule
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+_FEW = 8  # entries of a block, over those of the matrix, below which they are added one by one
 
 
 class ElementKernel(Protocol):
@@ -87,7 +89,8 @@ class ElementBlock:
 
     name: by which parameters are given. coordinates: (n, 2 nodes) reference (z, r), node by node.
     dofs: (n, ndof) numbers of the unknowns. data: (n, k) constants of each element or None.
-    rule: quadrature rule, None for the kernel's own.
+    rule: quadrature rule, None for the kernel's own. constant: the tangent depends on parameters
+    alone, so that it is evaluated once for each set of them.
     """
 
     name: str
@@ -96,6 +99,7 @@ class ElementBlock:
     dofs: Integers
     data: Array | None = None
     rule: Rule | None = None
+    constant: bool = False
 
     def residual(self, x: Array, parameters: Array) -> Array:
         """Element residuals (n, ndof) at the global vector x."""
@@ -160,12 +164,14 @@ class Assembler:
     """Blocks of elements and the pattern they share; pure functions of x and parameters.
 
     Parameters are given block by block, in the kernel's order; a block without parameters is
-    switched off, its place in the pattern stays.
+    switched off, its place in the pattern stays. known: block name -> the latest parameters of a
+    constant tangent, where it has entries and which.
     """
 
     size: int
     blocks: tuple[ElementBlock, ...]
     pattern: Pattern
+    known: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
 
     @classmethod
     def build(cls, size: int, blocks: Sequence[ElementBlock]) -> Assembler:
@@ -199,10 +205,35 @@ class Assembler:
         for block, scatter in zip(self.blocks, self.pattern.scatter, strict=True):
             if block.name not in parameters:
                 continue
-            local, tangents = block.tangent(x, parameters[block.name])
+            if block.constant:
+                local = block.residual(x, parameters[block.name])
+                places, entries = self._constant(block, scatter, parameters[block.name])
+                data[places] += entries
+            else:
+                local, tangents = block.tangent(x, parameters[block.name])
+                self._add(data, scatter, tangents)
             total += self._scatter_vector(block, local)
-            data += np.bincount(scatter, weights=tangents.ravel(), minlength=self.pattern.nnz)
         return total, self.pattern.matrix(data)
+
+    def _add(self, data: Array, scatter: Integers, tangents: Array) -> None:
+        """Add the entries of element tangents to the data, in place."""
+        if _FEW * len(scatter) < len(data):
+            np.add.at(data, scatter, tangents.ravel())
+        else:  # faster, but it goes through all of the data
+            data += np.bincount(scatter, weights=tangents.ravel(), minlength=len(data))
+
+    def _constant(
+        self, block: ElementBlock, scatter: Integers, parameters: Array
+    ) -> tuple[Integers, Array]:
+        """Places and values of the entries of a constant tangent."""
+        known = self.known.get(block.name)
+        if known is None or not np.array_equal(known[0], parameters):
+            data = np.zeros(self.pattern.nnz)
+            self._add(data, scatter, block.tangent(np.zeros(self.size), parameters)[1])
+            places = np.flatnonzero(data)
+            known = parameters.copy(), places, data[places]
+            self.known[block.name] = known
+        return known[1], known[2]
 
     def _scatter_vector(self, block: ElementBlock, local: Array) -> Array:
         summed = np.bincount(block.dofs.ravel(), weights=local.ravel(), minlength=self.size)

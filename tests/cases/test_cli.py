@@ -494,3 +494,13 @@ def test_a_full_disk_is_one_line(
     assert (code, len(err)) == (2, 1)
     assert "cannot write 'results/oring': No space left on device" in err[0]
     assert run_json(here / "results" / "oring")["status"] == "interrupted"
+
+
+def test_a_linear_solver_that_is_missing_is_bad_input(
+    here: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("runtime.pardiso.available", lambda: False)
+    code, out, err = invoke("run", "oring", *FAST, "--set", "linear=pardiso")
+    assert (code, out, len(err)) == (2, [], 1)
+    assert 'allowed here: "auto" or "superlu"' in err[0]
+    assert list(here.iterdir()) == []

@@ -1,11 +1,12 @@
 """Sparse assembly against a dense loop, prescribed unknowns, norms and guards."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from runtime.assembly import Assembler, ElementBlock, build_pattern
+from runtime.assembly import Array, Assembler, ElementBlock, build_pattern
 from runtime.dofs import DofLayout
 from runtime.newton import Newton
 from runtime.problem import KeepsOrientation, Problem, StaysPositive
@@ -157,3 +158,29 @@ def test_elements_may_not_fold() -> None:
     limit = guard.limit(np.zeros(8), dx)
     assert limit == 0.25
     assert guard.limit(np.zeros(8), 0.1 * dx) == 1.0
+
+
+def test_a_constant_tangent_is_evaluated_once_for_each_set_of_parameters() -> None:
+    calls: list[float] = []
+
+    class Counting(Spring):
+        def tangent(self, *args: Any, **given: Any) -> tuple[Array, Array]:
+            calls.append(given["parameters"][0])
+            r, K = super().tangent(*args, **given)
+            return r, K
+
+    dofs = np.array([[0, 1, 2], [2, 1, 3]])
+    blocks = [
+        ElementBlock("spring", kernel, np.zeros((2, 2)), dofs, constant=constant)
+        for kernel, constant in ((Counting(), True), (Spring(), False))
+    ]
+    constant, usual = (Assembler.build(4, [block]) for block in blocks)
+    x = np.arange(4.0)
+    for stiffness in (2.0, 2.0, 3.0):
+        given = {"spring": np.array([stiffness, 0.0])}
+        r, K = constant.linearise(x, given)
+        expected, _ = usual.linearise(x, given)
+        _, at_zero = usual.linearise(np.zeros(4), given)
+        assert r == pytest.approx(expected)  # the residual is never remembered
+        assert K.toarray() == pytest.approx(at_zero.toarray())
+    assert calls == [2.0, 3.0]

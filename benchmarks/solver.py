@@ -1,0 +1,154 @@
+"""The fast route against the monolithic one: factorisations, iterations, seconds, memory, h*.
+
+    OMP_NUM_THREADS=1 python -m benchmarks.solver [--densities 2 4] [--pressures 1 5]
+        [--strokes out in] [--routes auto:auto monolithic:superlu] [--speeds 1600 400 100]
+
+A route is solver:linear. Each run has a process of its own, one after the other, so that its peak
+memory is its own. CPU seconds are those of the process: on a shared machine they tell more than
+wall seconds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import math
+import resource
+import subprocess
+import sys
+import time
+from typing import Any
+
+from cases.observer import Observer
+from cases.oring import run
+from cases.oring_parameters import ORing
+
+
+class Quiet(Observer):
+    """Keeps the CPU time at the end of each stage."""
+
+    def __init__(self) -> None:
+        self.marks: list[float] = []
+
+    def stage(self, name: str, **details: Any) -> None:
+        self.marks.append(time.process_time())
+
+    def step(self, **details: Any) -> None:
+        pass
+
+    def contact_state(self, state: Any) -> None:
+        pass
+
+    def film_state(self, state: Any) -> None:
+        pass
+
+
+def measure(parameters: ORing) -> dict[str, Any]:
+    """One run: its stages, its films, its cost."""
+    observer, wall, cpu = Quiet(), time.perf_counter(), time.process_time()
+    outcome = run(parameters, observer)
+    marks = [*observer.marks, time.process_time()]
+    return {
+        "converged": outcome.converged,
+        "unknowns": outcome.unknowns_total,
+        "linear": outcome.solvers["linear"],
+        "wall": time.perf_counter() - wall,
+        "cpu": marks[-1] - cpu,
+        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+        "films": {f"{s.rod_speed:g}": s.h_star_um for s in outcome.states},
+        "residual": max(
+            (s.residual_histories[-1][-1] for s in outcome.stages if s.residual_histories),
+            default=math.nan,
+        ),
+        "stages": [
+            {
+                "name": s.name,
+                "stroke": s.stroke,
+                "factorisations": s.factorisations,
+                "iterations": s.iterations,
+                "wall": s.seconds,
+                "cpu": after - before,
+                "method": s.method,
+            }
+            for s, before, after in zip(outcome.stages, marks, marks[1:], strict=False)
+        ],
+    }
+
+
+def in_its_own_process(parameters: ORing) -> dict[str, Any]:
+    """`measure` in a fresh interpreter."""
+    command = [sys.executable, "-m", "benchmarks.solver", "--one", parameters.model_dump_json()]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
+def show(parameters: ORing, result: dict[str, Any]) -> None:
+    """The table of one run."""
+    p, row = (
+        parameters,
+        "  {:22} {:5} factorisations {:5} iterations {:8.2f} s CPU {:8.2f} s wall  {}",
+    )
+    print(
+        f"\ndensity {p.density}, p_s = {p.sealed_pressure:g}, stroke {p.stroke}, "
+        f"{result['unknowns']} unknowns, solver {p.solver}, linear {result['linear']}"
+        f"{'' if result['converged'] else ', NOT CONVERGED'}"
+    )
+    for s in result["stages"]:
+        numbers = (s[key] for key in ("factorisations", "iterations", "cpu", "wall"))
+        print(row.format(s["name"], *numbers, s["method"][:50]))
+    counts = [sum(s[k] for s in result["stages"]) for k in ("factorisations", "iterations")]
+    print(row.format("all", *counts, result["cpu"], result["wall"], f"{result['memory']:.0f} MB"))
+
+
+def compare(
+    parameters: ORing, routes: list[str], sizes: dict[str, list[tuple[int, float]]]
+) -> None:
+    """All routes of one case, against the first of them."""
+    first: dict[str, Any] | None = None
+    for route in routes:
+        solver, linear = route.split(":")
+        p = ORing(**{**parameters.model_dump(), "solver": solver, "linear": linear})
+        result = in_its_own_process(p)
+        show(p, result)
+        sizes[route].append((result["unknowns"], result["cpu"]))
+        first = first or result
+        films = first["films"]
+        ratios = [abs(h / films[u] - 1.0) for u, h in result["films"].items() if u in films]
+        print(
+            f"  h* of {len(ratios)} speeds differ by at most {max(ratios, default=0.0):.1e};"
+            f" CPU time {result['cpu'] / first['cpu']:.1f} times the first route's"
+        )
+
+
+def main() -> None:
+    """Run every combination and say how the time grows."""
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
+    parser.add_argument("--densities", type=int, nargs="+", default=[2, 4])
+    parser.add_argument("--pressures", type=float, nargs="+", default=[1.0])
+    parser.add_argument("--strokes", nargs="+", default=["out"])
+    parser.add_argument("--routes", nargs="+", default=["auto:auto", "monolithic:superlu"])
+    speeds = [1600.0, 800.0, 400.0, 200.0, 100.0, 50.0, 25.0]
+    parser.add_argument("--speeds", type=float, nargs="+", default=speeds)
+    parser.add_argument("--one", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.one:
+        print(json.dumps(measure(ORing.model_validate_json(given.one))))
+        return
+    sizes: dict[str, list[tuple[int, float]]] = {route: [] for route in given.routes}
+    for pressure, stroke in itertools.product(given.pressures, given.strokes):
+        for density in given.densities:
+            parameters = ORing(
+                density=density, sealed_pressure=pressure, stroke=stroke, speeds=tuple(given.speeds)
+            )
+            compare(parameters, given.routes, sizes)
+    for route, points in sizes.items():
+        if len(points) > 1 and points[-1][0] > points[0][0]:
+            growth = math.log(points[-1][1] / points[0][1])
+            growth /= math.log(points[-1][0] / points[0][0])
+            print(f"{route}: CPU time grows with the unknowns to the power {growth:.2f}")
+
+
+if __name__ == "__main__":
+    main()
