@@ -182,6 +182,8 @@ class _Run:
             return False
         fast = FastFilm.of(section, linear)
         x = self.walk(fast.weight(weight_stage(section, settings, film)), x)
+        if p.shear_traction:
+            x = self.walk(fast.shear(shear_stage(section, settings, film)), x)
         self.walk(fast.speed(speed_stage(section, settings, film, p.speeds, judge)), x)
         return True
 

@@ -27,6 +27,7 @@ METHOD = "chord iterations on a frozen section"
 
 _LOOSE = 1e-2  # of the states on the way from contact to film, which are no results
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
+_SHEAR_STEPS = StepRule(1.0, 0.05, target_iterations=8)
 _SPEED_STEPS = StepRule(math.log(2.0), 0.04, math.log(2.0) + 1e-9, target_iterations=30)
 
 
@@ -45,15 +46,19 @@ class FastFilm:
         shared = np.concatenate([2 * nodes, 2 * nodes + 1, layout.dofs("rotation")])
         inner = np.setdiff1d(layout.dofs("pressure"), section.film_ends)
         layer = Layer.of(section.problem.assembler, LAYER, shared, inner)
-        closing = Newton(max_iterations=3, linear=linear)
+        closing = Newton(max_iterations=1, linear=linear)
         return cls(section, layer, FrozenBody(linear, Chord(), closing=closing))
 
     def weight(self, stage: Stage) -> Stage:
         """The stage from contact to film, to a tolerance that is enough for a way."""
         return self._stage(stage, self.corrector.loosely(_LOOSE), _WEIGHT_STEPS)
 
+    def shear(self, stage: Stage) -> Stage:
+        """The stage in which the shear stress begins to act, to the same tolerance."""
+        return self._stage(stage, self.corrector.loosely(_LOOSE), _SHEAR_STEPS)
+
     def speed(self, stage: Stage) -> Stage:
-        """The stage of falling speed; its start also puts the shear stress on."""
+        """The stage of falling speed, to the full tolerance."""
         return self._stage(stage, self.corrector, _SPEED_STEPS)
 
     def _stage(self, stage: Stage, corrector: FrozenBody, steps: StepRule) -> Stage:

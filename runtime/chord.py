@@ -123,7 +123,7 @@ class Chord:
         """How the solve ends at these norms, None if it goes on."""
         if norms[-1] <= self.tolerance:
             return Status.CONVERGED
-        if len(norms) > 3 and self._exhausted(min(norms[-3:-1]), norms[-1]):
+        if len(norms) > 4 and self._exhausted(min(norms[1:-2]), min(norms[-2:])):
             return Status.CONVERGED
         if not math.isfinite(norms[-1]):
             return Status.NOT_FINITE

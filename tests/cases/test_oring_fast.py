@@ -51,7 +51,7 @@ def test_the_cost_of_the_fast_route() -> None:
     assert [s.method for s in on_the_mesh] == ["newton, prolonged from density 1"]
     assert (on_the_mesh[0].factorisations or 99) <= 6
     films = [s for s in stages if s.method == METHOD]
-    assert [s.name for s in films] == ["contact to film", "falling speed"] * 2
+    assert [s.name for s in films] == ["contact to film", "shear", "falling speed"] * 2
     for stroke in ("out", "in"):
         assert sum(s.factorisations or 0 for s in films if s.stroke == stroke) <= 5
     final = [
