@@ -19,8 +19,8 @@ from functools import cached_property
 from codegen.graph import FREE, Graph, Node, Op, reachable
 from codegen.sums import first_difference
 
-REGISTERS = 14
-"""Values that the simulated file holds: 16 of AVX2, less two for operands on their way."""
+REGISTERS = 16
+"""Values that the simulated file holds: those of AVX2."""
 ADDITIONS = (Op.ADD, Op.SUB)
 LATENCY = {Op.RECIP: 26, Op.RCBRT: 60, Op.CBRT: 60, Op.SQRT: 40, Op.LOG: 100, Op.EXP: 100}
 """Half cycles (two pieces start in a cycle) until a result is there."""
@@ -33,7 +33,7 @@ WAITING = 0.3
 OPENING = 0.3
 PARTIAL_SUM = 1.5
 FINISHING = -0.5
-DRIFT = 0.002
+DRIFT = 1.0
 
 
 @dataclass(eq=False)
@@ -118,6 +118,9 @@ class _Scheduler:
 
     def __post_init__(self) -> None:
         self._printed: set[Node] = set()
+        # how early the model's author, or the chain rule, wrote a value
+        ids = sorted(self.pieces, key=lambda p: p.node.id)
+        self._place = {p: k / len(ids) for k, p in enumerate(ids)}
         self._arrival: dict[Node | _Sum, int] = {}
         self._waiting: dict[Node, list[_Piece]] = {}
         self._missing: dict[_Piece, int] = {}
@@ -151,7 +154,7 @@ class _Scheduler:
                 self.ready[waiting] = None
 
     def _cost(self, p: _Piece) -> float:
-        cost, arrival = DRIFT * p.node.id / len(self.pieces), self.clock
+        cost, arrival = DRIFT * self._place[p], self.clock
         for a in p.fetched:
             if a not in self.registers:
                 cost += 1.0
