@@ -1,17 +1,19 @@
 """The fast route against the monolithic one, its cost, and what it says when it gives up."""
 
+import math
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import pytest
 
 from cases import oring_fast
 from cases.observer import Outcome
 from cases.oring import run
-from cases.oring_fast import METHOD, FastFilm
-from cases.oring_section import OringSection
-from runtime.chord import Chord
-from runtime.linear import Condenser, choose
+from cases.oring_fast import METHOD
+from runtime.frozen_body import FrozenBody
+from runtime.linear import choose
+from runtime.solution import Solution, Status, Vector
 from tests.cases.oring_cases import oring
 from tests.cases.test_oring_path import Recorder
 
@@ -68,23 +70,39 @@ def test_superlu_does_it_too() -> None:
         assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)
 
 
-@pytest.mark.parametrize("outer", [1, 7])
-def test_where_it_gives_up_newton_goes_on(monkeypatch: pytest.MonkeyPatch, outer: int) -> None:
-    made = FastFilm.of
+class Tired(FrozenBody):
+    """Gives up at films slower than 1000 mm/s, or at all."""
 
-    def lazy(section: OringSection, linear: Condenser) -> FastFilm:
-        fast = made(section, linear)
-        corrector = replace(fast.corrector, chord=Chord(max_outer=outer, depth=0))
-        return replace(fast, corrector=corrector)
+    slowest = 1000.0
 
-    monkeypatch.setattr(oring_fast.FastFilm, "of", staticmethod(lazy))
+    def solve(self, problem: Any, x0: Vector) -> Solution:
+        film = problem.problem.assembler.block("film").kernel.parameters
+        speed = problem.problem.parameters["film"][film.index("rod_speed")]
+        solution = super().solve(problem, x0)
+        failed = replace(solution, status=Status.DIVERGED, message="tired")
+        return solution if abs(speed) > self.slowest else failed
+
+
+class VeryTired(Tired):
+    slowest = math.inf
+
+
+@pytest.mark.parametrize(
+    ("corrector", "ended"), [(Tired, "falling speed"), (VeryTired, "contact to film")]
+)
+def test_where_it_gives_up_newton_goes_on(
+    monkeypatch: pytest.MonkeyPatch, corrector: type[Tired], ended: str
+) -> None:
+    monkeypatch.setattr(oring_fast, "FrozenBody", corrector)
     parameters = oring(density=1, sealed_pressure=1.0, stroke="out", speeds=SPEEDS)
     outcome = run(parameters, Recorder())
     assert outcome.converged, outcome.message
     assert [s.rod_speed for s in outcome.states] == list(SPEEDS)  # each of them once
-    methods = [s.method for s in outcome.stages]
-    assert any(m.startswith(f"{METHOD}; ended: ") for m in methods)
-    assert methods[-1] == "newton"
+    last_fast = [s for s in outcome.stages if s.method.startswith(METHOD)][-1]
+    assert last_fast.name == ended
+    assert last_fast.method.startswith(f"{METHOD}; ended: ")
+    assert "tired" in last_fast.method
+    assert (outcome.stages[-1].name, outcome.stages[-1].method) == ("falling speed", "newton")
     reference = solved("monolithic", 1.0, density=1)
     for a, b in zip(outcome.states, reference.states, strict=False):
         assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)

@@ -286,7 +286,7 @@ def test_a_failure_with_a_new_condensation_is_handed_on() -> None:
 def test_a_held_up_residual_is_closed_by_newton() -> None:
     # a useless condensation makes it so slow that rounding seems to be reached
     chord = Chord(tolerance=1e-10, stagnation=1e8, depth=0, contraction=0.999, max_outer=99)
-    memory = {"condensed": condensed(SuperLU(), Chain(), np.full(N, 3.0)), "settled": np.zeros(N)}
+    memory = {"condensed": condensed(SuperLU(), Chain(), np.full(N, 6.0)), "settled": np.zeros(N)}
     closing = Newton(tolerance=1e-12, max_iterations=6)
     held, closed = (
         FrozenBody(SuperLU(), chord, closing=newton, memory=Memory(**memory)).solve(
