@@ -5,6 +5,7 @@ solves a case loads no SymPy and `softehl --help` loads nothing at all.
 """
 
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -125,6 +126,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code.  What is wrong is said in one line on stderr."""
     import click
 
+    # One thread a process, before NumPy is loaded: the systems are small, the runs are parallel.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
         code = _commands().main(
             None if arguments is None else list(arguments),

@@ -18,6 +18,16 @@ class Argument:
 
 
 @dataclass(frozen=True)
+class Condition:
+    """What a parameter or datum must satisfy: `name relation bound`, and the page's line."""
+
+    name: str
+    relation: str
+    bound: float
+    where: str
+
+
+@dataclass(frozen=True)
 class Definition:
     """A finished model: everything the compiler needs, nothing differentiated yet."""
 
@@ -43,6 +53,7 @@ class Definition:
     derivatives: tuple[tuple[str, Node], ...] = ()
     example: tuple[tuple[str, float], ...] = ()
     tasks: tuple[str, ...] | None = None
+    conditions: tuple[Condition, ...] = ()
     components: int = 2
     """Basis values of the interpolated field: value and derivative, on each side of a facet."""
     nodal: tuple[tuple[int, int], ...] = ()

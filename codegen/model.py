@@ -12,7 +12,7 @@ from typing import Any
 import sympy as sp
 
 from codegen.abi import Task
-from codegen.definition import Argument, Definition
+from codegen.definition import Argument, Condition, Definition
 from codegen.differentiate import gradient
 from codegen.entries import Entries, fraction
 from codegen.graph import Graph, Input, Node, Op, reachable
@@ -63,6 +63,7 @@ class Model:
         self._product = False
         self._derivatives: list[tuple[str, Node]] = []
         self._example: dict[str, float] = {}
+        self._conditions: list[Condition] = []
         self._tasks: tuple[str, ...] | None = None
         self._declared: dict[str, tuple[Node, str]] = {}
 
@@ -132,6 +133,25 @@ class Model:
     def point_data(self, **meanings: str) -> list[sp.Symbol]:
         """Arguments that differ from quadrature point to point, e.g. history variables."""
         return self._declare("point data", meanings, varying=True)
+
+    def require(self, *conditions: Any) -> None:
+        """What parameters and data must satisfy, e.g. `mu > 0`; checked at every call.
+
+        Each condition compares one parameter or datum with a number by <, <=, > or >=.
+        """
+        for c in conditions:
+            known = [a.name for k in ("parameters", "data") for a in self._arguments[k]]
+            if isinstance(c, sp.core.relational.Relational) and c.lhs.is_number:
+                c = c.reversed
+            fit = isinstance(
+                c, (sp.StrictLessThan, sp.LessThan, sp.StrictGreaterThan, sp.GreaterThan)
+            )
+            if not fit or str(c.lhs) not in known or not c.rhs.is_number:
+                raise ModelError(
+                    f"require {c}: compare one parameter or datum with a number, e.g. mu > 0"
+                )
+            where = "/".join(page_line().split("/")[-1:])
+            self._conditions.append(Condition(str(c.lhs), c.rel_op, float(c.rhs), where))
 
     def point(self) -> list[sp.Symbol]:
         """Coordinates of the quadrature point in the parent element."""
@@ -329,6 +349,7 @@ class Model:
             derivatives=tuple(self._derivatives),
             example=tuple(self._example.items()),
             tasks=self._tasks,
+            conditions=tuple(self._conditions),
             nodal=tuple(self._nodal),
             components=self._components,
         )

@@ -152,6 +152,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "parameters": {a.name: a.meaning for a in d.parameters},
         "data": {a.name: a.meaning for a in d.data},
         "point_data": {a.name: a.meaning for a in d.point_data},
+        "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],
         "fields": [name for name, _ in d.fields],
         "unrolled": d.unroll,
         "rule": {"points": points, "weights": [float(w.evalf(30)) for w in d.rule.weights]},

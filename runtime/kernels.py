@@ -50,6 +50,11 @@ class ArgumentError(KernelError, ValueError):
     """An array has a wrong shape or kind, or a task is not offered."""
 
 
+Condition = tuple[str, str, float, str]
+"""Name of a parameter or datum, relation, bound, and the line of the page that demands it."""
+RELATIONS = {">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.less_equal}
+
+
 @dataclass(frozen=True)
 class Kernel:
     """One kernel family.  Calls take n elements at once; arrays are converted to float64.
@@ -74,6 +79,7 @@ class Kernel:
     signature: str
     library: Any
     components: int = 2
+    conditions: tuple[Condition, ...] = ()
 
     def energy(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Potential of each element, (n,)."""
@@ -150,6 +156,8 @@ class _Call:
         self.parameters = self._array(
             "parameters", self._ordered(parameters), (len(kernel.parameters),)
         )
+        for condition in kernel.conditions:
+            self._check(*condition)
         points = np.asarray(self.rule.points, dtype=np.float64).reshape(len(self.rule.weights), -1)
         self.direction = np.empty(0)
         if direction is not None:
@@ -165,6 +173,17 @@ class _Call:
         self.basis = np.ascontiguousarray(
             np.empty(0) if self.rule.basis is None else self.rule.basis, dtype=np.float64
         )
+
+    def _check(self, name: str, relation: str, bound: float, where: str) -> None:
+        kernel = self.kernel
+        if name in kernel.parameters:
+            values = self.parameters[[kernel.parameters.index(name)]]
+        else:
+            values = self.data[:, kernel.data.index(name)]
+        wrong = ~RELATIONS[relation](values, bound)
+        if wrong.any():
+            given, allowed = f"{values[wrong][0]:g}", f"{relation} {bound:g}"
+            raise ArgumentError(f"{kernel.name}: {name} = {given}, must be {allowed} ({where})")
 
     def _modes(self) -> int:
         if self.kernel.interpolated is None:
@@ -309,6 +328,7 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         signature=entry["signature"],
         library=_library(directory),
         components=entry["components"],
+        conditions=tuple((n, r, b, w) for n, r, b, w in entry["conditions"]),
     )
 
 

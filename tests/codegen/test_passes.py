@@ -44,6 +44,26 @@ def costs(g: Graph, name: str, root: Node) -> tuple[int, int, int, int]:
 # ------------------------------------------------------------------------------ one pass, one graph
 
 
+def test_an_inverse_next_to_its_root_is_a_power_of_it() -> None:
+    g = Graph()
+    x, y = unknowns(g, 2)
+    volume = g.add(g.mul(x, x), g.mul(y, y))
+    root = g.add(g.call(Op.RCBRT, volume), g.recip(volume))
+    alone = g.recip(g.add(x, y))
+    new = passes.inverses(g, [root, alone])
+    assert same_value(new[0], root, AT)
+    assert new[1] is alone
+    check(new)
+    # x x, y y, their sum, its root, its inverse or two products, the sum of both
+    assert (operations([root]), operations([new[0]])) == (6, 7)
+    divisions = [sum(n.op is Op.RECIP for n in reachable([r])) for r in (root, new[0])]
+    assert divisions == [1, 0]
+    straight = passes.straight_line([[Fraction(0), Fraction(2)]], (0, 0))
+    rest = [p for p in straight if p.name != "inverses of roots"]
+    kept = [passes.run(g, [root], p)[0] for p in (straight, rest)]
+    assert [sum(n.op is Op.RECIP for n in reachable(r)) for r in kept] == [0, 1]
+
+
 def test_fold_drops_names_and_what_they_hid() -> None:
     g = Graph()
     x, y = unknowns(g, 2)
