@@ -34,10 +34,23 @@ def run_case(case: Case, folder: Path, *, resume: bool, jobs: int, quiet: bool) 
 
     Raises BadInput where the parameters, the folder or the kernels cannot be used.
     """
+    with make_display(quiet=quiet) as display:
+        record, complaints = record_case(case, folder, resume=resume, jobs=jobs, display=display)
+    with _writing(folder):
+        return _finish(record, complaints, quiet=quiet)
+
+
+def record_case(
+    case: Case, folder: Path, *, resume: bool, jobs: int, display: Display
+) -> tuple[RunRecord, list[str]]:
+    """Run a case into a folder; return its record and what it did not reach, in words.
+
+    Raises BadInput like :func:`run_case`.
+    """
     _require_backend(case.parameters.linear)
     record = RunRecord(folder, case, resume=resume)
     runs = plan(case.parameters, record, jobs)
-    with make_display(quiet=quiet) as display, _recorded(record):
+    with _recorded(record):
         lanes = [Reporter(record, display, run.stroke) for run in runs]
         solve = case.load_solve()
         if jobs > 1 and len(runs) > 1:
@@ -45,7 +58,7 @@ def run_case(case: Case, folder: Path, *, resume: bool, jobs: int, quiet: bool) 
         else:
             outcomes = [solve(run, lane) for run, lane in zip(runs, lanes, strict=True)]
     with _writing(folder):
-        return _finish(record, outcomes, quiet=quiet)
+        return record, _conclude(record, outcomes)
 
 
 def plan(parameters: ORing, record: RunRecord, jobs: int) -> list[ORing]:
@@ -134,12 +147,17 @@ def _writing(folder: Path) -> Iterator[None]:
         raise BadInput(f"cannot write {where!r}: {error.strerror or error}") from None
 
 
-def _finish(record: RunRecord, outcomes: Sequence[Outcome], *, quiet: bool) -> int:
-    """Complete the files, print the curve, and say what is missing."""
+def _conclude(record: RunRecord, outcomes: Sequence[Outcome]) -> list[str]:
+    """Complete the record; return what is missing."""
     record.begin()
     record.set_outcomes(outcomes)
     complaints = [*_failures(outcomes), *_gaps(record)]
     record.save("not converged" if complaints else "converged", "; ".join(complaints))
+    return complaints
+
+
+def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
+    """Draw and print the curve, and say what is missing."""
     report.write_plots(record.folder, record.curve.profiles())
     if not quiet and (record.curve.rows or record.rejected.rows):
         report.print_curve(record.curve.rows, record.rejected.rows)
@@ -150,7 +168,7 @@ def _finish(record: RunRecord, outcomes: Sequence[Outcome], *, quiet: bool) -> i
     if not complaints:
         return 0
     reached = _named(record.curve.rows) or "nothing"
-    complaints.append(f"reached and saved in {record.folder}: {reached}")
+    complaints = [*complaints, f"reached and saved in {record.folder}: {reached}"]
     click.echo(f"softehl: not converged: {'; '.join(complaints)}", err=True)
     return NOT_CONVERGED
 

@@ -1,0 +1,1 @@
+"""The paper's tables and figures: which states they need, how they are drawn, what they show."""

@@ -1,0 +1,126 @@
+"""Computing the runs that items need: each once, several at a time, and none that is complete."""
+
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from cases.case_file import Case
+from cases.oring_parameters import ORing
+from cases.progress import Display
+from cases.record import strokes_of
+from cases.reproduction.states import Request, Store
+from cases.session import record_case
+from runtime.io import read_json
+
+ENDED = ("converged", "not converged")
+"""What run.json says of a run that came to its end; of another one the rest is still to be run."""
+
+
+def compute(requests: Sequence[Request], store: Store, *, resume: bool, jobs: int) -> None:
+    """Run what is requested into the folders of the store; with `resume` only what is missing.
+
+    A run that does not reach a speed is no error: its states say so. Raises BadInput for kernels
+    that are to be built or folders that cannot be written to.
+    """
+    waiting = [r for r in requests if not (resume and is_complete(r, store))]
+    tasks = [
+        (_case(request, store, resume), store.run_folder(request.setup)) for request in waiting
+    ]
+    with _progress(len(tasks)) as advance:
+        if jobs == 1:
+            for case, folder in tasks:
+                advance(_run(case, folder, resume), folder)
+        else:
+            _in_processes([(*task, resume) for task in tasks], jobs, advance)
+
+
+def is_complete(request: Request, store: Store) -> bool:
+    """Whether a run has ended that was asked for all these speeds (reached or not)."""
+    earlier = _earlier(request, store)
+    if earlier is None or earlier[0] not in ENDED:
+        return False
+    wanted = request.parameters
+    return set(strokes_of(wanted)) <= set(strokes_of(earlier[1])) and set(wanted.speeds) <= set(
+        earlier[1].speeds
+    )
+
+
+def _case(request: Request, store: Store, resume: bool) -> Case:
+    """The case to run: what is asked for, and what an earlier run was asked for if it is kept."""
+    speeds = set(request.speeds)
+    earlier = _earlier(request, store) if resume else None
+    if earlier:
+        signs = {"out": (1.0,), "in": (-1.0,), "both": (1.0, -1.0)}[earlier[1].stroke]
+        speeds |= {sign * u for sign in signs for u in earlier[1].speeds}
+    return Case("oring", Request(request.setup, frozenset(speeds)).parameters)
+
+
+def _earlier(request: Request, store: Store) -> tuple[str, ORing] | None:
+    """Status and parameters of an earlier run in the folder, None if there is none to be read."""
+    path = store.run_folder(request.setup) / "run.json"
+    try:
+        content = read_json(path)
+        return str(content["status"]), ORing(**content["parameters"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+def _run(case: Case, folder: Path, resume: bool) -> list[str]:
+    _, complaints = record_case(case, folder, resume=resume, jobs=1, display=Display())
+    return complaints
+
+
+def _in_processes(tasks: Sequence[tuple[Case, Path, bool]], jobs: int, advance: "_Advance") -> None:
+    # several processes of several threads each would only get in each other's way
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+        running: dict[Future[list[str]], Path] = {pool.submit(_run, *t): t[1] for t in tasks}
+        try:
+            while running:
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    advance(future.result(), running.pop(future))
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+class _Advance:
+    """Called with what a run did not reach, and its folder, when it ends."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self.progress, self.total, self.done = progress, total, 0
+        self.task = progress.add_task("runs", total=total) if progress else None
+
+    def __call__(self, complaints: list[str], folder: Path) -> None:
+        self.done += 1
+        note = f"{folder.name}: {'; '.join(complaints) if complaints else 'done'}"
+        if self.progress and self.task is not None:
+            self.progress.update(self.task, advance=1)
+            self.progress.console.print(note, highlight=False, markup=False)
+        else:
+            click.echo(f"[{self.done}/{self.total}] {note}", err=True)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[_Advance]:
+    """A bar over the runs on a terminal, a line a run elsewhere, both on stderr."""
+    console = Console(stderr=True)
+    if not console.is_terminal or total == 0:
+        yield _Advance(None, total)
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=32),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        yield _Advance(progress, total)
