@@ -7,26 +7,25 @@ from math import exp, isfinite, log
 
 import numpy as np
 
-from cases.oring_section import build_section
-from cases.reproduction.item import DENSITIES
 from cases.reproduction.look import Finding, Look, Measure, angle, counted, difference, numbers
-from cases.reproduction.states import setup
-from cases.reproduction.tables import FIG_4_PRESSURES, TABLE_2
+from cases.reproduction.tables import FIG_4_PRESSURES, TABLE_2, table_2_densities, unknowns
 
 _LAYERS = (5.0, 20.0)
 """Film thicknesses between which the inclination is taken, um."""
 
 
 def _unknowns(look: Look) -> Finding:
-    ours = [build_section(setup(d, 1.0)).layout.total for d in DENSITIES]
-    off = [100.0 * (n / TABLE_2[d][0] - 1.0) for d, n in zip(DENSITIES, ours, strict=True)]
+    densities = table_2_densities(look.scope)
+    ours = [unknowns(d)[0] for d in densities]
+    off = [100.0 * (n / TABLE_2[d][0] - 1.0) for d, n in zip(densities, ours, strict=True)]
     text = f"{', '.join(map(str, ours))}: {numbers(off, '+.2f')} %"
     return Finding(text, all(x == 0.0 for x in off))
 
 
 def _pressure_unknowns(look: Look) -> Finding:
-    ours = [build_section(setup(d, 1.0)).layout.count("pressure") for d in DENSITIES]
-    return Finding(", ".join(map(str, ours)), ours == [TABLE_2[d][1] for d in DENSITIES])
+    densities = table_2_densities(look.scope)
+    ours = [unknowns(d)[1] for d in densities]
+    return Finding(", ".join(map(str, ours)), ours == [TABLE_2[d][1] for d in densities])
 
 
 def _zone_expands(look: Look) -> Finding:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,12 +52,23 @@ def table_1(_: Store, __: Scope) -> Product:
     return Product({"table1": Table(header, rows)}, "The defaults of the case oring.")
 
 
+def table_2_densities(scope: Scope) -> tuple[int, ...]:
+    """All of the paper's, unless a density is asked for: counting takes no run."""
+    return DENSITIES if scope.density is None else scope.meshes(DENSITIES)
+
+
+@cache
+def unknowns(density: int) -> tuple[int, int]:
+    """Numbers of all unknowns and of those of pressure of a mesh, m_p = 4."""
+    layout = build_section(setup(density, 1.0)).layout
+    return layout.total, layout.count("pressure")
+
+
 def table_2(_: Store, scope: Scope) -> Product:
     """Numbers of unknowns of our meshes beside the paper's."""
     rows = []
-    for density in DENSITIES if scope.density is None else scope.meshes(DENSITIES):
-        layout = build_section(setup(density, 1.0)).layout
-        total, film = layout.total, layout.count("pressure")
+    for density in table_2_densities(scope):
+        total, film = unknowns(density)
         rows.append((density, total, TABLE_2[density][0], film, TABLE_2[density][1]))
     header = ("density", "unknowns", "unknowns_paper", "pressures", "pressures_paper")
     return Product({"table2": Table(header, rows)}, "Numbers of unknowns, m_p = 4.")
