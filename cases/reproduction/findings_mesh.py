@@ -73,8 +73,12 @@ def _dg_no_better(look: Look) -> Finding:
         f"{word} FE {numbers(fe, '.2g')} DG {numbers(dg, '.2g')}"
         for word, (fe, dg) in zip(("out", "in"), rows, strict=True)
     )
-    better = [a > 0.1 and b < 0.5 * a for fe, dg in rows for a, b in zip(fe, dg, strict=True)]
-    return Finding(f"density {d}, index at 800 to 25: {text}", not any(better))
+    pairs = [
+        pair for fe, dg in rows for pair in zip(fe, dg, strict=True) if all(map(isfinite, pair))
+    ]
+    better = [a > 0.1 and b < 0.5 * a for a, b in pairs]
+    holds = not any(better) if better else None
+    return Finding(f"density {d}, index at 800 to 25: {text}", holds)
 
 
 def _onset_density_8(look: Look) -> Finding:

@@ -256,12 +256,6 @@ def test_bad_input(what: str, here: Path, invoke: Invoke) -> None:
     assert [path for path in here.iterdir() if path.is_dir()] == []
 
 
-def test_reproduce_is_not_there_yet(here: Path, invoke: Invoke) -> None:
-    code, out, err = invoke("reproduce", "table2", "--density", "4")
-    assert (code, out, len(err)) == (2, [], 1)
-    assert "not available yet" in err[0]
-
-
 def test_no_kernels(here: Path, invoke: Invoke) -> None:
     code, out, err = invoke("run", "oring", solver=solve_without_kernels)
     assert (code, out) == (2, [])
