@@ -92,7 +92,8 @@ def _product(name: str, chart: Chart, store: Store) -> Product:
 def _scales(axes: Any, chart: Chart) -> None:
     if chart.log_y:
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter("{x:g}")
+        for axis_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+            axis_formatter("{x:g}")
     if chart.log_x:
         axes.set_xscale("log", base=2)
         axes.xaxis.set_major_formatter("{x:g}")
