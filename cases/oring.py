@@ -177,7 +177,7 @@ class _Run:
         """Second and third stage by chord iterations; False where these do not apply."""
         section, settings, p = self.section, self.settings, self.section.parameters
         linear = self.walker.newton.linear
-        fit = p.solver == "auto" and p.rotation == "fixed" and p.reynolds == "fe"
+        fit = p.solver == "auto" and p.rotation == "fixed"
         if not fit or not isinstance(linear, Condenser):
             return False
         fast = FastFilm.of(section, linear)

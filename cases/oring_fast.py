@@ -45,7 +45,8 @@ class FastFilm:
         layout, nodes = section.layout, section.mesh.arc_nodes
         shared = np.concatenate([2 * nodes, 2 * nodes + 1, layout.dofs("rotation")])
         inner = np.setdiff1d(layout.dofs("pressure"), section.film_ends)
-        layer = Layer.of(section.problem.assembler, LAYER, shared, inner)
+        facets = ("facet",) if section.parameters.reynolds == "dg" else ()
+        layer = Layer.of(section.problem.assembler, (*LAYER, *facets), shared, inner)
         closing = Newton(max_iterations=1, linear=linear)
         return cls(section, layer, FrozenBody(linear, Chord(), closing=closing))
 
