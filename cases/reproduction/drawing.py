@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ FILM = r"film thickness $h$ [$\mu$m]"
 POSITION = r"position $\bar x$ [mm]"
 H_STAR = r"$h^* = q/\bar u$ [$\mu$m]"
 
+_COLOURS = 48
 _MARGIN = 0.35  # mm of the contact's surroundings
 _LETTER_WIDTH = 0.049  # inches, of the caption
 _LINE_HEIGHT = 0.15
@@ -43,6 +45,7 @@ def write_picture(product: Product, path: Path) -> None:
         return
     import matplotlib
     from matplotlib.figure import Figure
+    from PIL import Image
 
     with matplotlib.rc_context(_STYLE):
         width, height = product.size
@@ -55,8 +58,10 @@ def write_picture(product: Product, path: Path) -> None:
             engine.set(rect=(0.0, share, 1.0, 1.0 - share))  # type: ignore[call-arg]
         product.draw(figure)
         figure.text(0.01, 0.01, "\n".join(lines), fontsize=6.5, va="bottom", color="0.3")
-        with replacing(path) as temporary:
-            figure.savefig(temporary, format="png")
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png")
+    with replacing(path) as temporary:  # a palette: meshes of thin lines are large otherwise
+        Image.open(buffer).convert("RGB").quantize(_COLOURS).save(temporary, "PNG", optimize=True)
 
 
 def shades(number: int) -> list[Any]:

@@ -9,10 +9,13 @@ from math import isfinite
 from cases.reproduction.checks import observed_order
 from cases.reproduction.curves import ORDERS
 from cases.reproduction.item import DENSITIES
-from cases.reproduction.look import Finding, Look, Measure, counted, difference, numbers
+from cases.reproduction.look import Finding, Look, Measure, counted, difference, numbers, ripple
 
 VISIBLE = 0.05
 """Oscillation index that can be seen in a diagram: a zigzag of 1.25 % of h."""
+
+RIPPLE = 0.02
+"""The same for a ripple, which includes the surroundings of the dip: 2 % of h*."""
 
 _FALLING = (800.0, 400.0, 200.0, 100.0, 50.0, 25.0)
 
@@ -23,18 +26,20 @@ def _index(look: Look, density: int, p_s: float, speed: float, **others: object)
 
 
 def _onset(look: Look, density: int, p_s: float, sign: float, **others: object) -> float:
-    """The fastest |U| from 800 down whose index is visible; 0 if none, nan if not known."""
-    values = [(u, _index(look, density, p_s, sign * u, **others)) for u in _FALLING]
-    seen = [u for u, index in values if index > VISIBLE]
+    """The fastest |U| from 800 down with a visible ripple; 0 if none, nan if not known."""
+    values = [(u, ripple(look.state(density, p_s, sign * u, **others))) for u in _FALLING]
+    seen = [u for u, rise in values if rise > RIPPLE]
     return seen[0] if seen else (0.0 if all(isfinite(i) for _, i in values) else float("nan"))
 
 
 def _refinement(look: Look) -> Finding:
     densities = look.scope.meshes(DENSITIES, default=8)
+    rises = [ripple(look.state(d, 1.0, 400.0)) for d in densities]
     values = [_index(look, d, 1.0, 400.0) for d in densities]
-    text = f"index {numbers(values, '.2g')} at densities {numbers(densities)}"
-    fine = [v for d, v in zip(densities, values, strict=True) if d >= 4]
-    return Finding(text, max(fine) < VISIBLE < max(values) if fine else None)
+    text = f"densities {numbers(densities)}: ripple {numbers(rises, '.2g')} h*, "
+    fine = [rise for d, rise in zip(densities, rises, strict=True) if d >= 4]
+    words = f"{text}index of the mid contact {numbers(values, '.2g')}"
+    return Finding(words, max(fine) < RIPPLE if fine else None)
 
 
 def _dip(look: Look) -> Finding:
@@ -84,7 +89,7 @@ def _dg_no_better(look: Look) -> Finding:
 def _onset_density_8(look: Look) -> Finding:
     d = look.scope.meshes((4, 8, 16), default=8)[-1]
     out, back = _onset(look, d, 5.0, 1.0), _onset(look, d, 5.0, -1.0)
-    text = f"density {d}: first index above {VISIBLE:g} at |U| = {out:g} (out), {back:g} (in)"
+    text = f"density {d}: first ripple above {RIPPLE:g} h* at |U| = {out:g} (out), {back:g} (in)"
     return Finding(text, None if d != 8 else out == 200.0)
 
 

@@ -105,6 +105,27 @@ def _crossing(x: Floats, h: Floats, i: int, level: float) -> float:
     return float(x[i - 1] + share * (x[i] - x[i - 1]))
 
 
+def ripple(state: State) -> float:
+    """Largest rise of h towards the outlet before the dip, in h*; nan if there is no film.
+
+    A smooth film falls from the inlet to the dip at the outlet: what rises on the way is an
+    oscillation. Unlike the index of `curve.csv` this includes the surroundings of the dip.
+    """
+    if not state.usable:
+        return nan
+    profile = state.profile
+    h = profile.h_um if state.rod_speed > 0 else profile.h_um[::-1]
+    first = int(np.argmax(h < 1.5 * state.h_star))
+    thin = np.flatnonzero(h < state.h_star)
+    if not len(thin):
+        return nan
+    last = int(thin[-1])
+    while last > first and h[last - 1] <= h[last]:
+        last -= 1
+    film = h[first : last + 1]
+    return float((film - np.minimum.accumulate(film)).max() / state.h_star)
+
+
 def difference(a: State, b: State, margin: float = 0.0) -> float:
     """Largest difference of the pressures of two states over the contact of b, MPa.
 

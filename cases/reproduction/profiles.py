@@ -206,7 +206,7 @@ def fig_11(scope: Scope) -> Sheet:
     densities = scope.meshes((4, 8, 16), default=8)
     u, p_s = scope.speed(400.0), scope.pressure(1.0)
     curves = [curve(f"density {d}", d, p_s, u) for d in densities]
-    panel = Panel("the dip", drawing.film, curves, ("end", -0.12, 0.03))
+    panel = Panel("the dip", drawing.film, curves, ("end", -0.2, -0.07), (0.8, 1.8))
     words = f" The detail of Fig. 10 at the outlet, outstroke, U = {u:g} mm/s."
     return Sheet([panel], density_words(densities, (4, 8, 16)) + words, columns=1)
 

@@ -113,7 +113,7 @@ def fig_4(store: Store, scope: Scope) -> Product:
         " Rod on the top, sealed side on the left; short lines: the ends of gamma. Drawn from the"
         " frictionless contact stage (the film is thinner than a line)."
     )
-    return Product({"fig4": Table(header, rows)}, caption, draw, (6.4, 5.6))
+    return Product({"fig4": Table(header, rows)}, caption, draw, (5.6, 4.8))
 
 
 def _section(axes: Axes, p: ORing, store: Store) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from math import inf, isnan, sqrt
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from cases.reproduction.checks import observed_order
 from cases.reproduction.command import reproduce_items
 from cases.reproduction.inverse import film_of, largest_inlet_gradient
 from cases.reproduction.item import Scope
-from cases.reproduction.look import angle
+from cases.reproduction.look import angle, ripple
 from cases.reproduction.states import NOT_REACHED, Store, ask, merged, setup
 from runtime.io import write_csv, write_json
 
@@ -152,7 +153,9 @@ def test_a_damaged_run_is_not_kept(tmp_path: Path) -> None:
 # --- marks ----------------------------------------------------------------------------------------
 
 
-def write_state(store: Store, parameters: ORing, speed: float, verdict: str) -> None:
+def write_state(
+    store: Store, parameters: ORing, speed: float, verdict: str, h: Sequence[float] = (2.0, 2.0)
+) -> None:
     """A made-up state with h* = 2 um."""
     folder = store.run_folder(parameters)
     folder = folder / "rejected" if verdict == "collapsed" else folder
@@ -167,7 +170,8 @@ def write_state(store: Store, parameters: ORing, speed: float, verdict: str) -> 
     write_csv(folder / "curve.csv", CURVE_COLUMNS, [[*list(values.values())[:-1], verdict]])
     header = ("x_mm", "h_um", "p_MPa", "tau_MPa", "flux_mm2_s")
     name = f"profile_{parameters.sealed_pressure:g}_{speed:g}.csv"
-    write_csv(folder / name, header, [[-1.0, 2.0, 0.0, 0.0, 1.0], [1.0, 2.0, 1.0, 0.0, 1.0]])
+    places = np.linspace(-1.0, 1.0, len(h)).tolist()
+    write_csv(folder / name, header, [[x, t, x, 0.0, 1.0] for x, t in zip(places, h, strict=True)])
 
 
 VERDICTS = {1: "ok", 2: "oscillating", 4: "collapsed"}
@@ -262,6 +266,15 @@ def test_the_angle_of_a_straight_wedge() -> None:
     x = np.linspace(0.0, 0.2, 7)
     assert angle(x, 1e3 * x * np.tan(np.radians(12.0)), 5.0, 20.0) == pytest.approx(12.0)
     assert isnan(angle(x, np.ones(7), 5.0, 20.0))
+
+
+@pytest.mark.parametrize(("sign", "rise"), [(1.0, 0.0), (1.0, 0.3), (-1.0, 0.3)])
+def test_a_ripple_is_what_rises_before_the_dip(sign: float, rise: float, tmp_path: Path) -> None:
+    h = [9.0, 2.0, 1.9, 1.5, 1.5 + 2.0 * rise, 1.4, 1.2, 1.8, 6.0][:: int(sign)]
+    store, ring = Store(tmp_path), setup(2, 1.0)
+    write_state(store, ring, sign * 400.0, "ok", h)
+    assert ripple(store.state(ring, sign * 400.0)) == pytest.approx(rise)
+    assert isnan(ripple(store.state(ring, -sign * 400.0)))
 
 
 # --- the page -------------------------------------------------------------------------------------
