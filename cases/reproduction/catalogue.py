@@ -1,6 +1,6 @@
 """Every item of `softehl reproduce` by its name, in the order of the paper."""
 
-from cases.reproduction import blind, checks, curves, inverse, profiles, statements, tables
+from cases.reproduction import blind, checks, curves, inverse, onset, profiles, statements, tables
 from cases.reproduction.item import Item
 
 _PAPER = [*tables.ITEMS, *profiles.ITEMS, *curves.ITEMS]
@@ -16,6 +16,7 @@ ITEMS: dict[str, Item] = {
         *sorted(_PAPER, key=_number),
         *checks.ITEMS,
         *blind.ITEMS,
+        *onset.ITEMS,
         *inverse.ITEMS,
         *statements.ITEMS,
     ]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from cases.reproduction import blind, checks, curves, inverse, profiles, tables
+from cases.reproduction import blind, checks, curves, inverse, onset, profiles, tables
 from cases.reproduction.findings import FINDINGS, Finding, Look
 from cases.reproduction.item import Item, Product, Scope, Table
 from cases.reproduction.states import Request, Store
@@ -18,6 +18,7 @@ _SOURCES: Sequence[Item] = (
     *checks.ITEMS,
     *blind.ITEMS,
     *inverse.ITEMS,
+    *onset.ITEMS,
 )
 
 
