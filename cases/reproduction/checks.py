@@ -51,13 +51,14 @@ def matrix(store: Store, scope: Scope) -> Product:
     speeds, rows, states = scope.some_speeds(), [], []
     for p in _matrix_setups(scope):
         strokes = [[store.state(p, sign * u) for u in speeds] for sign in (1.0, -1.0)]
-        letters = ["".join(LETTERS.get(s.verdict, "-") for s in some) for some in strokes]
+        other = "-" if store.ended(p) else "?"
+        letters = ["".join(LETTERS.get(s.verdict, other) for s in some) for some in strokes]
         rows.append((p.density, p.sealed_pressure, *letters))
         states += [("", s) for some in strokes for s in some]
     header = ("density", "sealed_pressure_MPa", "outstroke", "instroke")
     caption = (
         f"A letter for each |U| = {', '.join(f'{u:g}' for u in speeds)} mm/s: . ok, o oscillating,"
-        " U under-resolved, C collapsed, - not reached."
+        " U under-resolved, C collapsed, - not reached, ? not run to its end."
     )
     tables = {"matrix": Table(header, rows), "matrix_states": state_table(states)}
     return Product(tables, caption)

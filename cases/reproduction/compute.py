@@ -15,12 +15,9 @@ from cases.case_file import Case
 from cases.oring_parameters import ORing
 from cases.progress import Display
 from cases.record import strokes_of
-from cases.reproduction.states import Request, Store
+from cases.reproduction.states import ENDED, Request, Store
 from cases.session import record_case
 from runtime.io import read_json
-
-ENDED = ("converged", "not converged")
-"""What run.json says of a run that came to its end; of another one the rest is still to be run."""
 
 
 def compute(requests: Sequence[Request], store: Store, *, resume: bool, jobs: int) -> None:

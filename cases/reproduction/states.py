@@ -14,13 +14,16 @@ from cases.curve import PROFILE_COLUMNS, CurveFolder, CurveRow
 from cases.observer import COLLAPSED, OK, Floats, Profile
 from cases.oring_parameters import ORing
 from cases.record import SELECTION, SIGNS
-from runtime.io import number_text, read_columns
+from runtime.io import number_text, read_columns, read_json
 
 NOT_REACHED = "not reached"
 """Verdict of a state that its run could not reach."""
 
 SPEEDS = (1600.0, 800.0, 400.0, 200.0, 100.0, 50.0, 25.0)
 """The rod speeds |U| of Table 1, halved from the fastest to the slowest, mm/s."""
+
+ENDED = ("converged", "not converged")
+"""What run.json says of a run that came to its end; of another one the rest is still to be run."""
 
 _IN_NAME = ("density", "sealed_pressure")
 
@@ -129,6 +132,11 @@ class Store:
     def run_folder(self, parameters: ORing) -> Path:
         """Where the run of these parameters is or would be."""
         return self.folder / Request(parameters, frozenset()).name
+
+    def ended(self, parameters: ORing) -> bool:
+        """Whether the run of these parameters came to its end.  Raises OSError, ValueError."""
+        path = self.run_folder(parameters) / "run.json"
+        return path.exists() and read_json(path).get("status") in ENDED
 
     def state(self, parameters: ORing, rod_speed: float) -> State:
         """The state at a signed speed U, mm/s."""
