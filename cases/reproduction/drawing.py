@@ -33,7 +33,7 @@ FILM = r"film thickness $h$ [$\mu$m]"
 POSITION = r"position $\bar x$ [mm]"
 H_STAR = r"$h^* = q/\bar u$ [$\mu$m]"
 
-_COLOURS = 160
+_COLOURS = 96
 _MARGIN = 0.35  # mm of the contact's surroundings
 _LETTER_WIDTH = 0.049  # inches, of the caption
 _LINE_HEIGHT = 0.15
