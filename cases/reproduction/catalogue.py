@@ -1,6 +1,16 @@
 """Every item of `softehl reproduce` by its name, in the order of the paper."""
 
-from cases.reproduction import blind, checks, curves, inverse, onset, profiles, statements, tables
+from cases.reproduction import (
+    blind,
+    checks,
+    curves,
+    inverse,
+    onset,
+    points,
+    profiles,
+    statements,
+    tables,
+)
 from cases.reproduction.item import Item
 
 _PAPER = [*tables.ITEMS, *profiles.ITEMS, *curves.ITEMS]
@@ -17,6 +27,7 @@ ITEMS: dict[str, Item] = {
         *checks.ITEMS,
         *blind.ITEMS,
         *onset.ITEMS,
+        *points.ITEMS,
         *inverse.ITEMS,
         *statements.ITEMS,
     ]

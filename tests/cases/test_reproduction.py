@@ -28,7 +28,7 @@ from cases.reproduction.states import NOT_REACHED, Store, ask, merged, setup
 from runtime.io import write_csv, write_json
 
 SMALL = Scope(density=1, speeds=(1600.0,), pressures=(1.0,))
-"""Every item from density 1, p_s = 1 MPa, |U| = 1600 mm/s: 16 runs."""
+"""Every item from density 1, p_s = 1 MPa, |U| = 1600 mm/s: 22 runs."""
 
 
 def files(folder: Path) -> dict[str, bytes]:
