@@ -12,11 +12,12 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 GENERATED := $(wildcard generated/*.c generated/*.h generated/manifest.json)
 BUILDER := $(wildcard codegen/build.py codegen/abi.py)
 
-.PHONY: help oring test lint check format clean
+.PHONY: help oring test slow lint check format clean
 
 help:
 	@echo "make oring    solve the O-ring and write its film-thickness curve to $(OUT)"
 	@echo "make test     run the test suite"
+	@echo "make slow     the tests that take minutes"
 	@echo "make lint     ruff and mypy; make check: lint and test"
 	@echo "make clean    remove the environment and everything built"
 
@@ -25,6 +26,9 @@ oring: $(VENV)/.kernels
 
 test: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m pytest -n 2
+
+slow: $(VENV)/.dev $(VENV)/.kernels
+	$(BIN)/python -m pytest -n 2 -m slow
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

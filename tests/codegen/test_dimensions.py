@@ -70,6 +70,7 @@ def test_shape_functions_of_the_hexahedron() -> None:
         assert all(sp.expand(sp.diff(n, s) - g) == 0 for s, g in zip(xi, gradient, strict=True))
 
 
+@pytest.mark.slow
 def test_hexahedron_against_the_oracle(hexa: Kernel, rng: np.random.Generator) -> None:
     X = CUBE + rng.uniform(-0.1, 0.1, (8, 3))
     u, v = rng.uniform(-0.1, 0.1, (2, 8, 3))
