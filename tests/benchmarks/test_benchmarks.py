@@ -149,3 +149,13 @@ def test_the_command_line_refuses_what_it_does_not_know() -> None:
     result = CliRunner().invoke(kernels.main, ["--case", "q8_b"])
     assert result.exit_code == 2
     assert "q4_b" in result.output
+
+
+def test_fast_math_leaves_subnormal_numbers_to_the_process(tmp_path: Path) -> None:
+    source = tmp_path / "empty.c"
+    source.write_text("void bench_entry(void) {}\n", encoding="utf-8")
+    compiler = compiling.compilers(all_found=False)[0]
+    compiler.library([source], tmp_path / "empty.so", ("-O3", "-ffast-math"))
+    compiling.load(tmp_path / "empty.so")
+    smallest = np.array([5e-324])
+    assert (smallest * 1.0)[0] > 0.0
