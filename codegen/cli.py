@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Column, Table
 
-from codegen import cli_files, pipeline, targets
+from codegen import cache, cli_files, pipeline, targets
 from codegen.abi import Target
 from codegen.build import GENERATED
 from codegen.models import ALL
@@ -57,19 +56,13 @@ def generate(
     for name in strange:
         (GENERATED / name).unlink()
     for name in stale:
-        _write(GENERATED / name, files[name])
+        cache.write(GENERATED / name, files[name].encode())
     print(f"{len(files)} files in generated/, {len(stale)} of them new or changed")
     return 0
 
 
 def _differs(path: Path, text: str) -> bool:
     return not path.exists() or path.read_text(encoding="utf-8") != text
-
-
-def _write(path: Path, text: str) -> None:
-    scratch = path.with_suffix(path.suffix + ".tmp")
-    scratch.write_text(text, encoding="utf-8")
-    os.replace(scratch, path)
 
 
 def _trace(family: str) -> int:

@@ -7,6 +7,7 @@ A model page declares its arguments, writes its mathematics in SymPy, and ends w
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import sympy as sp
@@ -150,7 +151,7 @@ class Model:
                 raise ModelError(
                     f"require {c}: compare one parameter or datum with a number, e.g. mu > 0"
                 )
-            where = "/".join(page_line().split("/")[-1:])
+            where = Path(page_line()).name
             self._conditions.append(Condition(str(c.lhs), c.rel_op, float(c.rhs), where))
 
     def point(self) -> list[sp.Symbol]:

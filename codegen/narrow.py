@@ -21,7 +21,7 @@ from sympy import QQ
 from sympy.polys.matrices import DomainMatrix
 
 from codegen.graph import Graph, Node, Op, reachable
-from codegen.waists import Monomial, Polynomial, product
+from codegen.waists import Monomial, Polynomial, added, product
 
 _Shape = tuple[tuple[Monomial, Fraction], ...]
 """A polynomial with 1 as its first coefficient: hashable, and equal for multiples."""
@@ -101,11 +101,13 @@ def narrow(
         return None
     recipes, terms, squares = found
     new: dict[Node, Node] = {}
+    known: dict[int, Node] = {}
     for n in reachable(roots):
         if n in recipes:
-            new[n] = recipes[n].cook(g, terms, {m.id: v for m, v in new.items()})
+            new[n] = recipes[n].cook(g, terms, known)
         else:
             new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+        known[n.id] = new[n]
     return Narrowed([new[r] for r in roots], new, squares)
 
 
@@ -289,10 +291,7 @@ class _Search:
             out = functools.reduce(product, factors)
         else:
             sign = -1 if n.op in (Op.SUB, Op.NEG) else 1
-            out = dict(parts[0]) if len(parts) == 2 else {}
-            for m, c in parts[-1].items():
-                out[m] = out.get(m, Fraction(0)) + sign * c
-            out = {m: c for m, c in out.items() if c}
+            out = added(parts[0] if len(parts) == 2 else {}, parts[-1], sign)
         return out if len(out) <= LONGEST else None
 
 

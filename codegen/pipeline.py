@@ -12,7 +12,7 @@ from typing import Any
 
 from codegen import abi, emit_c, emit_routines, emit_simd, emit_ufcx, linearise, passes
 from codegen.abi import Target
-from codegen.graph import Routine
+from codegen.graph import Node, Routine
 from codegen.liveness import peak_live
 from codegen.model import Definition
 from codegen.order import arranged
@@ -76,16 +76,19 @@ def _rewritten(
     definition: Definition, entries: list[emit_c.Entry], chosen: Sequence[passes.Pass]
 ) -> tuple[list[emit_c.Entry], Schedule, list[passes.TraceRow]]:
     roots, trace = passes.run(definition.graph, [x.node for x in entries], chosen)
-    entries = [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
-    return entries, schedule(roots), trace
+    return _placed(entries, roots), schedule(roots), trace
 
 
 def _arranged(
     definition: Definition, entries: Sequence[emit_c.Entry]
 ) -> tuple[list[emit_c.Entry], Schedule]:
     roots, order = arranged(definition.graph, [x.node for x in entries])
-    entries = [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
-    return entries, straight_line(order)
+    return _placed(entries, roots), straight_line(order)
+
+
+def _placed(entries: Sequence[emit_c.Entry], roots: Sequence[Node]) -> list[emit_c.Entry]:
+    """The same rows and columns with new values."""
+    return [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
 
 
 def _work(definition: Definition, plan: Schedule) -> int:

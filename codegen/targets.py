@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from codegen import pipeline
+from codegen import cache, pipeline
 from codegen.abi import Target
 from codegen.emit_ufcx import TargetError
 from codegen.model import Definition
@@ -36,8 +35,6 @@ def write(definitions: Iterable[Definition], target: Target, folder: Path | None
     files = pipeline.ufcx_files(kernels) if target is Target.UFCX else pipeline.files(kernels)
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
-        scratch = folder / f"{name}.tmp"
-        scratch.write_text(text, encoding="utf-8")
-        os.replace(scratch, folder / name)
+        cache.write(folder / name, text.encode())
     print(f"{len(files)} files of target {target} in {folder}")
     return 0

@@ -106,7 +106,7 @@ class _Expansion:
         else:
             sign = -1 if n.op in (Op.SUB, Op.NEG) else 1
             first, second = (args[0], args[1]) if len(args) == 2 else ({}, args[0])
-            out = _added(first, second, sign)
+            out = added(first, second, sign)
         return out if len(out) <= LIMIT else {(n.id,): Fraction(1)}
 
     def _is_pure(self, n: Node) -> bool:
@@ -129,7 +129,8 @@ def product(p: Polynomial, q: Polynomial) -> Polynomial:
     return {k: v for k, v in out.items() if v}
 
 
-def _added(p: Polynomial, q: Polynomial, sign: int) -> Polynomial:
+def added(p: Polynomial, q: Polynomial, sign: int) -> Polynomial:
+    """p + sign q."""
     out = dict(p)
     for k, v in q.items():
         out[k] = out.get(k, Fraction(0)) + sign * v
@@ -140,7 +141,7 @@ def _combined(
     a: dict[int | None, Polynomial], b: dict[int | None, Polynomial], sa: int, sb: int
 ) -> dict[int | None, Polynomial]:
     keys = [*a, *(k for k in b if k not in a)]
-    return {k: _added(_added({}, a.get(k, {}), sa), b.get(k, {}), sb) for k in keys}
+    return {k: added(added({}, a.get(k, {}), sa), b.get(k, {}), sb) for k in keys}
 
 
 def _common_factors(n: Node, degree: Mapping[Node, int]) -> set[Node]:
@@ -238,7 +239,7 @@ class _Forms:
             for parent, vector in columns.items():
                 mode, factor = self._mode(vector)
                 term = {tuple(sorted((*geometry, *parent))): factor}
-                out[mode] = _added(out.get(mode, {}), term, 1)
+                out[mode] = added(out.get(mode, {}), term, 1)
         return out
 
     def _point_value(self, columns: dict[Monomial, dict[int, Fraction]]) -> tuple[Node, Fraction]:
