@@ -178,3 +178,23 @@ class Observer(Protocol):
 
 class Silent(Observer):
     """The observer that does nothing (for tests and scripts)."""
+
+    def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
+        """See :class:`Observer`."""
+
+    def step(
+        self,
+        *,
+        label: str,
+        parameter: float,
+        iterations: int,
+        residuals: Sequence[float],
+        fraction: float | None,
+    ) -> None:
+        """See :class:`Observer`."""
+
+    def contact_state(self, state: ContactState) -> None:
+        """See :class:`Observer`."""
+
+    def film_state(self, state: FilmState) -> None:
+        """See :class:`Observer`."""

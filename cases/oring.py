@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cases.observer import FilmState, Observer, Outcome, StageRecord
+from cases.oring_contact import ContactRoute
 from cases.oring_fast import FastFilm
 from cases.oring_order import REFERENCE_ORDER, OrderPair, transferred
 from cases.oring_parameters import ORing
@@ -18,72 +19,22 @@ from cases.oring_path import (
     Stroke,
     contact_problem,
     film_problem,
-    load_stage,
     release_stage,
     shear_stage,
     speed_stage,
-    squeeze_stage,
     weight_stage,
 )
-from cases.oring_refinement import DENSITIES, finer, refined_contact
 from cases.oring_results import contact_state, film_numbers, film_state
 from cases.oring_section import OringSection, build_section
-from cases.oring_verdict import FilmNumbers, Verdict, fewest_inlet_segments
+from cases.oring_stopped import Stopped
+from cases.oring_verdict import Verdict, fewest_inlet_segments
 from cases.stages import Stage, Walker
-from runtime.continuation import Branch, Point
+from runtime.continuation import Point
 from runtime.linear import Condenser, choose
 from runtime.newton import Newton
 from runtime.solution import Status
 
 Array = NDArray[np.float64]
-
-FOLD = (
-    "the path ends or turns back there, as it does when the film collapses on a mesh that is too "
-    "coarse: use a finer mesh (larger density)"
-)
-
-CLOSED = 0.05
-"""Least film thickness, in h*, below which a path ends because the film closes."""
-
-CLOSING = (
-    "the film closes: at a node it is only {:.2g} um thick there, and would be negative beyond; "
-    "use a finer mesh (larger density) or a higher pressure_order"
-)
-
-ROLLING = (
-    'with rotation = "free" hardly anything but the film turns or holds the section: use "fixed"'
-)
-
-
-class _Stopped(Exception):  # noqa: N818 (control flow inside this module)
-    """A stage did not reach its end; carries its branch."""
-
-    def __init__(self, stage: Stage, branch: Branch) -> None:
-        super().__init__(stage.name)
-        self.stage, self.branch = stage, branch
-        self.last: FilmNumbers | None = None
-
-    @property
-    def message(self) -> str:
-        """How far the stage came, in its own units, why no further, and what may help."""
-        stage, branch = self.stage, self.branch
-        goal = f"{stage.name} {stage.shown(stage.stop):.5g}"
-        if not branch.points:
-            return f"{goal} was not reached, not even the start: {branch.message}"
-        reached = stage.shown(branch.points[-1].parameter)
-        return f"{goal} was not reached, only {reached:.5g}"
-
-    @property
-    def advice(self) -> str:
-        """Why a path ends on the way, and what may help."""
-        if self.last is not None and self.last.h_min < CLOSED * self.last.h_star:
-            return CLOSING.format(1e3 * self.last.h_min)
-        return FOLD if self.branch.points else self.branch.status.advice
-
-    def explain(self, where: str, rotation: str) -> tuple[Status, str]:
-        """Status and message of a run that ends here."""
-        advice = ROLLING if rotation == "free" else self.advice
-        return self.branch.status, f"{where}: {self.message}; {advice}"
 
 
 @dataclass
@@ -100,47 +51,21 @@ class _Run:
     prefix: str = ""
 
     def walk(self, stage: Stage, x: Array) -> Array:
-        """Unknowns at the end of a stage; raises _Stopped if it is not reached."""
+        """Unknowns at the end of a stage; raises Stopped if it is not reached."""
         stage = replace(stage, name=self.prefix + stage.name)
         branch, record = self.walker.walk(stage, x, self.observer)
         self.records.append(record)
         if not branch.converged:
-            raise _Stopped(stage, branch)
+            raise Stopped(stage, branch)
         return branch.last.x
 
-    def contact(self) -> Array:
-        """First stage, shared by both strokes."""
-        p_s = self.section.parameters.sealed_pressure
-        x = self._contact_unknowns()
+    def contact(self, parameters: ORing) -> Array:
+        """First stage, shared by both strokes; settles the mesh, that is the section."""
+        route = ContactRoute(self.settings, self.walk)
+        self.section, x = route.contact(parameters)
+        p_s = parameters.sealed_pressure
         problem = contact_problem(self.section, self.settings, p_s)
         self.observer.contact_state(contact_state(self.section, problem, p_s, x))
-        return x
-
-    def _contact_unknowns(self) -> Array:
-        """By way of coarser meshes; on the mesh itself if that is asked for or the ways fail."""
-        p = self.section.parameters
-        coarser = [d for d in DENSITIES if d < p.density and p.solver == "auto"]
-        for coarsest in coarser:
-            with suppress(_Stopped):
-                return self._refined(coarsest)
-        return self._loaded(self.section)
-
-    def _loaded(self, section: OringSection) -> Array:
-        """Contact state of a section, from rest."""
-        p_s = section.parameters.sealed_pressure
-        x = self.walk(squeeze_stage(section, self.settings), section.at_rest())
-        return self.walk(load_stage(section, self.settings, p_s), x) if p_s > 0.0 else x
-
-    def _refined(self, coarsest: int) -> Array:
-        """Contact state of the section from that of a coarser mesh, density by density."""
-        p = self.section.parameters
-        section = build_section(p.model_copy(update={"density": coarsest}))
-        x = self._loaded(section)
-        while section is not self.section:
-            coarse, density = section, 2 * section.parameters.density
-            last = density == p.density
-            section = self.section if last else build_section(finer(coarse.parameters))
-            x = self.walk(*refined_contact(coarse, section, self.settings, x))
         return x
 
     def stroke(self, stroke: Stroke, x: Array) -> None:
@@ -152,14 +77,14 @@ class _Run:
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
         judge = _Judge(self, Verdict(reference, fewest=fewest))
         film = self.first_film(stroke, x)
-        with suppress(_Stopped):
+        with suppress(Stopped):
             if self._fast_films(film, x, judge):
                 return
         try:
             start, state = judge.position or self.build_film(film, x)
             slower = [u for u in p.speeds if u < start.speed or judge.position is None]
             self.walk(speed_stage(section, settings, start, slower, judge), state)
-        except _Stopped as stop:
+        except Stopped as stop:
             stop.last = judge.verdict.last
             self.from_higher_order(film, x, judge)
             if judge.missing:
@@ -212,12 +137,12 @@ class _Run:
             if at.speed in missing:
                 found[at.speed] = (at, point.solution.x)
 
-        with suppress(_Stopped):
+        with suppress(Stopped):
             x = transferred(contact, section, pair.high)
             film, x = other.build_film(other.first_film(film.stroke, x), x)
             other.walk(speed_stage(pair.high, settings, film, missing, keep), x)
         for at, x in found.values():
-            with suppress(_Stopped):
+            with suppress(Stopped):
                 x = pair.low_part(self.walk(pair.stage(settings, at), pair.start(x)))
                 solution = self.walker.newton.solve(film_problem(section, settings, at), x)
                 if solution.converged:
@@ -268,14 +193,14 @@ def run(
     strokes: tuple[Stroke, ...] = ("out", "in")
     wanted = strokes if parameters.stroke == "both" else (parameters.stroke,)
     try:
-        x = progress.contact()
-    except _Stopped as stop:
+        x = progress.contact(parameters)
+    except Stopped as stop:
         progress.stopped.append(stop.explain("contact", parameters.rotation))
         return _outcome(progress)
     for stroke in wanted:
         try:
             progress.stroke(stroke, x)
-        except _Stopped as stop:
+        except Stopped as stop:
             progress.stopped.append(stop.explain(f"stroke {stroke}", parameters.rotation))
     return _outcome(progress)
 

@@ -27,6 +27,10 @@ class ORing(BaseModel):
         default=2,
         description="mesh density d: 27 d segments on the lubricated arc; 1, 2, 4, 8 or 16",
     )
+    mesh: Literal["graded", "uniform"] = Field(
+        default="graded",
+        description='segments of the arc; "graded" (fine at the contact edges) or "uniform"',
+    )
     pressure_order: int = Field(
         default=4, ge=1, le=64, description="order m_p of the film pressure on a segment; 1 to 64"
     )

@@ -48,6 +48,7 @@ class OringSection:
     """
 
     parameters: ORing
+    disc: Disc
     mesh: SectionMesh
     layout: DofLayout
     obstacles: dict[str, Obstacle]
@@ -79,11 +80,15 @@ class OringSection:
         return self.mesh.points + x[self.layout.part("displacement")].reshape(-1, 2)
 
 
-def build_section(p: ORing) -> OringSection:
-    """Mesh, unknowns, blocks and the problem of a case."""
+def uniform_disc(p: ORing) -> Disc:
+    """The circular section with equal segments on its arc."""
     radius = 0.5 * p.section_diameter
-    centre_r = 0.5 * p.inner_diameter + radius
-    disc = Disc(0.0, centre_r, radius, p.arc_start, p.arc_end)
+    return Disc(0.0, 0.5 * p.inner_diameter + radius, radius, p.arc_start, p.arc_end)
+
+
+def build_section(p: ORing, disc: Disc | None = None) -> OringSection:
+    """Mesh, unknowns, blocks and the problem of a case; without a disc that of equal segments."""
+    disc = disc or uniform_disc(p)
     mesh = disc_mesh(disc, p.density)
     layout = number_unknowns(mesh, p)
     obstacles = {o.name: o for o in _obstacles(p)}
@@ -96,8 +101,8 @@ def build_section(p: ORing) -> OringSection:
         guards=(_orientation(mesh),),
     )
     areas = tributary_areas(mesh.points, mesh.arc_segments, mesh.arc_nodes)
-    problem = _with_solid(p, problem, centre_r, radius)
-    section = OringSection(p, mesh, layout, obstacles, problem, areas)
+    problem = _with_solid(p, problem, disc.centre_r, disc.radius)
+    section = OringSection(p, disc, mesh, layout, obstacles, problem, areas)
     return replace(section, problem=problem.with_fixed([layout.dofs("pressure")], [0.0]))
 
 

@@ -12,6 +12,8 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from runtime.spacing import Spacing
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -29,6 +31,7 @@ class Disc:
     bulge: how round the edges of the central block are (bottom, sides, top), 0 = chord and
     1 = concentric arc. layer_growth, row_growth: ratio of the last to the first thickness
     of the layers (outside to inside) and of the rows of the central block (bottom to top).
+    spacing: of the nodes along the arc and, fading, in the columns above it; None = equal.
     """
 
     centre_z: float
@@ -41,6 +44,7 @@ class Disc:
     bulge: tuple[float, float, float] = (0.55, 0.3, 0.5)
     layer_growth: float = 1.8
     row_growth: float = 2.4
+    spacing: Spacing | None = None
 
     @property
     def corners(self) -> tuple[float, float, float, float]:
@@ -103,7 +107,7 @@ def disc_mesh(disc: Disc, density: int) -> SectionMesh:
     """O-grid of 360 d^2 quadrilaterals with 27 d equal segments on the arc and 66 d around."""
     if density < 1:
         raise ValueError(f"disc_mesh: density {density} is not allowed, it is at least 1")
-    long, short, layers = LONG * density, SHORT * density, LAYERS * density
+    long, short, layers = (round(n * density) for n in (LONG, SHORT, LAYERS))
     loop = _loop(disc, long, short)
     ring = disc.centre + disc.radius * disc.direction(loop[0])
     inner = loop[1]
@@ -131,6 +135,12 @@ def _graded(count: int, growth: float) -> Array:
     return np.asarray(np.expm1(k * t) / np.expm1(k)) if growth != 1.0 else t
 
 
+def _columns(disc: Disc, long: int) -> Array:
+    """Relative positions (long + 1,) of the nodes along the arc."""
+    t = np.arange(long + 1) / long
+    return disc.spacing(t) if disc.spacing else t
+
+
 def _loop(disc: Disc, long: int, short: int) -> tuple[Array, Array]:
     """Angles of the boundary nodes and the points of the central block that they are joined to."""
     a = disc.corners
@@ -138,7 +148,7 @@ def _loop(disc: Disc, long: int, short: int) -> tuple[Array, Array]:
     bottom, sides, top = disc.bulge
     rows = _graded(short, disc.row_growth)
     pieces = [
-        _edge(disc, a[0], a[1], low, low, bottom, np.arange(long + 1) / long),
+        _edge(disc, a[0], a[1], low, low, bottom, _columns(disc, long)),
         _edge(disc, a[1], a[2], low, high, sides, rows),
         _edge(disc, a[2], a[3], high, high, top, np.arange(long + 1) / long),
         _edge(disc, a[3], a[0] + 2.0 * np.pi, high, low, sides, 1.0 - rows[::-1]),
@@ -164,8 +174,9 @@ def _central_block(disc: Disc, loop: Array, long: int, short: int) -> Array:
     right = loop[long : long + short + 1]
     top = loop[long + short : 2 * long + short + 1][::-1]
     left = np.concatenate([loop[2 * long + short :], loop[:1]])[::-1]
-    s = (np.arange(long + 1) / long)[None, :, None]
     t = _graded(short, disc.row_growth)[:, None, None]
+    s = _columns(disc, long)[:, None]
+    s = s + t * ((np.arange(long + 1) / long)[:, None] - s)
     edges = (1 - t) * bottom[None] + t * top[None] + (1 - s) * left[:, None] + s * right[:, None]
     corners = (1 - t) * ((1 - s) * bottom[0] + s * bottom[-1])
     corners = corners + t * ((1 - s) * top[0] + s * top[-1])

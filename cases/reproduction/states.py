@@ -25,13 +25,16 @@ SPEEDS = (1600.0, 800.0, 400.0, 200.0, 100.0, 50.0, 25.0)
 ENDED = ("converged", "not converged")
 """What run.json says of a run that came to its end; of another one the rest is still to be run."""
 
+PAPER: dict[str, Any] = {"mesh": "uniform"}
+"""What the paper does where a run by itself would do better."""
+
 _IN_NAME = ("density", "sealed_pressure")
 
 
 def setup(density: int, sealed_pressure: float, **others: Any) -> ORing:
     """Parameters of a run, without speeds and stroke (those are left at their defaults)."""
     given: dict[str, Any] = {"density": density, "sealed_pressure": float(sealed_pressure)}
-    return ORing(**given, **others)
+    return ORing(**PAPER, **given, **others)
 
 
 @dataclass(frozen=True)
@@ -43,8 +46,8 @@ class Request:
 
     @property
     def name(self) -> str:
-        """The folder of the run: density, p_s and what is not at its default."""
-        given, default = self.setup.model_dump(), ORing().model_dump()
+        """The folder of the run: density, p_s and what is not as in the paper's default."""
+        given, default = self.setup.model_dump(), ORing(**PAPER).model_dump()
         others = [
             f"{key}={number_text(value) if isinstance(value, float) else value}"
             for key, value in given.items()

@@ -7,5 +7,11 @@ from cases.oring_parameters import ORing
 
 def oring(**changes: Any) -> ORing:
     """The O-ring with other values for some keys."""
-    values: dict[str, Any] = {"groove_width": 3.74, "arc_start": -34.0, "arc_end": 43.0, **changes}
+    values: dict[str, Any] = {
+        "mesh": "uniform",
+        "groove_width": 3.74,
+        "arc_start": -34.0,
+        "arc_end": 43.0,
+        **changes,
+    }
     return ORing(**values)

@@ -16,9 +16,10 @@ from cases.observer import (
     Outcome,
     Silent,
 )
-from cases.oring import _Stopped, run
+from cases.oring import run
 from cases.oring_path import PathSettings, squeeze_stage
 from cases.oring_section import build_section
+from cases.oring_stopped import Stopped
 from cases.oring_verdict import FilmNumbers
 from runtime.continuation import Branch, Point
 from runtime.solution import Solution, Status
@@ -262,7 +263,7 @@ def test_a_low_order_is_reached_from_a_higher_one() -> None:
 
 def test_a_film_that_closes_is_named() -> None:
     last = FilmNumbers(889.1, -0.7, 1.67e-3, 6.1e-6, 3.7, -9.0, 1e-9, 0.0, 1.0, 2.5)
-    stop = _Stopped(squeeze_stage(build_section(oring(density=1)), PathSettings()), ENDED)
+    stop = Stopped(squeeze_stage(build_section(oring(density=1)), PathSettings()), ENDED)
     assert "turns back" in stop.advice
     stop.last = last
     assert "closes: at a node it is only 0.0061 um" in stop.advice

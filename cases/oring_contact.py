@@ -1,0 +1,93 @@
+"""First stage: the mesh of a section and its contact state, by whichever way leads there cheaply.
+
+A path from rest is walked on a coarse mesh; finer and graded meshes start from a coarser or a
+uniform one and are corrected by Newton's method. Where a way does not lead to the end, the next
+one begins on a finer mesh, the last of them on the mesh itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cases.oring_grading import PASSES, graded_disc
+from cases.oring_parameters import ORing
+from cases.oring_path import PathSettings, load_stage, squeeze_stage
+from cases.oring_refinement import finer, refined_contact, regraded_contact
+from cases.oring_section import OringSection, build_section
+from cases.oring_stopped import Stopped
+from cases.stages import Stage
+
+Array = NDArray[np.float64]
+State = tuple[OringSection, Array]
+
+GUIDE = 2
+"""Least density of the uniform mesh whose contact shows where a graded one is to be fine."""
+
+
+@dataclass(frozen=True)
+class ContactRoute:
+    """Ways to a contact state; walk solves a stage from a start or raises Stopped."""
+
+    settings: PathSettings
+    walk: Callable[[Stage, Array], Array]
+
+    def contact(self, p: ORing) -> State:
+        """The section of a case, uniform or graded, and its unknowns in contact under p_s.
+
+        Raises Stopped where no way leads there.
+        """
+        return self._graded(p) if p.mesh == "graded" else self._uniform(p)
+
+    def loaded(self, section: OringSection) -> Array:
+        """Unknowns of a section in contact, from rest: squeezed, then loaded by p_s."""
+        p_s = section.parameters.sealed_pressure
+        x = self.walk(squeeze_stage(section, self.settings), section.at_rest())
+        return self.walk(load_stage(section, self.settings, p_s), x) if p_s > 0.0 else x
+
+    def _uniform(self, p: ORing) -> State:
+        if p.solver == "auto":
+            for coarsest in _doublings(1, p.density // 2):
+                with suppress(Stopped):
+                    section = build_section(_at(p, coarsest))
+                    return self._refined(section, self.loaded(section), p.density)
+        section = build_section(p)
+        return section, self.loaded(section)
+
+    def _graded(self, p: ORing) -> State:
+        """Graded at a low density, from the uniform mesh of that density, then refined."""
+        for guide in _doublings(min(GUIDE, p.density), p.density // 2):
+            with suppress(Stopped):
+                return self._refined(*self._regraded(_at(p, guide)), p.density)
+        return self._regraded(p)
+
+    def _regraded(self, p: ORing) -> State:
+        section, x = self._uniform(p.model_copy(update={"solver": "auto"}))
+        for number in range(1, PASSES + 1):
+            graded = build_section(p, graded_disc(section, x))
+            x = self.walk(*regraded_contact(section, graded, self.settings, x, number))
+            section = graded
+        return section, x
+
+    def _refined(self, section: OringSection, x: Array, density: int) -> State:
+        """From a contact state to that of the same mesh at `density`, doubling by doubling."""
+        while section.parameters.density < density:
+            coarse = section
+            section = build_section(finer(coarse.parameters), coarse.disc)
+            x = self.walk(*refined_contact(coarse, section, self.settings, x))
+        return section, x
+
+
+def _doublings(first: int, last: int) -> Iterator[int]:
+    """first, 2 first, ... up to last."""
+    while first <= last:
+        yield first
+        first *= 2
+
+
+def _at(p: ORing, density: int) -> ORing:
+    return p.model_copy(update={"density": density})

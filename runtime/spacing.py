@@ -1,0 +1,74 @@
+"""Where the nodes of a line lie: a size function, and the map of index space that obeys it.
+
+A line of length L is to have `count` segments whose size at s is
+
+    dx(s) = min(coarsest, finest + rate min_k |s - s_k|)
+
+with `finest` chosen such that they fill it. The map is that of the limit of many segments, so that
+the nodes of a mesh are among those of the mesh of twice its density.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import brentq
+
+Array = NDArray[np.float64]
+
+_STATIONS = 20001  # points at which a size function is tabulated
+_STEPS = 27 * 64  # of the table of a map: nodes of every density up to 64 are entries of it
+
+
+@dataclass(frozen=True, eq=False)
+class Spacing:
+    """A monotone map of [0, 1] onto itself: where equal steps of index space lie on a line.
+
+    places: (K + 1,), from 0 to 1, the images of k / K.
+    """
+
+    places: Array
+
+    def __call__(self, t: Array) -> Array:
+        """Relative positions (n,) of the relative indices t (n,)."""
+        return np.interp(t, self._indices, self.places)
+
+    @cached_property
+    def _indices(self) -> Array:
+        return np.arange(len(self.places)) / (len(self.places) - 1)
+
+
+def graded(
+    length: float, spots: Sequence[float], count: int, *, coarsest: float, rate: float
+) -> Spacing:
+    """The map of a line of `length` (mm) with `count` segments that resolves the spots s_k (mm).
+
+    coarsest: largest size, mm; rate: growth of the size with the distance from a spot.
+    Raises ValueError where `count` segments of the coarsest size do not fill the line, or without
+    a spot.
+    """
+    if not spots:
+        raise ValueError("graded: no spot is given; at least one is needed")
+    if count * coarsest <= length:
+        raise ValueError(
+            f"graded: {count} segments of at most {coarsest:g} mm do not fill {length:g} mm; "
+            f"the coarsest size must be larger than {length / count:g} mm"
+        )
+    s = np.linspace(0.0, length, _STATIONS)
+    away = np.abs(s[:, None] - np.asarray(spots)).min(axis=1)
+
+    def segments(log_finest: float) -> Array:
+        """Number of segments (stations,) from the beginning of the line to s."""
+        size = np.minimum(coarsest, np.exp(log_finest) + rate * away)
+        return np.asarray(cumulative_trapezoid(1.0 / size, s, initial=0))
+
+    bounds = np.log(1e-6 * coarsest), np.log(coarsest)
+    index = segments(brentq(lambda finest: segments(finest)[-1] - count, *bounds))
+    places = np.interp(np.linspace(0.0, index[-1], _STEPS + 1), index, s) / length
+    places[-1] = 1.0
+    return Spacing(places)

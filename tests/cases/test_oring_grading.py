@@ -1,0 +1,107 @@
+"""Graded meshes: contact edges, shape of the elements, the contact and the film on them."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cases.observer import Outcome, Silent
+from cases.oring import run
+from cases.oring_contact import ContactRoute
+from cases.oring_grading import arc_positions, contact_edges, graded_disc
+from cases.oring_parameters import ORing
+from cases.oring_path import PathSettings
+from cases.oring_section import OringSection, build_section
+from cases.oring_stopped import Stopped
+from cases.stages import Stage, Walker
+from runtime.mesh import corner_jacobians
+from tests.cases.oring_cases import oring
+
+
+def _walk(walker: Walker) -> Callable[[Stage, np.ndarray], np.ndarray]:
+    def walk(stage: Stage, x: np.ndarray) -> np.ndarray:
+        branch, _ = walker.walk(stage, x, Silent())
+        if not branch.converged:
+            raise Stopped(stage, branch)
+        return branch.last.x
+
+    return walk
+
+
+@cache
+def _contact(
+    density: int, mesh: str = "graded", p_s: float = 1.0
+) -> tuple[OringSection, np.ndarray]:
+    route = ContactRoute(PathSettings(), _walk(Walker()))
+    return route.contact(oring(density=density, mesh=mesh, sealed_pressure=p_s))
+
+
+@cache
+def _curve(**changes: object) -> Outcome:
+    return run(oring(**changes), Silent())
+
+
+def test_the_edge_of_a_pressure_like_a_square_root_is_found_exactly() -> None:
+    section = build_section(oring(density=2))
+    s = arc_positions(section)
+    x = section.at_rest()
+    first, last = 0.413, 1.777
+    x[section.layout.part("rod")] = -np.sqrt(np.maximum(np.minimum(s - first, last - s), 0.0))
+    assert contact_edges(section, x) == pytest.approx((first, last), abs=1e-12)
+
+
+def test_a_section_that_does_not_touch_has_no_edges() -> None:
+    section = build_section(oring(density=1))
+    with pytest.raises(ValueError, match="0 nodes touch the rod; at least 3 are needed"):
+        contact_edges(section, section.at_rest())
+
+
+def test_segments_are_finest_at_the_edges_of_the_contact() -> None:
+    section, x = _contact(2)
+    s = arc_positions(section)
+    sizes, middle = np.diff(s), 0.5 * (s[1:] + s[:-1])
+    for edge in contact_edges(section, x):
+        nearest = np.abs(middle - edge).argmin()
+        assert sizes[nearest] < 1.25 * sizes.min()
+        assert abs(middle[sizes[: len(s) // 2].argmin()] - contact_edges(section, x)[0]) < 0.01
+    assert sizes.min() < 0.2 * sizes.mean()
+    assert len(s) == 55
+
+
+def test_a_graded_mesh_is_valid_and_its_boundary_is_round() -> None:
+    section, x = _contact(2)
+    disc = section.disc
+    radii = np.hypot(*(section.mesh.points[section.mesh.boundary] - disc.centre).T)
+    assert radii == pytest.approx(np.full(len(radii), disc.radius), rel=1e-13)
+    assert corner_jacobians(section.mesh).min() > 0.1
+    assert graded_disc(section, x).spacing is not None
+
+
+def test_the_same_contact_is_found_on_both_meshes() -> None:
+    pressures = []
+    for mesh in ("uniform", "graded"):
+        section, x = _contact(2, mesh, p_s=0.0)
+        pressures.append(-(x[section.layout.part("rod")] * section.rod_areas).sum())
+    assert pressures[1] == pytest.approx(pressures[0], rel=3e-3)
+
+
+def test_no_more_unknowns() -> None:
+    graded, uniform = _contact(2)[0], _contact(2, "uniform")[0]
+    assert graded.layout.total == uniform.layout.total
+
+
+def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
+    """h* of graded density 8, outstroke: 0.2581 um at 25 and 0.5953 um at 100 mm/s."""
+    outcome = _curve(mesh="graded", density=2, stroke="out", speeds=(100.0, 25.0))
+    h = [state.h_star_um for state in outcome.states]
+    assert outcome.converged
+    assert h == pytest.approx([0.5953, 0.2581], rel=5e-3)
+    assert [state.verdict for state in outcome.states] == ["ok", "ok"]
+    uniform = _curve(mesh="uniform", density=2, stroke="out", speeds=(100.0, 25.0))
+    assert [state.verdict for state in uniform.states] == ["ok", "under-resolved"]
+
+
+def test_a_mesh_may_be_asked_for() -> None:
+    assert ORing().mesh == "graded"
+    assert _contact(1, "uniform")[0].disc.spacing is None

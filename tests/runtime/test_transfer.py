@@ -1,0 +1,55 @@
+"""From mesh to mesh: quadratic fields are carried over exactly, chains keep their bounds."""
+
+import numpy as np
+import pytest
+
+from runtime.mesh import Disc, disc_mesh
+from runtime.spacing import graded
+from runtime.transfer import transfer_chain, transfer_elements, transfer_nodes
+
+OLD = disc_mesh(Disc(0.0, 26.0, 1.7, -34.0, 43.0), 2)
+NEW = disc_mesh(
+    Disc(
+        *(0.0, 26.0, 1.7, -34.0, 43.0),
+        top=95.0,
+        layer_growth=15.0,
+        spacing=graded(2.28, (0.5, 1.6), 54, coarsest=0.1, rate=0.25),
+    ),
+    2,
+)
+
+
+def test_quadratic_fields_are_carried_over_exactly() -> None:
+    def field(points: np.ndarray) -> np.ndarray:
+        z, r = points[:, 0], points[:, 1] - 26.0
+        return np.stack([1.0 + z - r**2, z * r + 0.5 * z**2], axis=1)
+
+    assert transfer_nodes(OLD, NEW, field(OLD.points)) == pytest.approx(field(NEW.points), abs=1e-9)
+
+
+def test_a_cubic_field_is_not() -> None:
+    values = OLD.points[:, :1] ** 3
+    error = np.abs(transfer_nodes(OLD, NEW, values) - NEW.points[:, :1] ** 3).max()
+    assert 1e-9 < error < 1e-2
+
+
+def test_constant_element_values_stay_constant() -> None:
+    constant = np.full(len(OLD.quads), 7.0)
+    assert transfer_elements(OLD, NEW, constant) == pytest.approx(np.full(len(NEW.quads), 7.0))
+
+
+def test_a_mesh_is_carried_over_to_itself() -> None:
+    values = np.sin(3.0 * OLD.points)
+    assert transfer_nodes(OLD, OLD, values) == pytest.approx(values, abs=1e-12)
+
+
+@pytest.mark.parametrize("part", ["arc_nodes", "outer_nodes"])
+def test_a_chain_keeps_to_the_values_of_its_neighbours(part: str) -> None:
+    nodes, new_nodes = getattr(OLD, part), getattr(NEW, part)
+    values = np.zeros(len(nodes))
+    values[5:9] = -3.0
+    moved = transfer_chain(OLD, NEW, nodes, new_nodes, values)
+    assert moved.shape == (len(new_nodes),)
+    assert -3.0 <= moved.min() < -2.5
+    assert moved.max() <= 0.0
+    assert moved[[0, -1]].tolist() == [0.0, 0.0]
