@@ -2,7 +2,7 @@
 
 A line of length L is to have `count` segments whose size at s is
 
-    dx(s) = min(coarsest, finest + rate min_k |s - s_k|)
+    dx(s) = min(coarsest, min_k [a_k finest + rate |s - s_k|])
 
 with `finest` chosen such that they fill it. The map is that of the limit of many segments, so that
 the nodes of a mesh are among those of the mesh of twice its density.
@@ -25,6 +25,14 @@ _STATIONS = 20001  # points at which a size function is tabulated
 _STEPS = 27 * 64  # of the table of a map: nodes of every density up to 64 are entries of it
 
 
+@dataclass(frozen=True)
+class Spot:
+    """A place to be resolved: s_k in mm, a_k the size there relative to that of other spots."""
+
+    place: float
+    size: float = 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Spacing:
     """A monotone map of [0, 1] onto itself: where equal steps of index space lie on a line.
@@ -44,9 +52,9 @@ class Spacing:
 
 
 def graded(
-    length: float, spots: Sequence[float], count: int, *, coarsest: float, rate: float
+    length: float, spots: Sequence[Spot], count: int, *, coarsest: float, rate: float
 ) -> Spacing:
-    """The map of a line of `length` (mm) with `count` segments that resolves the spots s_k (mm).
+    """The map of a line of `length` (mm) with `count` segments that resolves the spots.
 
     coarsest: largest size, mm; rate: growth of the size with the distance from a spot.
     Raises ValueError where `count` segments of the coarsest size do not fill the line, or without
@@ -60,11 +68,13 @@ def graded(
             f"the coarsest size must be larger than {length / count:g} mm"
         )
     s = np.linspace(0.0, length, _STATIONS)
-    away = np.abs(s[:, None] - np.asarray(spots)).min(axis=1)
+    away = [rate * np.abs(s - spot.place) for spot in spots]
 
     def segments(log_finest: float) -> Array:
         """Number of segments (stations,) from the beginning of the line to s."""
-        size = np.minimum(coarsest, np.exp(log_finest) + rate * away)
+        finest = np.exp(log_finest)
+        wanted = [spot.size * finest + more for spot, more in zip(spots, away, strict=True)]
+        size = np.minimum(coarsest, np.min(wanted, axis=0))
         return np.asarray(cumulative_trapezoid(1.0 / size, s, initial=0))
 
     bounds = np.log(1e-6 * coarsest), np.log(coarsest)

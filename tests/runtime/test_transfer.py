@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from runtime.mesh import Disc, disc_mesh
-from runtime.spacing import graded
+from runtime.spacing import Spot, graded
 from runtime.transfer import transfer_chain, transfer_elements, transfer_nodes
 
 OLD = disc_mesh(Disc(0.0, 26.0, 1.7, -34.0, 43.0), 2)
@@ -13,7 +13,7 @@ NEW = disc_mesh(
         *(0.0, 26.0, 1.7, -34.0, 43.0),
         top=95.0,
         layer_growth=15.0,
-        spacing=graded(2.28, (0.5, 1.6), 54, coarsest=0.1, rate=0.25),
+        spacing=graded(2.28, (Spot(0.5), Spot(1.6)), 54, coarsest=0.1, rate=0.25),
     ),
     2,
 )
