@@ -22,7 +22,9 @@ from runtime.linear import Condenser
 from runtime.newton import Newton
 from runtime.problem import Problem
 
-LAYER = ("film", "rod", "sealed_arc")
+LAYER = ("film", "rod", "sealed_arc", "facet", "upwind")
+"""Blocks of the layer, as far as a section has them."""
+
 METHOD = "chord iterations on a frozen section"
 
 _LOOSE = 1e-2  # of the states on the way from contact to film, which are no results
@@ -45,8 +47,9 @@ class FastFilm:
         layout, nodes = section.layout, section.mesh.arc_nodes
         shared = np.concatenate([2 * nodes, 2 * nodes + 1, layout.dofs("rotation")])
         inner = np.setdiff1d(layout.dofs("pressure"), section.film_ends)
-        facets = ("facet",) if section.parameters.reynolds == "dg" else ()
-        layer = Layer.of(section.problem.assembler, (*LAYER, *facets), shared, inner)
+        present = [block.name for block in section.problem.assembler.blocks]
+        names = [name for name in LAYER if name in present]
+        layer = Layer.of(section.problem.assembler, names, shared, inner)
         closing = Newton(max_iterations=1, linear=linear)
         return cls(section, layer, FrozenBody(linear, Chord(), closing=closing))
 

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 REFERENCE_ORDER = 4
 """Order from which lower ones are reached."""
 
-_DISPLACEMENTS = {"film": 4, "facet": 6}  # columns of a dof map that are no pressures
+_DISPLACEMENTS = {"film": 4, "facet": 6, "upwind": 4}  # columns of a dof map that are no pressures
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +67,11 @@ class OrderPair:
             if name in given:
                 names = alone.assembler.block(name).kernel.parameters
                 both[f"higher_{name}"] = dict(zip(names, given[name].tolist(), strict=True))
-        both["higher_film"]["force_weight"] = 1.0 - share
-        shared = alone.with_parameters(film={"force_weight": share}, **both)
+        low = {}
+        for name in {"film", "upwind"} & given.keys():
+            both[f"higher_{name}"]["force_weight"] = 1.0 - share
+            low[name] = {"force_weight": share}
+        shared = alone.with_parameters(**low, **both)
         ends = self.both.layout.dofs("higher")[[0, -1]]
         return replace(
             shared,

@@ -47,6 +47,10 @@ class ORing(BaseModel):
         le=128,
         description="points of the film rule; 2 to 128, left out = automatic",
     )
+    upwinding: NonNegative = Field(
+        default=0.0,
+        description="strength c of the bubble-load upwinding; >= 0, 0 = the paper's scheme",
+    )
     solid: Literal["fbar", "taylor", "q4"] = Field(
         default="taylor", description='solid element; "fbar", "taylor" or "q4"'
     )
@@ -122,6 +126,11 @@ class ORing(BaseModel):
         le=120.0,
         description="air end of the lubricated arc, from the bottom [degrees]; > 0 to 120",
     )
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus in the initial configuration, mu of (3) [MPa]."""
+        return self.mu_1 + self.mu_2
 
     @field_validator("density", mode="before")
     @classmethod

@@ -123,6 +123,7 @@ def film_problem(section: OringSection, settings: PathSettings, film: Film) -> P
             "shear_weight": film.shear,
         },
         **({"facet": flow} if p.reynolds == "dg" else {}),
+        **({"upwind": _upwinding(section, film)} if p.upwinding else {}),
     )
     fixed = [section.film_ends, section.layout.dofs("rod")]
     values: list[Array | float] = [np.array([p_s, 0.0]), film.multipliers]
@@ -134,6 +135,19 @@ def film_problem(section: OringSection, settings: PathSettings, film: Film) -> P
         scales={**problem.scales, "pressure": film_scale(film.speed)},
         guards=(*problem.guards, film_guard(section)),
     )
+
+
+def _upwinding(section: OringSection, film: Film) -> dict[str, float]:
+    """Parameters of the term that moves the load of the pressure bubbles downstream."""
+    p = section.parameters
+    return {
+        "rod_radius": section.rod_radius,
+        "rod_speed": film.rod_speed,
+        "viscosity": p.viscosity,
+        "shear_modulus": p.shear_modulus,
+        "upwinding": p.upwinding * math.copysign(1.0, film.rod_speed),
+        "force_weight": film.weight,
+    }
 
 
 def squeeze_stage(section: OringSection, settings: PathSettings) -> Stage:

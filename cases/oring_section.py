@@ -164,22 +164,23 @@ def _blocks(
     candidates = {"rod": (mesh.arc_nodes, arc, layout.dofs("rod"))}
     for name in HOUSING:
         candidates[name] = (mesh.outer_nodes, mesh.outer_segments, layout.dofs(name))
-    stiffness = p.mu_1 + p.mu_2
+    film = ElementBlock(
+        "film",
+        load_kernel("film"),
+        _flat(points, arc),
+        gather_rows(displacement_dofs(arc), pressures),
+        rule=rule,
+    )
     return [
         ElementBlock("solid", load_kernel(f"solid_{p.solid}"), quads, quad_dofs),
         ElementBlock("sealed_side", follower, _flat(points, outer), displacement_dofs(outer)),
         ElementBlock("sealed_arc", follower, _flat(points, bottom), displacement_dofs(bottom)),
         *(
-            contact_block(obstacles[n], contact, points, c, stiffness)
+            contact_block(obstacles[n], contact, points, c, p.shear_modulus)
             for n, c in candidates.items()
         ),
-        ElementBlock(
-            "film",
-            load_kernel("film"),
-            _flat(points, arc),
-            gather_rows(displacement_dofs(arc), pressures),
-            rule=rule,
-        ),
+        film,
+        *([replace(film, name="upwind", kernel=load_kernel("film_upwind"))] if p.upwinding else []),
         *([_facets(p, mesh, pressures)] if p.reynolds == "dg" else []),
         ElementBlock(
             "rotation",

@@ -14,6 +14,7 @@ ALL: dict[str, Callable[[], Definition]] = {
     "follower_pressure": boundary.follower_pressure,
     "contact": contact.augmented_lagrangian,
     "film": film.reynolds_segment,
+    "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,
     "mean_rotation": support.mean_rotation,
     "axial_spring": support.axial_spring,

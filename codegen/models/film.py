@@ -1,7 +1,8 @@
-"""Lubricant film on the deformed boundary: Reynolds equation, its tractions, its DG facets.
+"""Lubricant film on the deformed boundary: Reynolds equation, tractions, upwinding, DG facets.
 
 The continuous (21) and the discontinuous (22) treatment share the segment; the pressure unknowns
 are joined at the nodes in the one, belong to one segment each in the other, which adds the facets.
+Both take the upwinding of the bubbles' load, a term of its own: without it they are the paper's.
 The boundary conditions (15) prescribe the end unknowns in both: dp vanishes there.
 """
 
@@ -11,6 +12,9 @@ import sympy as sp
 
 from codegen import quadrature, shapes
 from codegen.model import Definition, Model
+
+Vectors = list[list[sp.Symbol]]
+"""Components, and for each its values at the nodes."""
 
 
 def reynolds_segment() -> Definition:
@@ -37,11 +41,7 @@ def reynolds_segment() -> Definition:
     x = [[a + b for a, b in zip(X[c], u[c], strict=True)] for c in (0, 1)]
     z_xi, r_xi = (m.define(f"{n}_xi", (c[1] - c[0]) / 2) for n, c in zip("zr", x, strict=True))
     ds = m.define("ds", sp.sqrt(z_xi**2 + r_xi**2))
-    # Subtract the radii of the undeformed ring and rod first: h is 1e-5 of either.
-    clearance = [m.define(f"clearance_{a}", R - R_rod) for a, R in enumerate(X[1])]
-    nodal_h = [
-        m.define(f"h_{a}", c + v) for a, (c, v) in enumerate(zip(clearance, u[1], strict=True))
-    ]
+    nodal_h = _nodal_thickness(m, X, u, R_rod)
     h = m.define("h", shapes.interpolate(N, nodal_h), waist=True)
     r = m.define("r", R_rod + h)
     slope = m.define("slope", p_xi / z_xi)
@@ -71,6 +71,47 @@ def reynolds_segment() -> Definition:
         tau_rod=couette + poiseuille,
         eta=eta,
     )
+    return m.finish()
+
+
+def _nodal_thickness(m: Model, X: Vectors, u: Vectors, R_rod: sp.Symbol) -> list[sp.Symbol]:
+    """h at the nodes; the radii of undeformed ring and rod come first: h is 1e-5 of either."""
+    clearance = [m.define(f"clearance_{a}", R - R_rod) for a, R in enumerate(X[1])]
+    return [m.define(f"h_{a}", c + v) for a, (c, v) in enumerate(zip(clearance, u[1], strict=True))]
+
+
+def bubble_load() -> Definition:
+    """Upwinding of the load of the pressure bubbles, for any pressure order; none of m_p = 1.
+
+    p_b is p less its linear interpolant between the ends of the segment. Of its radial load B, the
+    integral of 2 pi r p_b n_r ds, (18) gives each node about a half; this term takes
+    (c delta / 2) B from node 1 to node 2. delta = Pe^2 / (9 + Pe^2) and
+    Pe = 3 eta_0 |ubar| dx^2 / (pi G h_m^3), h_m the mean of the nodal film thicknesses, compare the
+    oil with the elasticity of the seal (docs/film-without-oscillations.md).
+    """
+    m = Model("film_upwind", nodes=2, rule=quadrature.gauss(2, 1), doc=bubble_load.__doc__ or "")
+    X = m.coordinates("Z", "R")
+    u = m.nodal_unknowns("u_z", "u_r")
+    _, p_xi = m.interpolated("p")
+    R_rod, U, eta_0, G, c, force_weight = m.parameters(
+        rod_radius="radius of the rod [mm]",
+        rod_speed="rod speed U, positive towards the air side [mm/s]",
+        viscosity="viscosity at zero pressure [MPa s]",
+        shear_modulus="shear modulus G of the seal, mu_1 + mu_2 of (3) [MPa]",
+        upwinding="strength c, signed like U: the load goes downstream",
+        force_weight="factor on the nodal forces",
+    )
+    (xi,) = m.point()
+    z_xi = m.define("z_xi", (X[0][1] + u[0][1] - X[0][0] - u[0][0]) / 2)
+    h = _nodal_thickness(m, X, u, R_rod)
+    h_m = m.define("h_m", (h[0] + h[1]) / 2)
+    peclet = m.define("peclet", 6 * eta_0 * U * z_xi**2 / (sp.pi * G * h_m**3))
+    delta = m.define("delta", peclet**2 / (9 + peclet**2))
+    # p_b vanishes at both ends: the integral of r p_b is that of -W p_b', with W' = r, and also
+    # of -W p', where the integral of W is zero.
+    W = m.define("W", (R_rod + h_m) * xi + (h[1] - h[0]) / 2 * (xi**2 / 2 - sp.Rational(1, 6)))
+    moved = m.define("moved", sp.pi * force_weight * c * delta * z_xi)
+    m.weak_form([(moved * W * p_xi, u[1][1] - u[1][0])])
     return m.finish()
 
 

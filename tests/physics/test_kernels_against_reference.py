@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from runtime.kernels import load_kernel
-from tests.reference import film, material, oracles, rules, solids
+from tests.reference import film, material, oracles, rules, solids, upwind
 from tests.reference.calling import call, rule_of
-from tests.reference.differentiate import Matrix, Vector, hessian, jacobian, numbers
+from tests.reference.differentiate import PI, Matrix, Vector, hessian, jacobian, numbers
 from tests.reference.states import SOLIDS, State, all_states, thin_film_states
 
 STATES = all_states()
@@ -159,6 +159,8 @@ def test_tangent_without_a_term_is_rejected() -> None:
         (pick("film_facet", "m3-out"), facet_on_a_fixed_domain),
         (pick("film_facet", "m3-out"), facet_with_the_printed_signs),
         (pick("film_facet", "m4-thin"), facet_without_barus),
+        (pick("film_upwind", "m3-gauss-out-pressed"), upwinding_with_frozen_delta),
+        (pick("film_upwind", "m2-lobatto-in-crossing"), upwinding_of_the_whole_pressure),
     ):
         kernel = call("tangent", state)[1][0]
         errors = oracles.tangent_errors(kernel, dropped(state), state.family)
@@ -235,6 +237,32 @@ def facet_with_the_printed_signs(state: State) -> Matrix:
 
 def facet_without_barus(state: State) -> Matrix:
     return oracles.tangent(replace(state, parameters=(*state.parameters[:3], 0.0)))
+
+
+def upwinding_with_frozen_delta(state: State) -> Matrix:
+    """Only the bubble load differentiated, at a constant share of it."""
+    X, u, parameters = exact_arguments(state)
+    factor = parameters[4] * parameters[5] * upwind.share(X, u, parameters) / 2
+
+    def residual(v: Vector) -> Vector:
+        moved = factor * upwind.bubble_load(X, v, v[4:])
+        return [0, -moved, 0, moved] + [0] * (len(v) - 4)
+
+    return jacobian(residual, u)
+
+
+def upwinding_of_the_whole_pressure(state: State) -> Matrix:
+    """The linear part of the pressure left in the load that is moved."""
+    X, u, parameters = exact_arguments(state)
+
+    def residual(v: Vector) -> Vector:
+        z1, r1, z2, r2 = (X[i] + v[i] for i in range(4))
+        interpolant = (v[4] * (2 * r1 + r2) + v[-1] * (r1 + 2 * r2)) / 6 * (z2 - z1)
+        load = upwind.bubble_load(X, v, v[4:]) - 2 * PI * interpolant
+        moved = parameters[4] * parameters[5] * upwind.share(X, v, parameters) / 2 * load
+        return [0, -moved, 0, moved] + [0] * (len(v) - 4)
+
+    return jacobian(residual, u)
 
 
 # ------------------------------------------------------------- the references are tested on theory

@@ -16,7 +16,7 @@ def rule_of(state: State) -> Any:
     """The double-precision rule that goes with a state (None: the kernel's own)."""
     if state.family == "film_facet":
         return rules.facet_rule((len(state.dofs) - 6) // 2 - 1)
-    if state.family != "film":
+    if state.family not in ("film", "film_upwind"):
         return None
     return rules.film_rule(len(state.dofs) - 5, state.kind, state.count)
 

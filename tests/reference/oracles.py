@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.reference import boundary, facet, film, section, solids
+from tests.reference import boundary, facet, film, section, solids, upwind
 from tests.reference.differentiate import Matrix, Number, Vector, mpf, numbers
 from tests.reference.states import State
 
@@ -52,6 +52,7 @@ RESIDUALS: dict[str, Oracle] = {
     "follower_pressure": _single(boundary.residual_pressure),
     "contact": _contact(boundary.residual_contact),
     "film": _film(film.residual_film),
+    "film_upwind": _plain(upwind.residual_upwind),
     "film_facet": _plain(facet.residual_facet),
     "mean_rotation": _plain(section.residual_rotation),
     "axial_spring": _single(section.residual_spring),
@@ -63,6 +64,7 @@ TANGENTS: dict[str, Oracle] = {
     "follower_pressure": _single(boundary.tangent_pressure),
     "contact": _contact(boundary.tangent_contact),
     "film": _film(film.tangent_film),
+    "film_upwind": _plain(upwind.tangent_upwind),
     "film_facet": _plain(facet.tangent_facet),
     "mean_rotation": _plain(section.tangent_rotation),
     "axial_spring": _single(section.tangent_spring),
@@ -111,7 +113,8 @@ def fields(state: State) -> Matrix:
 
 def blocks(family: str, count: int) -> tuple[Block, ...]:
     """Groups of unknowns of one kind: displacements, and pressures or multipliers."""
-    split = {"contact": 2, "film": 4, "film_facet": 6, "mean_rotation": 8}.get(family, count)
+    known = {"contact": 2, "film": 4, "film_upwind": 4, "film_facet": 6, "mean_rotation": 8}
+    split = known.get(family, count)
     rest = () if split == count else (("p", slice(split, count)),)
     return (("u", slice(0, split)), *rest)
 

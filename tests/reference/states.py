@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -176,6 +177,15 @@ def facet_states(orders: tuple[int, ...] = ORDERS) -> Iterator[State]:
             yield State("film_facet", f"m{order}-{label}", _tuple(X), dofs, parameters)
 
 
+def upwind_states(orders: tuple[int, ...] = ORDERS[1:]) -> Iterator[State]:
+    """Both rules and strokes; delta small, in between and nearly 1; m_p = 1 has no such load."""
+    for state in film_states(orders):
+        speed, weight = state.parameters[1], state.parameters[5]
+        strength = math.copysign({400.0: 1.0, -100.0: 0.5, 1600.0: 0.8}[speed], speed)
+        parameters = (25.0, speed, 6.59e-8, 3.66, strength, weight)
+        yield replace(state, family="film_upwind", parameters=parameters)
+
+
 def thin_film_states() -> Iterator[State]:
     """A film of about 0.3 micrometres at a radius of 25 mm: h must not be lost in r - R_rod."""
     for state in film_states((4,)):
@@ -187,4 +197,4 @@ def thin_film_states() -> Iterator[State]:
 def all_states() -> list[State]:
     """Every state of every family."""
     bodies = [*solid_states(), *boundary_states(), *section_states()]
-    return [*bodies, *film_states(), *facet_states()]
+    return [*bodies, *film_states(), *upwind_states(), *facet_states()]

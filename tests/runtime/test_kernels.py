@@ -39,6 +39,8 @@ VALUES = {
     "polar_moment": 7.6,
     "angle": 0.05,
     "stiffness": 0.4,
+    "shear_modulus": 3.66,
+    "upwinding": 1.0,
 }
 MATERIAL = np.array([3.04, 0.62, 500.0])
 Call = Callable[..., Any]
@@ -84,6 +86,7 @@ def test_families_offer_what_the_contract_says() -> None:
         "follower_pressure": (2, 4),
         "contact": (1, 3),
         "film": (2, 4),
+        "film_upwind": (2, 4),
         "film_facet": (3, 6),
         "mean_rotation": (4, 9),
         "axial_spring": (4, 8),

@@ -1,0 +1,49 @@
+"""Upwinding of the bubble load of a film segment, by integrals in which p_b itself stands.
+
+Unknowns: u_z1 u_r1 u_z2 u_r2 and the pressures at the Gauss-Lobatto-Legendre points, end 1 to 2.
+Parameters: rod_radius rod_speed viscosity shear_modulus upwinding force_weight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.rules import gauss, lagrange, lobatto
+
+
+def bubble_load(X: Sequence[Number], dofs: Sequence[Number], pressures: Sequence[Number]) -> Number:
+    """Integral of 2 pi r p_b n_r ds, p_b = p - its linear interpolant, n_r ds = -dz, N."""
+    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    nodes = lobatto(len(pressures))[0]
+    total = mpf(0)
+    for xi, weight in zip(*gauss(len(pressures) // 2 + 1), strict=True):
+        one, two = (1 - xi) / 2, (1 + xi) / 2
+        p = mp.fdot(lagrange(nodes, xi)[0], pressures)
+        p_b = p - one * pressures[0] - two * pressures[-1]
+        total -= 2 * PI * (one * r1 + two * r2) * p_b * weight * (z2 - z1) / 2
+    return total
+
+
+def share(X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number]) -> Number:
+    """delta = Pe^2 / (9 + Pe^2), Pe = 3 eta_0 |U / 2| dx^2 / (pi G h_m^3)."""
+    rod_radius, speed, viscosity, shear_modulus = parameters[:4]
+    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    h_m = (r1 + r2) / 2 - rod_radius
+    peclet = 3 * viscosity * abs(speed) / 2 * (z2 - z1) ** 2 / (PI * shear_modulus * h_m**3)
+    return peclet**2 / (9 + peclet**2)
+
+
+def residual_upwind(
+    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number]
+) -> Vector:
+    """Radial forces (N) that are taken from node 1 and given to node 2."""
+    strength, force_weight = parameters[4:]
+    factor = force_weight * strength * share(X, dofs, parameters) / 2
+    moved = factor * bubble_load(X, dofs, dofs[4:])
+    return [mpf(0), -moved, mpf(0), moved] + [mpf(0)] * (len(dofs) - 4)
+
+
+def tangent_upwind(X: Sequence[Number], dofs: Vector, parameters: Sequence[Number]) -> Matrix:
+    """Differences of the residual."""
+    return jacobian(lambda v: residual_upwind(X, v, parameters), dofs)
