@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cases.observer import FilmState, Observer, Outcome, Silent
     from cases.oring import run as run_oring
     from cases.oring_parameters import ORing
+    from cases.sweep import Curve, solve_cases
     from codegen import kinematics, quadrature, shapes
     from codegen.model import Definition, Model
     from runtime.assembly import Assembler, ElementBlock
@@ -33,6 +34,7 @@ _PUBLIC = {
     "Assembler": "runtime.assembly",
     "Branch": "runtime.solution",
     "Continuation": "runtime.continuation",
+    "Curve": "cases.sweep",
     "DofLayout": "runtime.dofs",
     "ElementBlock": "runtime.assembly",
     "FilmState": "cases.observer",
@@ -46,6 +48,7 @@ _PUBLIC = {
     "Solution": "runtime.solution",
     "Status": "runtime.solution",
     "run_oring": "cases.oring:run",
+    "solve_cases": "cases.sweep",
 }
 _MODELLING = {
     "Definition": "codegen.model",
@@ -60,6 +63,7 @@ __all__ = [
     "Assembler",
     "Branch",
     "Continuation",
+    "Curve",
     "Definition",
     "DofLayout",
     "ElementBlock",
@@ -80,6 +84,7 @@ __all__ = [
     "quadrature",
     "run_oring",
     "shapes",
+    "solve_cases",
 ]
 
 

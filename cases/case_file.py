@@ -12,6 +12,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,14 +42,19 @@ class BadInput(click.ClickException):
 
 @dataclass(frozen=True)
 class Case:
-    """A named case with its checked parameters."""
+    """A named case with its checked parameters.
+
+    contacts: folder in which runs leave their contact states for each other, None for none.
+    """
 
     name: str
     parameters: ORing
+    contacts: Path | None = None
 
     def load_solve(self) -> Solve:
         """Import the module of the case (late: it is heavy) and return its `run`."""
-        solve: Solve = importlib.import_module(SHIPPED[self.name][1]).run
+        run = importlib.import_module(SHIPPED[self.name][1]).run
+        solve: Solve = partial(run, contacts=self.contacts) if self.contacts else run
         return solve
 
 

@@ -152,6 +152,7 @@ class Observer(Protocol):
 
     def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
         """A stage begins.  steps: how many are expected, None if the path decides."""
+        return None
 
     def step(
         self,
@@ -168,12 +169,15 @@ class Observer(Protocol):
         parameter: its value.  residuals: norms of Newton's iterates.  fraction: share of the stage
         done in [0, 1], if known.
         """
+        return None
 
     def contact_state(self, state: ContactState) -> None:
         """The contact stage is done."""
+        return None
 
     def film_state(self, state: FilmState) -> None:
         """A requested speed converged: keep it now."""
+        return None
 
 
 class Silent(Observer):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cases.contact_store import ContactStore, stored_contact
 from cases.observer import FilmState, Observer, Outcome, StageRecord
 from cases.oring_contact import ContactRoute
 from cases.oring_fast import FastFilm
@@ -49,6 +52,7 @@ class _Run:
     states: list[FilmState] = field(default_factory=list)
     stopped: list[tuple[Status, str]] = field(default_factory=list)
     prefix: str = ""
+    contacts: ContactStore = field(default_factory=ContactStore)
 
     def walk(self, stage: Stage, x: Array) -> Array:
         """Unknowns at the end of a stage; raises Stopped if it is not reached."""
@@ -61,7 +65,7 @@ class _Run:
 
     def contact(self, parameters: ORing) -> Array:
         """First stage, shared by both strokes; settles the mesh, that is the section."""
-        route = ContactRoute(self.settings, self.walk)
+        route = ContactRoute(self.settings, self.walk, self.walker.newton, self.contacts)
         self.section, x = route.contact(parameters)
         p_s = parameters.sealed_pressure
         problem = contact_problem(self.section, self.settings, p_s)
@@ -185,11 +189,16 @@ def run(
     observer: Observer,
     settings: PathSettings | None = None,
     walker: Walker | None = None,
+    contacts: Path | None = None,
 ) -> Outcome:
-    """Solve the O-ring and report to the observer; failure is in the outcome's status."""
+    """Solve the O-ring and report to the observer; failure is in the outcome's status.
+
+    contacts: folder of contact states (`cases.contact_store`) to start from and to add to.
+    """
     section = build_section(parameters)
     walker = walker or Walker(Newton(max_iterations=10, linear=choose(parameters.linear)))
     progress = _Run(section, observer, settings or PathSettings(), walker)
+    progress.contacts = ContactStore(contacts)
     strokes: tuple[Stroke, ...] = ("out", "in")
     wanted = strokes if parameters.stroke == "both" else (parameters.stroke,)
     try:

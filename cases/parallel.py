@@ -1,91 +1,56 @@
-"""Runs of a case side by side, in one process each, that report as if they ran here."""
+"""Work that is spread over processes or machines, by the standard `concurrent.futures.Executor`.
+
+Any executor will do: :func:`processes` on this machine, Dask's `client.get_executor()` or mpi4py's
+`MPIPoolExecutor` on a cluster. Functions, arguments and results cross by pickle, and so do errors,
+which are raised here as what they are.
+"""
 
 import multiprocessing
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from multiprocessing.connection import wait
+from threading import Thread
+from typing import TypeVar
 
-from cases.case_file import BadInput, Solve
-from cases.observer import ContactState, FilmState, Observer, Outcome
-from cases.oring_parameters import ORing
-from runtime.kernels import MissingKernelsError, StaleKernelsError
-
-_Call = tuple[str, tuple[object, ...], dict[str, Any]]
+T = TypeVar("T")
+R = TypeVar("R")
 
 
-def solve_side_by_side(
-    solve: Solve, runs: Sequence[ORing], observers: Sequence[Observer]
-) -> list[Outcome]:
-    """Run each parameter set in its own process and return the outcomes in the order of `runs`.
-
-    The observers are called in this process.  solve must be importable by name.  Raises BadInput
-    for kernels to be built, RuntimeError if a process dies; the other processes are then ended.
-    """
-    # two processes of several threads each would only get in each other's way
+def processes(count: int) -> ProcessPoolExecutor:
+    """Fresh processes on this machine, of one thread each, that end when this one is killed."""
+    # several processes of several threads each would only get in each other's way
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     context = multiprocessing.get_context("spawn")
-    lanes: dict[Connection, int] = {}
-    processes = []
+    return ProcessPoolExecutor(count, mp_context=context, initializer=_end_with_parent)
+
+
+def completed(
+    function: Callable[[T], R], tasks: Sequence[T], executor: Executor | None
+) -> Iterator[tuple[int, R]]:
+    """(number of the task, its result) as they come in; without an executor one by one, here.
+
+    Raises what a task raises, and then cancels those that have not begun.
+    """
+    if executor is None:
+        yield from enumerate(map(function, tasks))
+        return
+    futures: dict[Future[R], int] = {executor.submit(function, t): n for n, t in enumerate(tasks)}
     try:
-        for number, run in enumerate(runs):
-            receiver, sender = context.Pipe(duplex=False)
-            process = context.Process(target=_run_lane, args=(solve, run, sender), daemon=True)
-            process.start()
-            sender.close()  # so that the receiver sees the end when the process ends
-            processes.append(process)
-            lanes[receiver] = number
-        return _collect(lanes, observers)
+        for future in as_completed(futures):
+            yield futures[future], future.result()
     finally:
-        for process in processes:
-            process.terminate()
-            process.join()
+        for future in futures:
+            future.cancel()
 
 
-def _collect(lanes: dict[Connection, int], observers: Sequence[Observer]) -> list[Outcome]:
-    """Make the calls that arrive, until every lane has sent its outcome."""
-    outcomes: dict[int, Outcome] = {}
-    while len(outcomes) < len(lanes):
-        waiting = [receiver for receiver, lane in lanes.items() if lane not in outcomes]
-        for receiver in wait(waiting):
-            assert isinstance(receiver, Connection)
-            lane = lanes[receiver]
-            try:
-                message: _Call | Outcome | BadInput = receiver.recv()
-            except EOFError:
-                raise RuntimeError("a run side by side ended without an outcome") from None
-            if isinstance(message, BadInput):
-                raise message
-            if isinstance(message, Outcome):
-                outcomes[lane] = message
-            else:
-                method, args, details = message
-                getattr(observers[lane], method)(*args, **details)
-    return [outcomes[lane] for lane in range(len(lanes))]
+def _end_with_parent() -> None:
+    """Let this process end when the one that started it does, however it does."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        Thread(target=_end_after, args=(parent.sentinel,), daemon=True).start()
 
 
-def _run_lane(solve: Solve, run: ORing, sender: "Connection[Any, Any]") -> None:
-    try:
-        sender.send(solve(run, _Forwarder(sender)))
-    except (MissingKernelsError, StaleKernelsError) as error:
-        sender.send(BadInput(str(error)))
-
-
-@dataclass(frozen=True)
-class _Forwarder(Observer):
-    """The observer inside a process of its own: sends each call to the other side."""
-
-    sender: "Connection[Any, Any]"
-
-    def stage(self, name: str, **details: Any) -> None:
-        self.sender.send(("stage", (name,), details))
-
-    def step(self, **details: Any) -> None:
-        self.sender.send(("step", (), details))
-
-    def contact_state(self, state: ContactState) -> None:
-        self.sender.send(("contact_state", (state,), {}))
-
-    def film_state(self, state: FilmState) -> None:
-        self.sender.send(("film_state", (state,), {}))
+def _end_after(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)

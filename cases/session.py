@@ -10,6 +10,7 @@ import click
 from cases import report
 from cases.case_file import BadInput, Case
 from cases.curve import CurveRow
+from cases.lanes import solve_side_by_side
 from cases.observer import (
     OSCILLATING,
     UNDER_RESOLVED,
@@ -19,7 +20,6 @@ from cases.observer import (
     Outcome,
 )
 from cases.oring_parameters import ORing
-from cases.parallel import solve_side_by_side
 from cases.progress import Display, make_display
 from cases.record import RunRecord, StageLog, strokes_of
 from runtime.kernels import MissingKernelsError, StaleKernelsError

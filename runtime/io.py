@@ -10,6 +10,7 @@ import io
 import json
 import math
 import os
+import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,12 +22,14 @@ Cell = float | int | str
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
     """Give a path to write to; move it over `path` if the block succeeds, remove it if not.
 
-    The name is fixed, so what a killed run leaves behind is overwritten by the next one.
+    Its name is fixed, so what a killed run leaves behind is overwritten by the next one; where
+    several processes may write the file (shared), each has a name of its own.
     """
-    temporary = path.with_name(f".{path.name}.part")
+    own = f".{uuid.uuid4().hex}" if shared else ""
+    temporary = path.with_name(f".{path.name}{own}.part")
     try:
         yield temporary
         os.replace(temporary, path)
@@ -38,6 +41,22 @@ def write_text(path: Path, text: str) -> None:
     """Write UTF-8 text atomically.  Raises OSError."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_arrays(path: Path, arrays: Mapping[str, NDArray[np.float64]]) -> None:
+    """Write named arrays (.npz), atomically also for several processes at once.  OSError."""
+    named: dict[str, Any] = dict(arrays)
+    with replacing(path, shared=True) as temporary, temporary.open("wb") as file:
+        np.savez(file, **named)
+
+
+def read_arrays(path: Path) -> dict[str, NDArray[np.float64]] | None:
+    """What :func:`write_arrays` wrote; None if the file is missing or anything is wrong with it."""
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
+            return {name: np.asarray(content[name], dtype=np.float64) for name in content.files}
+    except Exception:  # damage may show as almost anything: in the archive, a header, the data
+        return None
 
 
 def number_text(value: float) -> str:

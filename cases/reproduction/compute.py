@@ -1,11 +1,8 @@
 """Computing the runs that items need: each once, several at a time, and none that is complete."""
 
-import multiprocessing
-import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
-from pathlib import Path
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 import click
 from rich.console import Console
@@ -13,10 +10,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from cases.case_file import Case
 from cases.oring_parameters import ORing
-from cases.progress import Display
+from cases.parallel import processes
 from cases.record import strokes_of
 from cases.reproduction.states import ENDED, Request, Store
-from cases.session import record_case
+from cases.sweep import CONTACTS, Curve, Task, solved
 from runtime.io import read_json
 
 
@@ -28,14 +25,16 @@ def compute(requests: Sequence[Request], store: Store, *, resume: bool, jobs: in
     """
     waiting = [r for r in requests if not (resume and is_complete(r, store))]
     tasks = [
-        (_case(request, store, resume), store.run_folder(request.setup)) for request in waiting
+        Task(_case(request, store, resume), store.run_folder(request.setup), resume)
+        for request in waiting
     ]
-    with _progress(len(tasks)) as advance:
-        if jobs == 1:
-            for case, folder in tasks:
-                advance(_run(case, folder, resume), folder)
-        else:
-            _in_processes([(*task, resume) for task in tasks], jobs, advance)
+    with _progress(len(tasks)) as advance, _executor(jobs) as executor:
+        for curve in solved(tasks, executor):
+            advance(curve)
+
+
+def _executor(jobs: int) -> AbstractContextManager[Executor | None]:
+    return processes(jobs) if jobs > 1 else nullcontext()
 
 
 def is_complete(request: Request, store: Store) -> bool:
@@ -56,7 +55,8 @@ def _case(request: Request, store: Store, resume: bool) -> Case:
     if earlier:
         signs = {"out": (1.0,), "in": (-1.0,), "both": (1.0, -1.0)}[earlier[1].stroke]
         speeds |= {sign * u for sign in signs for u in earlier[1].speeds}
-    return Case("oring", Request(request.setup, frozenset(speeds)).parameters)
+    parameters = Request(request.setup, frozenset(speeds)).parameters
+    return Case("oring", parameters, store.folder / CONTACTS)
 
 
 def _earlier(request: Request, store: Store) -> tuple[str, ORing] | None:
@@ -69,36 +69,16 @@ def _earlier(request: Request, store: Store) -> tuple[str, ORing] | None:
         return None
 
 
-def _run(case: Case, folder: Path, resume: bool) -> list[str]:
-    _, complaints = record_case(case, folder, resume=resume, jobs=1, display=Display())
-    return complaints
-
-
-def _in_processes(tasks: Sequence[tuple[Case, Path, bool]], jobs: int, advance: "_Advance") -> None:
-    # several processes of several threads each would only get in each other's way
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        running: dict[Future[list[str]], Path] = {pool.submit(_run, *t): t[1] for t in tasks}
-        try:
-            while running:
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in done:
-                    advance(future.result(), running.pop(future))
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
 class _Advance:
-    """Called with what a run did not reach, and its folder, when it ends."""
+    """Called with each curve when it is there."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self.progress, self.total, self.done = progress, total, 0
         self.task = progress.add_task("runs", total=total) if progress else None
 
-    def __call__(self, complaints: list[str], folder: Path) -> None:
+    def __call__(self, curve: Curve) -> None:
         self.done += 1
-        note = f"{folder.name}: {'; '.join(complaints) if complaints else 'done'}"
+        note = f"{curve.folder.name}: {'; '.join(curve.complaints) or 'done'}"
         if self.progress and self.task is not None:
             self.progress.update(self.task, advance=1)
             self.progress.console.print(note, highlight=False, markup=False)

@@ -1,0 +1,225 @@
+"""Contact states that runs share: found again, verified, prolonged, and never trusted."""
+
+import shutil
+import threading
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cases.contact_store import WITHOUT_INFLUENCE, ContactStore, contact_key, stored_contact
+from cases.observer import Outcome, Silent
+from cases.oring import run
+from cases.oring_parameters import ORing
+from cases.oring_path import PathSettings, contact_problem
+from cases.oring_section import build_section
+from cases.stages import Walker
+from runtime.io import read_arrays, write_arrays
+from runtime.newton import Newton
+
+Damage = Callable[[Path, np.random.Generator], None]
+STORED = "newton, from a stored contact state"
+OTHER = {
+    "pressure_order": 3,
+    "reynolds": "dg",
+    "quadrature": "lobatto",
+    "quadrature_points": 7,
+    "stroke": "in",
+    "speeds": (400.0,),
+    "pressure_viscosity": 0.0,
+    "shear_traction": False,
+    "rotation": "free",
+    "solver": "monolithic",
+    "linear": "superlu",
+    "viscosity": 1e-7,
+    "cavitation_penalty": 2e4,
+}
+"""Another value of every parameter that the contact stage does not know."""
+
+CHANGED = {
+    "density": 2,
+    "solid": "fbar",
+    "sealed_pressure": 0.25,
+    "inner_diameter": 50.4,
+    "section_diameter": 3.54,
+    "rod_diameter": 50.01,
+    "housing_diameter": 56.29,
+    "mu_1": 3.0,
+    "mu_2": 0.6,
+    "bulk_modulus": 400.0,
+    "groove_width": 3.75,
+    "groove_centre": 0.01,
+    "arc_start": -33.0,
+    "arc_end": 42.0,
+}
+
+
+def case(**changes: Any) -> ORing:
+    given = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (1600.0,)}
+    return ORing(**{**given, **changes})
+
+
+def names(outcome: Outcome) -> list[str]:
+    return [stage.name for stage in outcome.stages if stage.stroke == "both"]
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
+    """A folder with the one contact state of `case()`, and the run that left it."""
+    folder = tmp_path_factory.mktemp("solved")
+    return folder, run(case(), Silent(), contacts=folder)
+
+
+@pytest.fixture
+def contacts(solved: tuple[Path, Outcome], tmp_path: Path) -> Path:
+    """A copy of that folder."""
+    return shutil.copytree(solved[0], tmp_path / "contacts")
+
+
+@cache
+def plain(**changes: Any) -> Outcome:
+    return run(case(**changes), Silent())
+
+
+def test_every_parameter_either_matters_or_does_not() -> None:
+    assert set(OTHER) == set(WITHOUT_INFLUENCE)
+    assert set(CHANGED) == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
+    key = contact_key(case())
+    assert contact_key(case(**OTHER)) == key
+    keys = {contact_key(case(**{name: value})) for name, value in CHANGED.items()}
+    assert len(keys | {key}) == len(CHANGED) + 1
+
+
+def test_a_second_curve_has_no_contact_path(solved: tuple[Path, Outcome], contacts: Path) -> None:
+    first = solved[1]
+    assert names(first) == ["squeeze", "sealed pressure"]
+    second = run(case(stroke="both"), Silent(), contacts=contacts)
+    assert second.converged, second.message
+    assert names(second) == ["contact at density 1"]
+    assert (second.stages[0].method, second.stages[0].factorisations) == (STORED, 0)
+    assert second.stages[0].residual_histories[-1][-1] < 1e-8  # it was looked at
+    assert second.states[0].h_star_um == pytest.approx(plain().states[0].h_star_um, rel=1e-10)
+    assert first.states[0].h_star_um == plain().states[0].h_star_um
+
+
+def test_a_state_holds_whatever_the_film_is(contacts: Path) -> None:
+    def residual(of: ORing) -> float:
+        section = build_section(of)
+        problem = contact_problem(section, PathSettings(), 0.5)
+        return problem.norm(problem.residual(ContactStore(contacts).read(section)))
+
+    assert max(residual(case()), residual(case(**OTHER))) < 1e-8
+    (path,) = contacts.iterdir()
+    path.rename(contacts / f"{contact_key(case(mu_2=0.62001))}.npz")
+    assert residual(case(mu_2=0.62001)) > 1e-6
+
+
+def test_a_coarser_state_is_prolonged(contacts: Path) -> None:
+    fine = run(case(density=2), Silent(), contacts=contacts)
+    assert names(fine) == ["contact at density 1", "contact at density 2"]
+    assert [s.method for s in fine.stages[:2]] == [STORED, "newton, prolonged from density 1"]
+    expected = plain(density=2).states[0].h_star_um
+    assert fine.states[0].h_star_um == pytest.approx(expected, rel=1e-10)
+    assert ContactStore(contacts).densities(case(), (1, 2, 4)) == [2, 1]
+
+
+def test_the_reference_takes_no_part(contacts: Path) -> None:
+    reference = run(case(solver="monolithic"), Silent(), contacts=contacts)
+    assert names(reference) == ["squeeze", "sealed pressure"]
+
+
+def cut(path: Path, rng: np.random.Generator) -> None:
+    path.write_bytes(path.read_bytes()[:2000])
+
+
+def overwrite(path: Path, rng: np.random.Generator) -> None:
+    content = bytearray(path.read_bytes())
+    content[500:600] = rng.bytes(100)
+    path.write_bytes(bytes(content))
+
+
+def empty(path: Path, rng: np.random.Generator) -> None:
+    path.write_bytes(b"")
+
+
+def shorten(path: Path, rng: np.random.Generator) -> None:
+    parts = read_arrays(path)
+    assert parts is not None
+    write_arrays(path, parts | {"displacement": parts["displacement"][:-2]})
+
+
+def falsify(path: Path, rng: np.random.Generator) -> None:
+    parts = read_arrays(path)
+    assert parts is not None
+    write_arrays(path, {name: rng.normal(size=part.shape) for name, part in parts.items()})
+
+
+def spoil(path: Path, rng: np.random.Generator) -> None:
+    parts = read_arrays(path)
+    assert parts is not None
+    parts["rod"][3] = np.inf
+    write_arrays(path, parts)
+
+
+@pytest.mark.parametrize("damage", [cut, overwrite, empty, shorten, spoil])
+def test_damage_is_seen(damage: Damage, contacts: Path, rng: np.random.Generator) -> None:
+    section, store, (path,) = build_section(case()), ContactStore(contacts), contacts.iterdir()
+    assert np.isfinite(store.read(section)).all()
+    damage(path, rng)
+    assert not np.isfinite(store.read(section)).all()
+
+
+@pytest.mark.parametrize("damage", [overwrite, falsify])
+def test_a_damaged_state_costs_little_and_is_replaced(
+    damage: Damage, contacts: Path, rng: np.random.Generator
+) -> None:
+    (path,) = contacts.iterdir()
+    before = path.read_bytes()
+    damage(path, rng)
+    outcome = run(case(), Silent(), contacts=contacts)
+    assert names(outcome) == ["contact at density 1", "squeeze", "sealed pressure"]
+    refused = outcome.stages[0]
+    assert refused.method.startswith(f"{STORED}; ended: ")
+    assert (refused.factorisations or 0) <= 10
+    assert outcome.states[0].h_star_um == plain().states[0].h_star_um
+    assert path.read_bytes() == before
+
+
+def test_a_stale_state_is_corrected(contacts: Path) -> None:
+    changed = build_section(case(mu_2=0.63))
+    (path,) = contacts.iterdir()
+    path.rename(contacts / f"{contact_key(changed.parameters)}.npz")
+    stage = stored_contact(changed, PathSettings(), Newton())
+    branch, record = Walker().walk(stage, ContactStore(contacts).read(changed), Silent())
+    assert branch.converged
+    assert 0 < (record.factorisations or 0) <= 5
+    assert record.residual_histories[-1][-1] < 1e-8
+
+
+def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    section = build_section(case())
+    store = ContactStore(tmp_path / "file")
+    store.keep(section, section.at_rest())
+    assert store.densities(case(), (1, 2)) == []
+
+
+def test_several_writers_never_show_half_a_state(tmp_path: Path) -> None:
+    path = tmp_path / "state.npz"
+    write_arrays(path, {"x": np.zeros(1000)})
+
+    def write(value: float) -> None:
+        for _ in range(100):
+            write_arrays(path, {"x": np.full(1000, value)})
+
+    writers = [threading.Thread(target=write, args=(float(n),)) for n in range(3)]
+    for writer in writers:
+        writer.start()
+    while any(writer.is_alive() for writer in writers):
+        parts = read_arrays(path)
+        assert parts is not None
+        assert np.ptp(parts["x"]) == 0.0
+    assert list(tmp_path.iterdir()) == [path]
