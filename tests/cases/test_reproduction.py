@@ -13,6 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import softehl
+from cases import sweep
 from cases.case_file import BadInput
 from cases.curve import CURVE_COLUMNS
 from cases.oring_parameters import ORing
@@ -48,7 +49,7 @@ def test_a_small_version_of_everything_and_nothing_twice(
     assert b"oscillating: U -1600" in first["fig7.txt"]
     assert b"under-resolved: U +1600 fe m_p 1" in first["fig16.txt"]
     assert b"plain results" not in first["fig17.txt"]
-    monkeypatch.setattr(computing, "_run", pytest.fail)
+    monkeypatch.setattr(sweep, "solve_task", pytest.fail)
     names = ["fig7", "fig17", "statements"]
     for path in tmp_path.glob("*.*"):
         path.unlink()
@@ -67,7 +68,9 @@ def test_runs_side_by_side_are_the_same_as_one_by_one(tmp_path: Path) -> None:
         one, two = (store.state(request.setup, 1600.0) for store in stores)
         assert one.row is not None
         assert one.row == two.row
-    assert {path.name for path in stores[1].folder.iterdir()} == {"d1-ps0", "d1-ps0.5"}
+    assert {path.name for path in stores[1].folder.iterdir()} == {
+        *("contacts", "d1-ps0", "d1-ps0.5"),
+    }
 
 
 def test_an_unknown_item_is_named_with_the_list(

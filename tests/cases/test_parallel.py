@@ -1,0 +1,246 @@
+"""Work in other processes: results, errors, the end of either side; curves through any executor."""
+
+import json
+import multiprocessing
+import os
+import pickle
+import signal
+import time
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import softehl
+from cases.case_file import BadInput, Case
+from cases.lanes import solve_side_by_side
+from cases.observer import Observer, Outcome, Silent
+from cases.oring_parameters import ORing
+from cases.parallel import completed, processes
+from cases.sweep import Curve, Task, in_order, solve_cases
+from runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
+from runtime.linear import MissingBackend, SingularMatrix
+from tests.cases.test_cli import outcome
+
+ERRORS = (
+    BadInput("one line"),
+    MissingKernelsError("none"),
+    StaleKernelsError("old"),
+    ArgumentError("wrong"),
+    MissingBackend("none"),
+    SingularMatrix("zero"),
+    KeyError("name"),
+)
+
+
+def case(**changes: Any) -> ORing:
+    given = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (1600.0,)}
+    return ORing(**{**given, **changes})
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[Executor]:
+    with processes(2) as executor:
+        yield executor
+
+
+# --- tasks ----------------------------------------------------------------------------------------
+
+
+def double(value: int) -> int:
+    return 2 * value
+
+
+def fail(number: int) -> None:
+    raise ERRORS[number]
+
+
+def test_results_with_and_without_an_executor(pool: Executor) -> None:
+    for executor in (None, pool):
+        assert dict(completed(double, [3, 1, 2], executor)) == {0: 6, 1: 2, 2: 4}
+
+
+@pytest.mark.parametrize("number", range(len(ERRORS)))
+def test_an_error_comes_back_as_what_it_is(number: int, pool: Executor) -> None:
+    copy = pickle.loads(pickle.dumps(ERRORS[number]))
+    assert (type(copy), copy.args) == (type(ERRORS[number]), ERRORS[number].args)
+    with pytest.raises(type(ERRORS[number])) as raised:
+        list(completed(fail, [number], pool))
+    assert raised.value.args == ERRORS[number].args
+
+
+def test_after_an_error_nothing_more_is_begun(tmp_path: Path) -> None:
+    with processes(1) as executor, pytest.raises(ZeroDivisionError):
+        list(completed(touch, [tmp_path / f"{n}" for n in range(20)], executor))
+    assert not (tmp_path / "19").exists()
+
+
+def touch(path: Path) -> None:
+    path.write_text("")
+    time.sleep(0.02)
+    1 / int(path.name)
+
+
+def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+    target = tmp_path / "pid"
+    parent = multiprocessing.get_context("spawn").Process(target=wait_in_a_worker, args=(target,))
+    parent.start()
+    worker = int(eventually(lambda: target.read_text() if target.exists() else ""))
+    os.kill(worker, 0)  # it is there
+    assert parent.pid is not None
+    os.kill(parent.pid, signal.SIGKILL)
+    parent.join()
+    assert eventually(lambda: not alive(worker))
+
+
+def wait_in_a_worker(target: Path) -> None:
+    with processes(1) as executor:
+        executor.submit(tell_and_wait, target)
+
+
+def tell_and_wait(target: Path) -> None:
+    part = target.with_name("part")
+    part.write_text(str(os.getpid()))
+    part.rename(target)
+    time.sleep(60.0)
+
+
+def eventually(look: Any, seconds: float = 20.0) -> Any:
+    """What `look` sees as soon as that is something."""
+    end = time.monotonic() + seconds
+    while not (seen := look()) and time.monotonic() < end:
+        time.sleep(0.02)
+    return seen
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs (an orphan that nobody collects is none that runs)."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+# --- strokes side by side -------------------------------------------------------------------------
+
+
+def step_for_ever(parameters: ORing, observer: Observer) -> Outcome:
+    """Takes a minute unless nobody listens any more."""
+    for number in range(6000):
+        observer.step(label="U", parameter=number, iterations=1, residuals=(), fraction=None)
+        time.sleep(0.01)
+    return outcome()
+
+
+def tell_and_end(parameters: ORing, observer: Observer) -> Outcome:
+    for number in range(500):
+        observer.stage(str(number), sealed_pressure=1.0, stroke="out", steps=None)
+    return outcome()
+
+
+class Counter(Silent):
+    """Keeps what it is told; may have no room for more."""
+
+    def __init__(self, room: int) -> None:
+        self.room, self.stages = room, list[str]()
+
+    def stage(self, name: str, **details: Any) -> None:
+        self.stages.append(name)
+
+    def step(self, **details: Any) -> None:
+        self.room -= 1
+        if self.room == 0:
+            raise OSError("no room")
+
+
+def test_every_call_arrives_in_order() -> None:
+    counters = [Counter(1), Counter(1)]
+    outcomes = solve_side_by_side(tell_and_end, [case(), case()], counters)
+    assert [o.unknowns_total for o in outcomes] == [1234, 1234]
+    assert [c.stages for c in counters] == [[str(n) for n in range(500)]] * 2
+
+
+def test_an_error_on_this_side_ends_the_other() -> None:
+    begin = time.monotonic()
+    with pytest.raises(OSError, match="no room"):
+        solve_side_by_side(step_for_ever, [case(), case()], [Counter(3), Counter(10**6)])
+    assert time.monotonic() - begin < 30.0
+
+
+# --- curves ---------------------------------------------------------------------------------------
+
+
+def rows(curve: Curve) -> dict[float, float]:
+    return {row.rod_speed_mm_s: row.h_star_um for row in curve.rows}
+
+
+SWEEP = [case(stroke=stroke, sealed_pressure=p) for p in (0.0, 0.5) for stroke in ("out", "in")]
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory: pytest.TempPathFactory) -> list[Curve]:
+    """The sweep without an executor."""
+    return solve_cases(SWEEP, tmp_path_factory.mktemp("serial"))
+
+
+def test_a_sweep_here(serial: list[Curve]) -> None:
+    assert [curve.parameters for curve in serial] == SWEEP
+    assert all(curve.converged for curve in serial)
+    folder = serial[0].folder.parent
+    assert serial[2].folder.name == "density=1-sealed_pressure=0.5-stroke=out-speeds=1600"
+    assert len(list((folder / "contacts").iterdir())) == 2
+    assert len(list(folder.iterdir())) == 5
+    assert [contact_stages(curve) for curve in serial] == [
+        ["squeeze"],
+        ["contact at density 1"],
+        ["squeeze", "sealed pressure"],
+        ["contact at density 1"],
+    ]
+
+
+def contact_stages(curve: Curve) -> list[str]:
+    stages = json.loads((curve.folder / "run.json").read_text())["stages"]
+    return [stage["name"] for stage in stages if stage["stroke"] == "both"]
+
+
+def test_a_sweep_on_dask(serial: list[Curve], tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        cluster.get_client() as client,
+    ):
+        executor = client.get_executor()
+        curves = solve_cases(SWEEP, tmp_path / "sweep", executor)
+        again = solve_cases(SWEEP, tmp_path / "sweep", executor, resume=True)
+        (tmp_path / "file").write_text("")
+        with pytest.raises(BadInput, match="is not a folder"):
+            solve_cases(SWEEP[:1], tmp_path / "file", executor)
+    for curve, resumed, expected in zip(curves, again, serial, strict=True):
+        assert curve.converged
+        assert curve.parameters == expected.parameters
+        assert rows(curve) == rows(resumed) == pytest.approx(rows(expected), rel=1e-10)
+        assert {p.name for p in curve.folder.iterdir()} == {
+            p.name for p in expected.folder.iterdir()
+        }
+    shared = [curve for curve in curves if contact_stages(curve) == ["contact at density 1"]]
+    assert len(shared) == 2
+
+
+def test_one_curve_of_each_section_comes_first() -> None:
+    cases = [*SWEEP, case(density=2, stroke="in"), case(density=2, mu_1=3.0)]
+    tasks = [Task(Case("oring", c), Path(str(n)), False) for n, c in enumerate(cases)]
+    assert [task.folder.name for task in in_order(tasks)] == ["4", "5", "0", "2", "1", "3"]
+
+
+def test_names_of_folders(tmp_path: Path) -> None:
+    assert softehl.solve_cases({}, tmp_path) == []
+    with pytest.raises(BadInput, match="same folder; allowed: a dict"):
+        solve_cases([case(), case(solver="monolithic")], tmp_path)
+    with pytest.raises(BadInput, match="too long; allowed: a dict"):
+        solve_cases([case(speeds=tuple(1.0 + n for n in range(100)))], tmp_path)
+    assert list(tmp_path.iterdir()) == []
