@@ -1,26 +1,27 @@
 """Assembly of element kernels into a residual vector and a sparse tangent.
 
 The sparsity pattern and the position of every element entry in it are computed once; assembling
-is then one gather, one kernel call and one `bincount` for each block of like elements.
+is then a gather, a kernel call and an `add.at` for each piece of a block of like elements.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import pairwise
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
+from runtime.pattern import Pattern, build_pattern
 from runtime.rules import Rule
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_FEW = 8  # entries of a block, over those of the matrix, below which they are added one by one
+_PIECE = 1 << 18  # entries of the tangents that are evaluated before they are added up
+_CROSSES = 4  # sets of unknowns that are remembered
 
 
 class ElementKernel(Protocol):
@@ -109,6 +110,21 @@ class ElementBlock:
         """Element residuals (n, ndof) and tangents (n, ndof, ndof) at the global vector x."""
         return self.kernel.tangent(self.coordinates, x[self.dofs], **self._given(parameters))
 
+    def pieces(self, scatter: Integers) -> Iterator[tuple[ElementBlock, Integers]]:
+        """Parts of the block whose tangents fit into a core's cache, with theirs of `scatter`."""
+        n = len(self.dofs)
+        step = max(_PIECE // max(self.dofs.shape[1] ** 2, 1), 1)
+        if n <= step:
+            yield self, scatter
+            return
+        width = len(scatter) // n
+        for first in range(0, n, step):
+            part = slice(first, first + step)
+            data = None if self.data is None else self.data[part]
+            coordinates, dofs = self.coordinates[part], self.dofs[part]
+            piece = replace(self, coordinates=coordinates, dofs=dofs, data=data)
+            yield piece, scatter[width * first : width * (first + step)]
+
     def _given(self, parameters: Array) -> dict[str, Any]:
         return {"data": self.data, "parameters": parameters, "rule": self.rule}
 
@@ -119,59 +135,19 @@ class ElementBlock:
 
 
 @dataclass(frozen=True, eq=False)
-class Pattern:
-    """Sparsity of a matrix that element blocks share, compressed by columns.
-
-    indptr (size + 1,), indices (nnz,): csc structure, every diagonal entry included, symmetric.
-    diagonal: (size,) positions of the diagonal in the data. scatter: for each block the position
-    (n * ndof * ndof,) of every element entry in the data.
-    """
-
-    size: int
-    indptr: Integers
-    indices: Integers
-    diagonal: Integers
-    scatter: tuple[Integers, ...]
-
-    @property
-    def nnz(self) -> int:
-        """Number of stored entries."""
-        return len(self.indices)
-
-    def matrix(self, data: Array) -> csc_array[np.float64]:
-        """The csc matrix with these data (nnz,); the structure is shared, not copied."""
-        structure = (data, self.indices, self.indptr)
-        return csc_array(structure, shape=(self.size, self.size), copy=False)
-
-
-def build_pattern(size: int, dof_maps: Sequence[Integers]) -> Pattern:
-    """Pattern of the matrix of order `size` to which elements with these dofs contribute."""
-    keys = [np.arange(size) * (size + 1)]
-    for dofs in dof_maps:
-        if dofs.size and (dofs.min() < 0 or dofs.max() >= size):
-            raise ValueError(f"a dof map points outside the {size} unknowns")
-        keys.append((dofs[:, None, :] * size + dofs[:, :, None]).ravel())
-    stored, where = np.unique(np.concatenate(keys), return_inverse=True)
-    columns, rows = np.divmod(stored, size)
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=size))])
-    ends = np.cumsum([len(key) for key in keys])
-    parts = tuple(where[a:b] for a, b in pairwise(ends))
-    return Pattern(size, indptr.astype(np.int32), rows.astype(np.int32), where[:size], parts)
-
-
-@dataclass(frozen=True, eq=False)
 class Assembler:
     """Blocks of elements and the pattern they share; pure functions of x and parameters.
 
     Parameters are given block by block, in the kernel's order; a block without parameters is
     switched off, its place in the pattern stays. known: block name -> the latest parameters of a
-    constant tangent, where it has entries and which.
+    constant tangent, where it has entries and which. crosses: see `cross`.
     """
 
     size: int
     blocks: tuple[ElementBlock, ...]
     pattern: Pattern
     known: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
+    crosses: dict[bytes, Integers] = field(default_factory=dict)
 
     @classmethod
     def build(cls, size: int, blocks: Sequence[ElementBlock]) -> Assembler:
@@ -193,8 +169,7 @@ class Assembler:
         total = np.zeros(self.size)
         for block in self.blocks:
             if block.name in parameters:
-                local = block.residual(x, parameters[block.name])
-                total += self._scatter_vector(block, local)
+                self._add_residual(total, block, x, parameters[block.name])
         return total
 
     def linearise(
@@ -205,22 +180,35 @@ class Assembler:
         for block, scatter in zip(self.blocks, self.pattern.scatter, strict=True):
             if block.name not in parameters:
                 continue
+            given = parameters[block.name]
             if block.constant:
-                local = block.residual(x, parameters[block.name])
-                places, entries = self._constant(block, scatter, parameters[block.name])
-                data[places] += entries
-            else:
-                local, tangents = block.tangent(x, parameters[block.name])
-                self._add(data, scatter, tangents)
-            total += self._scatter_vector(block, local)
+                self._add_residual(total, block, x, given)
+                places, entries = self._constant(block, scatter, given)
+                np.add.at(data, places, entries)
+                continue
+            for piece, places in block.pieces(scatter):
+                local, tangents = piece.tangent(x, given)
+                np.add.at(data, places, tangents.ravel())
+                np.add.at(total, piece.dofs.ravel(), local.ravel())
         return total, self.pattern.matrix(data)
 
-    def _add(self, data: Array, scatter: Integers, tangents: Array) -> None:
-        """Add the entries of element tangents to the data, in place."""
-        if _FEW * len(scatter) < len(data):
-            np.add.at(data, scatter, tangents.ravel())
-        else:  # faster, but it goes through all of the data
-            data += np.bincount(scatter, weights=tangents.ravel(), minlength=len(data))
+    def cross(self, fixed: Integers) -> Integers:
+        """Positions in the data of the rows and columns of these unknowns; kept for later calls."""
+        key = fixed.tobytes()
+        places = self.crosses.get(key)
+        if places is None:
+            chosen = np.zeros(self.size, dtype=bool)
+            chosen[fixed] = True
+            columns = np.repeat(chosen, np.diff(self.pattern.indptr))
+            places = np.flatnonzero(columns | chosen[self.pattern.indices])
+            while len(self.crosses) >= _CROSSES:
+                del self.crosses[next(iter(self.crosses))]
+            self.crosses[key] = places
+        return places
+
+    def _add_residual(self, total: Array, block: ElementBlock, x: Array, given: Array) -> None:
+        """Add the residuals of a block to the sum, in place."""
+        np.add.at(total, block.dofs.ravel(), block.residual(x, given).ravel())
 
     def _constant(
         self, block: ElementBlock, scatter: Integers, parameters: Array
@@ -229,12 +217,8 @@ class Assembler:
         known = self.known.get(block.name)
         if known is None or not np.array_equal(known[0], parameters):
             data = np.zeros(self.pattern.nnz)
-            self._add(data, scatter, block.tangent(np.zeros(self.size), parameters)[1])
+            np.add.at(data, scatter, block.tangent(np.zeros(self.size), parameters)[1].ravel())
             places = np.flatnonzero(data)
             known = parameters.copy(), places, data[places]
             self.known[block.name] = known
         return known[1], known[2]
-
-    def _scatter_vector(self, block: ElementBlock, local: Array) -> Array:
-        summed = np.bincount(block.dofs.ravel(), weights=local.ravel(), minlength=self.size)
-        return np.asarray(summed, dtype=np.float64)

@@ -10,13 +10,10 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
 from runtime.assembly import Array, Assembler, Integers
 from runtime.dofs import DofLayout
-
-Flags = NDArray[np.bool_]
 
 
 class Guard(Protocol):
@@ -182,10 +179,6 @@ class Problem:
         """K with the rows and columns of prescribed unknowns replaced by those of the identity."""
         if not len(self.fixed):
             return K
-        prescribed: Flags = np.zeros(K.shape[0], dtype=bool)
-        prescribed[self.fixed] = True
-        pattern = self.assembler.pattern
-        K.data[prescribed[K.indices]] = 0.0
-        K.data[np.repeat(prescribed, np.diff(K.indptr))] = 0.0
-        K.data[pattern.diagonal[self.fixed]] = 1.0
+        K.data[self.assembler.cross(self.fixed)] = 0.0
+        K.data[self.assembler.pattern.diagonal[self.fixed]] = 1.0
         return K

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from runtime.assembly import Array, Assembler, ElementBlock, build_pattern
+from runtime import assembly
+from runtime.assembly import Array, Assembler, ElementBlock, Integers
 from runtime.dofs import DofLayout
 from runtime.newton import Newton
+from runtime.pattern import build_pattern
 from runtime.problem import KeepsOrientation, Problem, StaysPositive
 from tests.runtime.springs import Spring
 
@@ -71,6 +73,66 @@ def test_pattern_is_symmetric_with_a_full_diagonal(rng: np.random.Generator) -> 
     assert np.array_equal(np.diag(ones), np.ones(SIZE))
     positions = pattern.matrix(np.arange(pattern.nnz, dtype=float)).toarray()
     assert np.array_equal(np.diag(positions), pattern.diagonal)
+
+
+def _pattern_by_sorting(size: int, dof_maps: list[Integers]) -> tuple[Integers, Integers]:
+    """Places column * size + row of all entries, and the position of each element entry."""
+    keys = [np.arange(size) * (size + 1)]
+    keys += [(dofs[:, None, :] * size + dofs[:, :, None]).ravel() for dofs in dof_maps]
+    stored, where = np.unique(np.concatenate(keys), return_inverse=True)
+    return stored, where[size:]
+
+
+def test_pattern_is_that_of_a_sort(rng: np.random.Generator) -> None:
+    def some(n: int, k: int) -> Integers:
+        return np.stack([rng.permutation(SIZE)[:k] for _ in range(n)])
+
+    first, other = some(9, 4), some(5, 3)
+    longer = np.concatenate([first, np.full((9, 1), SIZE)], axis=1)
+    longest = np.concatenate([longer, np.full((9, 1), SIZE + 1)], axis=1)
+    twice = np.array([[0, 3, 0], [5, 5, 2]])  # an unknown may occur twice in an element
+    nothing = np.empty((0, 4), dtype=np.int64)
+    one = some(9, 1)
+    maps = [first, other, longer, first.copy(), nothing, twice, longest, one, other, nothing]
+    pattern = build_pattern(SIZE + 2, maps)
+    stored, where = _pattern_by_sorting(SIZE + 2, maps)
+    columns = np.repeat(np.arange(SIZE + 2), np.diff(pattern.indptr))
+    assert np.array_equal(columns * (SIZE + 2) + pattern.indices, stored)
+    assert np.array_equal(np.concatenate(pattern.scatter), where)
+    assert [len(part) for part in pattern.scatter] == [m.shape[0] * m.shape[1] ** 2 for m in maps]
+    assert pattern.indices.dtype == pattern.indptr.dtype == np.int32
+    # a map of which one entry differs is another one
+    first[3, 1] = (first[3, 1] + 1) % SIZE
+    changed = build_pattern(SIZE + 2, maps)
+    assert not np.array_equal(np.concatenate(changed.scatter)[:144], where[:144])
+
+
+def test_pieces_of_a_block_add_up_to_it(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocks, x = _blocks(rng), rng.normal(size=SIZE)
+    assembler = Assembler.build(SIZE, blocks)
+    whole = assembler.linearise(x, PARAMETERS)
+    monkeypatch.setattr(assembly, "_PIECE", 9 * 4)  # 4 of the 25 elements at a time
+    pieces = [piece for piece, _ in blocks[0].pieces(assembler.pattern.scatter[0])]
+    assert [len(piece.dofs) for piece in pieces] == [4] * 6 + [1]
+    r, K = assembler.linearise(x, PARAMETERS)
+    assert r == pytest.approx(whole[0], rel=1e-14, abs=1e-13)
+    assert K.data == pytest.approx(whole[1].data, rel=1e-14, abs=1e-13)
+
+
+def test_rows_and_columns_of_some_unknowns(rng: np.random.Generator) -> None:
+    assembler = Assembler.build(SIZE, _blocks(rng))
+    for fixed in (np.array([3, 7]), np.array([7]), np.array([3, 7]), np.empty(0, dtype=np.int64)):
+        data = np.ones(assembler.pattern.nnz)
+        data[assembler.cross(fixed)] = 0.0
+        expected = assembler.pattern.matrix(np.ones(len(data))).toarray()
+        expected[fixed] = 0.0
+        expected[:, fixed] = 0.0
+        assert np.array_equal(assembler.pattern.matrix(data).toarray(), expected)
+    for number in range(SIZE):
+        assembler.cross(np.array([number]))
+    assert len(assembler.crosses) <= 4
 
 
 def test_a_block_without_parameters_is_off_but_keeps_its_place(rng: np.random.Generator) -> None:
