@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cases.contact_store import ContactStore, stored_contact
+from cases.contact_store import ContactStore
 from cases.observer import FilmState, Observer, Outcome, StageRecord
 from cases.oring_contact import ContactRoute
 from cases.oring_fast import FastFilm

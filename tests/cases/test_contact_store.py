@@ -23,6 +23,7 @@ from runtime.newton import Newton
 Damage = Callable[[Path, np.random.Generator], None]
 STORED = "newton, from a stored contact state"
 OTHER = {
+    "upwinding": 0.3,
     "pressure_order": 3,
     "reynolds": "dg",
     "quadrature": "lobatto",
@@ -40,6 +41,7 @@ OTHER = {
 """Another value of every parameter that the contact stage does not know."""
 
 CHANGED = {
+    "mesh": "graded",
     "density": 2,
     "solid": "fbar",
     "sealed_pressure": 0.25,
@@ -59,7 +61,7 @@ CHANGED = {
 
 def case(**changes: Any) -> ORing:
     given = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (1600.0,)}
-    return ORing(**{**given, **changes})
+    return ORing(**{"mesh": "uniform", **given, **changes})
 
 
 def names(outcome: Outcome) -> list[str]:

@@ -37,7 +37,7 @@ ERRORS = (
 
 def case(**changes: Any) -> ORing:
     given = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (1600.0,)}
-    return ORing(**{**given, **changes})
+    return ORing(**{"mesh": "uniform", **given, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -190,7 +190,9 @@ def test_a_sweep_here(serial: list[Curve]) -> None:
     assert [curve.parameters for curve in serial] == SWEEP
     assert all(curve.converged for curve in serial)
     folder = serial[0].folder.parent
-    assert serial[2].folder.name == "density=1-sealed_pressure=0.5-stroke=out-speeds=1600"
+    assert (
+        serial[2].folder.name == "density=1-mesh=uniform-sealed_pressure=0.5-stroke=out-speeds=1600"
+    )
     assert len(list((folder / "contacts").iterdir())) == 2
     assert len(list(folder.iterdir())) == 5
     assert [contact_stages(curve) for curve in serial] == [
