@@ -21,6 +21,11 @@ import click
     type=click.Path(path_type=Path),
     help="Folder for the files, results/<case> if left out. An earlier run in it is replaced.",
 )
+@click.option(
+    "--tolerance",
+    metavar="PERCENT",
+    help="Largest estimated error of h*, as in 1%: speeds that miss it run on finer meshes.",
+)
 @click.option("--resume", is_flag=True, help="Keep the speeds that DIR has and run the others.")
 @click.option(
     "--jobs",
@@ -34,6 +39,7 @@ def run(
     case: str,
     assignments: tuple[str, ...],
     folder: Path | None,
+    tolerance: str | None,
     resume: bool,
     jobs: int,
     quiet: bool,
@@ -46,6 +52,8 @@ def run(
     from cases.case_file import read_case
     from cases.session import run_case
 
+    if tolerance is not None:
+        assignments = (*assignments, f"tolerance={tolerance.strip().removesuffix('%')}")
     read = read_case(case, assignments)
     target = Path("results", read.name) if folder is None else folder
     return run_case(read, target, resume=resume, jobs=jobs, quiet=quiet)

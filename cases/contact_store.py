@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 WITHOUT_INFLUENCE = (
     *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
     *("viscosity", "pressure_viscosity", "shear_traction", "cavitation_penalty"),
-    *("rotation", "solver", "linear", "upwinding"),
+    *("rotation", "solver", "linear", "upwinding", "error_estimate", "tolerance"),
 )
 """Parameters that the contact stage does not know."""
 

@@ -5,7 +5,7 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from cases.observer import COLLAPSED, FilmState, Profile, Section
+from cases.observer import COLLAPSED, OK, FilmState, Profile, Section
 from runtime.io import (
     number_text,
     read_columns,
@@ -25,6 +25,7 @@ class CurveRow:
     sealed_pressure_MPa: float
     rod_speed_mm_s: float
     h_star_um: float
+    h_star_error_percent: float
     h_min_um: float
     p_max_MPa: float
     pressure_jump_max_MPa: float
@@ -38,6 +39,7 @@ class CurveRow:
     contact_p_max_MPa: float
     oscillation_index: float
     inlet_segments: float
+    density: int
     verdict: str
 
     @classmethod
@@ -51,7 +53,8 @@ class CurveRow:
         """The row from the text of its cells.  Raises ValueError."""
         *numbers, verdict = cells
         row: dict[str, Any] = dict(zip(CURVE_COLUMNS, map(float, numbers), strict=False))
-        return cls(**{**row, "newton_iterations": int(row["newton_iterations"])}, verdict=verdict)
+        integers = {name: int(row[name]) for name in ("newton_iterations", "density")}
+        return cls(**{**row, **integers}, verdict=verdict)
 
     @property
     def name(self) -> str:
@@ -62,6 +65,10 @@ class CurveRow:
     def usable(self) -> bool:
         """Whether this is a result (a collapsed film never is)."""
         return self.verdict != COLLAPSED
+
+    def within(self, tolerance: float) -> bool:
+        """Whether h* is a plain result whose error is known to be at most so many per cent."""
+        return self.verdict == OK and abs(self.h_star_error_percent) <= tolerance
 
     @property
     def stroke(self) -> str:
@@ -102,6 +109,12 @@ class CurveFolder:
         self.rows = sorted([*others, row], key=lambda r: r.order)
         self.save()
         return row
+
+    def drop(self, rod_speed: float) -> None:
+        """Take a state out of the curve; its files stay until it is written again."""
+        self.rows = [row for row in self.rows if row.rod_speed_mm_s != rod_speed]
+        if self.path.exists():
+            self.save()
 
     def save(self) -> None:
         """Write curve.csv, a header alone if there is no row yet."""

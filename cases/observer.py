@@ -7,6 +7,7 @@ killed keeps what it had reached.  Units are mm, MPa, N, s; film thicknesses are
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import nan
 from typing import Protocol
 
 import numpy as np
@@ -79,6 +80,7 @@ class FilmState:
     moment_N_mm: torque that holds the mean rotation.  contact_p_max_MPa: the maximum of the
     frictionless contact stage.  verdict: :data:`OK`, :data:`COLLAPSED`, :data:`UNDER_RESOLVED` or
     :data:`OSCILLATING`; advice: what to do about a verdict that is not :data:`OK`.
+    h_star_error_percent: `cases.oring_estimate`, + where h* is too large, nan where not known.
     """
 
     sealed_pressure: float
@@ -97,10 +99,12 @@ class FilmState:
     contact_p_max_MPa: float
     oscillation_index: float
     inlet_segments: float
+    density: int
     verdict: str
     advice: str
     profile: Profile
     section: Section
+    h_star_error_percent: float = nan
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from cases.contact_store import ContactStore
 from cases.observer import FilmState, Observer, Outcome, StageRecord
 from cases.oring_contact import ContactRoute
+from cases.oring_estimate import coarser_section, h_star_error
 from cases.oring_fast import FastFilm
 from cases.oring_order import REFERENCE_ORDER, OrderPair, transferred
 from cases.oring_parameters import ORing
@@ -26,7 +29,8 @@ from cases.oring_path import (
     speed_stage,
     weight_stage,
 )
-from cases.oring_results import contact_state, film_numbers, film_state
+from cases.oring_refinement import regraded_contact
+from cases.oring_results import MICROMETRE, contact_state, film_numbers, film_state
 from cases.oring_section import OringSection, build_section
 from cases.oring_stopped import Stopped
 from cases.oring_verdict import Verdict, fewest_inlet_segments
@@ -37,6 +41,7 @@ from runtime.newton import Newton
 from runtime.solution import Status
 
 Array = NDArray[np.float64]
+OnSpeed = Callable[[Film, Point], None]
 
 
 @dataclass
@@ -52,6 +57,7 @@ class _Run:
     stopped: list[tuple[Status, str]] = field(default_factory=list)
     prefix: str = ""
     contacts: ContactStore = field(default_factory=ContactStore)
+    coarser: tuple[_Run, Array] | None = None
 
     def walk(self, stage: Stage, x: Array) -> Array:
         """Unknowns at the end of a stage; raises Stopped if it is not reached."""
@@ -69,7 +75,33 @@ class _Run:
         p_s = parameters.sealed_pressure
         problem = contact_problem(self.section, self.settings, p_s)
         self.observer.contact_state(contact_state(self.section, problem, p_s, x))
+        if parameters.error_estimate and parameters.mesh == "graded":
+            with suppress(Stopped):
+                self.coarser = self._coarser_run(x)
         return x
+
+    def _coarser_run(self, x: Array) -> tuple[_Run, Array]:
+        """The same on a coarser mesh, whose films are no results, and its contact state."""
+        section, prefix = coarser_section(self.section), "coarser mesh: "
+        run = _Run(section, self.observer, self.settings, self.walker, self.records, prefix=prefix)
+        return run, run.walk(*regraded_contact(self.section, section, self.settings, x, "contact"))
+
+    def thicknesses(self, stroke: Stroke, x: Array) -> dict[float, float]:
+        """h* (mm) at the requested speeds, as far as they are reached; nothing is reported."""
+        found: dict[float, float] = {}
+
+        def keep(film: Film, point: Point) -> None:
+            problem = film_problem(self.section, self.settings, film)
+            numbers = film_numbers(self.section, problem, film, point.solution.x)
+            found[film.speed] = numbers.h_star
+
+        film = self.first_film(stroke, x)
+        with suppress(Stopped):
+            if not self._fast_films(film, x, keep):
+                film, x = self.build_film(film, x)
+                speeds = self.section.parameters.speeds
+                self.walk(speed_stage(self.section, self.settings, film, speeds, keep), x)
+        return found
 
     def stroke(self, stroke: Stroke, x: Array) -> None:
         """Second and third stage of one stroke, from the contact state x."""
@@ -78,7 +110,8 @@ class _Run:
             section, contact_problem(section, settings, p.sealed_pressure), p.sealed_pressure, x
         ).p_max_MPa
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
-        judge = _Judge(self, Verdict(reference, fewest=fewest))
+        coarser = self.coarser[0].thicknesses(stroke, self.coarser[1]) if self.coarser else {}
+        judge = _Judge(self, Verdict(reference, fewest=fewest), coarser)
         film = self.first_film(stroke, x)
         with suppress(Stopped):
             if self._fast_films(film, x, judge):
@@ -101,7 +134,7 @@ class _Run:
         shear = 1.0 if p.shear_traction else 0.0
         return Film(p.sealed_pressure, stroke, speed, multipliers, shear=shear)
 
-    def _fast_films(self, film: Film, x: Array, judge: _Judge) -> bool:
+    def _fast_films(self, film: Film, x: Array, on_speed: OnSpeed) -> bool:
         """Second and third stage by chord iterations; False where these do not apply."""
         section, settings, p = self.section, self.settings, self.section.parameters
         linear = self.walker.newton.linear
@@ -112,7 +145,7 @@ class _Run:
         x = self.walk(fast.weight(weight_stage(section, settings, film)), x)
         if p.shear_traction:
             x = self.walk(fast.shear(shear_stage(section, settings, film)), x)
-        self.walk(fast.speed(speed_stage(section, settings, film, p.speeds, judge)), x)
+        self.walk(fast.speed(speed_stage(section, settings, film, p.speeds, on_speed)), x)
         return True
 
     def build_film(self, film: Film, x: Array) -> tuple[Film, Array]:
@@ -154,10 +187,14 @@ class _Run:
 
 @dataclass
 class _Judge:
-    """Looks at every step of falling speed; a requested speed becomes a state."""
+    """Looks at every step of falling speed; a requested speed becomes a state.
+
+    coarser: h* (mm) at a speed on the coarser mesh, where it is known.
+    """
 
     run: _Run
     verdict: Verdict
+    coarser: Mapping[float, float] = field(default_factory=dict)
     reached: list[float] = field(default_factory=list)
     position: tuple[Film, Array] | None = None
 
@@ -179,6 +216,9 @@ class _Judge:
         self.reached.append(film.speed)
         iterations = point.solution.iterations
         state = film_state(run.section, problem, film, x, self.verdict, iterations)
+        density, coarser = state.density, self.coarser.get(film.speed, nan)
+        error = h_star_error(density, state.h_star_um, coarser / MICROMETRE)
+        state = replace(state, h_star_error_percent=error)
         run.states.append(state)
         run.observer.film_state(state)
 

@@ -89,7 +89,8 @@ class ContactRoute:
         section, x = self._uniform(p.model_copy(update={"mesh": "uniform", "solver": "auto"}))
         for number in range(1, PASSES + 1):
             graded = build_section(p, graded_disc(section, x))
-            x = self.walk(*regraded_contact(section, graded, self.settings, x, number))
+            name = f"contact on graded mesh {number}"
+            x = self.walk(*regraded_contact(section, graded, self.settings, x, name))
             section = graded
         return section, x
 

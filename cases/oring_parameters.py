@@ -8,6 +8,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+DENSITIES = (1, 2, 4, 8, 16)
+"""Mesh densities of the paper, coarsest first."""
+
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 # strict again on the item: the list itself is lax so that a TOML array becomes a tuple
@@ -48,8 +51,17 @@ class ORing(BaseModel):
         description="points of the film rule; 2 to 128, left out = automatic",
     )
     upwinding: NonNegative = Field(
-        default=0.0,
+        default=1.0,
         description="strength c of the bubble-load upwinding; >= 0, 0 = the paper's scheme",
+    )
+    error_estimate: bool = Field(
+        default=True,
+        description="whether the error of h* is estimated, on a graded mesh; true or false",
+    )
+    tolerance: float | None = Field(
+        default=None,
+        gt=0,
+        description="largest estimated error of h* [%], reached by finer meshes; left out = any",
     )
     solid: Literal["fbar", "taylor", "q4"] = Field(
         default="taylor", description='solid element; "fbar", "taylor" or "q4"'
@@ -146,6 +158,15 @@ class ORing(BaseModel):
         if len(set(speeds)) < len(speeds):
             raise ValueError("a speed is given twice")
         return speeds
+
+    @model_validator(mode="after")
+    def _tolerance_has_an_estimate(self) -> Self:
+        if self.tolerance is not None and not (self.error_estimate and self.mesh == "graded"):
+            raise ValueError(
+                f"tolerance = {self.tolerance:g} needs an estimate of the error; "
+                'set error_estimate = true and mesh = "graded"'
+            )
+        return self
 
     @model_validator(mode="after")
     def _seal_is_squeezed(self) -> Self:

@@ -76,18 +76,18 @@ def refined_contact(
 
 
 def regraded_contact(
-    old: OringSection, new: OringSection, settings: PathSettings, x: Array, number: int
+    old: OringSection, new: OringSection, settings: PathSettings, x: Array, name: str
 ) -> tuple[Stage, Array]:
-    """A stage of one step that solves for contact on another mesh of the same density.
+    """A stage of one step that solves for contact on another mesh of the same section.
 
-    x: unknowns of the contact state on the old mesh. number: of the mesh in its row, for the name.
+    x: unknowns of the contact state on the old mesh. name: of the stage.
     """
     pressures = transfer_elements(old.mesh, new.mesh, _pressures(old, settings, x))
     stage = _corrected(
         new,
         settings,
         pressures,
-        name=f"contact on graded mesh {number}",
+        name=name,
         method="newton, moved from another mesh",
     )
     return stage, move_contact(old, new, x)

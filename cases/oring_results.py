@@ -147,6 +147,7 @@ def film_state(
         sealed_pressure=film.sealed_pressure,
         rod_speed=film.rod_speed,
         h_star_um=numbers.h_star / MICROMETRE,
+        density=section.parameters.density,
         h_min_um=numbers.h_min / MICROMETRE,
         p_max_MPa=numbers.p_max,
         pressure_jump_max_MPa=numbers.jump,

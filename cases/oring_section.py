@@ -7,6 +7,7 @@ crown and the sealed side. Sealed pressure acts from the sealed end of the arc r
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from math import pi
 
 import numpy as np
@@ -86,10 +87,15 @@ def uniform_disc(p: ORing) -> Disc:
     return Disc(0.0, 0.5 * p.inner_diameter + radius, radius, p.arc_start, p.arc_end)
 
 
-def build_section(p: ORing, disc: Disc | None = None) -> OringSection:
-    """Mesh, unknowns, blocks and the problem of a case; without a disc that of equal segments."""
+def build_section(
+    p: ORing, disc: Disc | None = None, density: Fraction | None = None
+) -> OringSection:
+    """Mesh, unknowns, blocks and the problem of a case.
+
+    disc: how the mesh is laid out, with equal segments if left out. density: instead of the case's.
+    """
     disc = disc or uniform_disc(p)
-    mesh = disc_mesh(disc, p.density)
+    mesh = disc_mesh(disc, density or p.density)
     layout = number_unknowns(mesh, p)
     obstacles = {o.name: o for o in _obstacles(p)}
     assembler = Assembler.build(layout.total, _blocks(p, mesh, layout, obstacles))

@@ -21,7 +21,7 @@ from cases.observer import COLLAPSED, ContactState, FilmState, Outcome, StageRec
 from cases.oring_parameters import ORing
 from runtime.io import number_text, read_json, write_columns, write_csv, write_json
 
-SELECTION = ("speeds", "stroke", "solver", "linear")
+SELECTION = ("speeds", "stroke", "solver", "linear", "tolerance")
 """Parameters that do not change a row of a curve: a resumed run may change them."""
 SIGNS = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
@@ -103,10 +103,27 @@ class RunRecord:
         signs = [SIGNS[stroke] for stroke in strokes_of(parameters)]
         return [sign * speed for sign in signs for speed in parameters.speeds]
 
-    def missing(self, stroke: str) -> tuple[float, ...]:
-        """The requested speeds |U| of a stroke that the curve does not have yet."""
-        done = {row.rod_speed_mm_s for row in self.curve.rows}
-        return tuple(u for u in self.case.parameters.speeds if SIGNS[stroke] * u not in done)
+    def missing(self, stroke: str, density: int) -> tuple[float, ...]:
+        """The requested speeds |U| of a stroke to be solved at a density.
+
+        Those that the curve does not have, or has from a coarser mesh outside the tolerance.
+        """
+        rows = {row.rod_speed_mm_s: row for row in self.curve.rows}
+        sign = SIGNS[stroke]
+        return tuple(
+            u
+            for u in self.case.parameters.speeds
+            if sign * u not in rows or self._too_coarse(rows[sign * u], density)
+        )
+
+    def outside(self) -> list[CurveRow]:
+        """The rows that do not meet the tolerance, if there is one."""
+        tolerance = self.case.parameters.tolerance
+        return [row for row in self.curve.rows if tolerance and not row.within(tolerance)]
+
+    def _too_coarse(self, row: CurveRow, density: int) -> bool:
+        tolerance = self.case.parameters.tolerance
+        return tolerance is not None and row.density < density and not row.within(tolerance)
 
     def begin(self) -> None:
         """Create the folder, or empty it of an earlier run that is not resumed; once."""
@@ -140,7 +157,9 @@ class RunRecord:
         self.begin()
         folder = self.rejected if state.verdict == COLLAPSED else self.curve
         row = folder.add(state)
-        if not row.usable:
+        if row.usable:
+            self.rejected.drop(row.rod_speed_mm_s)
+        else:
             self.advice.add(state.advice)
         self.save("running", "")
         return row

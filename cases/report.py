@@ -1,6 +1,7 @@
 """The curve as a table on the terminal, and the plots of a run (PNG, SVG), the same every time."""
 
 from collections.abc import Callable, Iterator, Sequence
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +45,7 @@ _TABLE_WIDTH = 110
 _COLUMNS: tuple[tuple[str, str, Callable[[CurveRow], str]], ...] = (
     ("U", "mm/s", lambda row: f"{row.rod_speed_mm_s:+g}"),
     ("h*", "um", lambda row: f"{row.h_star_um:.4g}"),
+    ("error", "%", lambda row: _known(row.h_star_error_percent)),
     ("h min", "um", lambda row: f"{row.h_min_um:.4g}"),
     ("p max", "MPa", lambda row: f"{row.p_max_MPa:.4f}"),
     ("friction", "N", lambda row: f"{row.rod_friction_N:.4g}"),
@@ -71,6 +73,10 @@ def curve_table(rows: Sequence[CurveRow], rejected: Sequence[CurveRow] = ()) -> 
         style = None if row.verdict == OK else ("yellow" if row.usable else "bold red")
         table.add_row(*(Text(text) for text in [*texts, verdict]), style=style)
     return table
+
+
+def _known(percent: float) -> str:
+    return "" if isnan(percent) else f"{percent:+.2f}"
 
 
 def print_curve(rows: Sequence[CurveRow], rejected: Sequence[CurveRow] = ()) -> None:

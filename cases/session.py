@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from cases import report
-from cases.case_file import BadInput, Case
+from cases.case_file import BadInput, Case, Solve
 from cases.curve import CurveRow
 from cases.lanes import solve_side_by_side
 from cases.observer import (
@@ -19,7 +19,7 @@ from cases.observer import (
     Observer,
     Outcome,
 )
-from cases.oring_parameters import ORing
+from cases.oring_parameters import DENSITIES, ORing
 from cases.progress import Display, make_display
 from cases.record import RunRecord, StageLog, strokes_of
 from runtime.kernels import MissingKernelsError, StaleKernelsError
@@ -49,24 +49,40 @@ def record_case(
     """
     _require_backend(case.parameters.linear)
     record = RunRecord(folder, case, resume=resume)
-    runs = plan(case.parameters, record, jobs)
+    outcomes: list[Outcome] = []
     with _recorded(record):
-        lanes = [Reporter(record, display, run.stroke) for run in runs]
-        solve = case.load_solve()
-        if jobs > 1 and len(runs) > 1:
-            outcomes = solve_side_by_side(solve, runs, lanes)
-        else:
-            outcomes = [solve(run, lane) for run, lane in zip(runs, lanes, strict=True)]
+        for parameters in refinements(case.parameters):
+            last = _solve(plan(parameters, record, jobs), case.load_solve(), record, display, jobs)
+            outcomes = [*outcomes, *last]
     with _writing(folder):
         return record, _conclude(record, outcomes)
 
 
+def refinements(parameters: ORing) -> list[ORing]:
+    """The case, and where it has a tolerance the same on every finer mesh there is."""
+    if parameters.tolerance is None:
+        return [parameters]
+    finer = [d for d in DENSITIES if d >= parameters.density]
+    return [parameters.model_copy(update={"density": density}) for density in finer]
+
+
+def _solve(
+    runs: Sequence[ORing], solve: Solve, record: RunRecord, display: Display, jobs: int
+) -> list[Outcome]:
+    """Run parameter sets one after the other or, with jobs > 1, side by side."""
+    lanes = [Reporter(record, display, run.stroke) for run in runs]
+    if jobs > 1 and len(runs) > 1:
+        return solve_side_by_side(solve, runs, lanes)
+    return [solve(run, lane) for run, lane in zip(runs, lanes, strict=True)]
+
+
 def plan(parameters: ORing, record: RunRecord, jobs: int) -> list[ORing]:
-    """The parameter sets still to be run: one for both strokes, or one for each.
+    """The parameter sets still to be run at this density: one for both strokes, or one for each.
 
     Strokes go separately where they can run side by side or miss different speeds.
     """
-    missing = {stroke: record.missing(stroke) for stroke in strokes_of(parameters)}
+    density = parameters.density
+    missing = {stroke: record.missing(stroke, density) for stroke in strokes_of(parameters)}
     missing = {stroke: speeds for stroke, speeds in missing.items() if speeds}
     if jobs == 1 and len(missing) == 2 and missing["out"] == missing["in"]:
         missing = {"both": missing["out"]}
@@ -191,6 +207,9 @@ def _gaps(record: RunRecord) -> list[str]:
     if rejected:
         advice = " ".join(sorted(record.advice))
         gaps.append(f"collapsed film, not a result: {_named(rejected)}. {advice}")
+    outside = record.outside()
+    if outside:
+        gaps.append(f"h* not known to {record.case.parameters.tolerance:g} %: {_named(outside)}")
     return gaps
 
 

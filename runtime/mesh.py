@@ -7,6 +7,7 @@ of density d are among those of density 2 d, and every boundary node lies exactl
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from math import cos, radians, sin
 
 import numpy as np
@@ -103,11 +104,16 @@ class SectionMesh:
         return self.segments[self.arc :]
 
 
-def disc_mesh(disc: Disc, density: int) -> SectionMesh:
-    """O-grid of 360 d^2 quadrilaterals with 27 d equal segments on the arc and 66 d around."""
-    if density < 1:
-        raise ValueError(f"disc_mesh: density {density} is not allowed, it is at least 1")
-    long, short, layers = (round(n * density) for n in (LONG, SHORT, LAYERS))
+def disc_mesh(disc: Disc, density: int | Fraction) -> SectionMesh:
+    """O-grid of 360 d^2 quadrilaterals with 27 d segments on the arc and 66 d around.
+
+    density: a multiple of 1/3, at least 2/3. Raises ValueError for others.
+    """
+    if density < Fraction(2, 3) or (3 * density) % 1:
+        raise ValueError(
+            f"disc_mesh: density {density} is not allowed, it is a multiple of 1/3 and at least 2/3"
+        )
+    long, short, layers = (int(n * density) for n in (LONG, SHORT, LAYERS))
     loop = _loop(disc, long, short)
     ring = disc.centre + disc.radius * disc.direction(loop[0])
     inner = loop[1]

@@ -75,6 +75,7 @@ def film_state(parameters: ORing, speed: float, verdict: str = OK) -> FilmState:
         contact_p_max_MPa=4.1,
         oscillation_index=0.01,
         inlet_segments=4.2,
+        density=parameters.density,
         verdict=verdict,
         advice="" if verdict == OK else "Use a finer mesh.",
         profile=Profile(x, h_star + 50 * x**2, 4 - 4 * x**2, 0.01 * x, h_star * speed + 0 * x),
