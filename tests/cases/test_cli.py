@@ -7,6 +7,7 @@ import json
 import multiprocessing
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +30,15 @@ from cases.observer import (
 )
 from cases.oring_parameters import ORing
 from cases.record import RunRecord
+from cases.session import NOT_CONVERGED
 from runtime.kernels import MissingKernelsError
 from runtime.solution import Status
 
 HEADER = (
-    "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_min_um,p_max_MPa,pressure_jump_max_MPa,"
-    "rod_friction_N,leak_rate_mm3_s,contact_start_mm,contact_end_mm,newton_iterations,"
-    "flux_variation,moment_N_mm,contact_p_max_MPa,oscillation_index,inlet_segments,verdict"
+    "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_star_error_percent,h_min_um,p_max_MPa,"
+    "pressure_jump_max_MPa,rod_friction_N,leak_rate_mm3_s,contact_start_mm,contact_end_mm,"
+    "newton_iterations,flux_variation,moment_N_mm,contact_p_max_MPa,oscillation_index,"
+    "inlet_segments,density,verdict"
 )
 FAST = ("--set", "speeds=[400, 100]")
 PLOTS = {"curve.png", "curve.svg", "profiles.png", "profiles.svg"}
@@ -105,6 +108,18 @@ def solve(parameters: ORing, observer: Observer) -> Outcome:
 def outcome(*states: FilmState, status: Status = Status.CONVERGED, message: str = "") -> Outcome:
     stage = StageRecord("contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), 1.0, "out")
     return Outcome(states, status, message, 1234, 109, {"film": "abc"}, (stage,))
+
+
+def solve_roughly(parameters: ORing, observer: Observer) -> Outcome:
+    """Every requested state, with an error that falls with the density and rises with 1 / U."""
+    states = []
+    for sign in {"out": [1.0], "in": [-1.0], "both": [1.0, -1.0]}[parameters.stroke]:
+        for speed in parameters.speeds:
+            error = -400.0 / speed / parameters.density**2
+            state = replace(film_state(parameters, sign * speed), h_star_error_percent=error)
+            observer.film_state(state)
+            states.append(state)
+    return outcome(*states)
 
 
 def solve_and_stop(parameters: ORing, observer: Observer) -> Outcome:
@@ -206,6 +221,12 @@ BAD = {
     "wrong type": (["oring", "--set", "sealed_pressure=high"], 'sealed_pressure = "high"'),
     "negative pressure": (["oring", "--set", "sealed_pressure=-1"], "sealed_pressure = -1"),
     "nan pressure": (["oring", "--set", "sealed_pressure=nan"], "sealed_pressure = NaN"),
+    "no tolerance": (["oring", "--tolerance", "small"], 'tolerance = "small"'),
+    "zero tolerance": (["oring", "--tolerance", "0%"], "tolerance = 0"),
+    "uniform tolerance": (
+        ["oring", "--tolerance", "1%", "--set", "mesh=uniform"],
+        "needs an estimate",
+    ),
     "no speeds": (["oring", "--set", "speeds=[]"], "speeds = []"),
     "zero speed": (["oring", "--set", "speeds=[100, 0]"], "speeds = [100, 0]"),
     "negative speed": (["oring", "--set", "speeds=[-100]"], "speeds = [-100]"),
@@ -273,7 +294,7 @@ def test_a_run_writes_its_files(here: Path, invoke: Invoke) -> None:
     assert code == 0
     assert names(folder) == FILES | PLOTS
     assert speeds(folder) == [400.0, 100.0, -400.0, -100.0]
-    assert rows(folder)[0][2:4] == ["2", "1.6"]
+    assert rows(folder)[0][2:5] == ["2", "nan", "1.6"]
     assert {row[-1] for row in rows(folder)} == {OK}
     profile = (folder / "profile_1_-100.csv").read_text().splitlines()
     assert profile[0] == "x_mm,h_um,p_MPa,tau_MPa,flux_mm2_s"
@@ -308,6 +329,45 @@ def test_run_json(here: Path, invoke: Invoke) -> None:
     assert len(content["states"]) == 4
     listed = {file for state in content["states"] for file in state["files"]}
     assert listed <= names(here / "a")
+
+
+def test_a_tolerance_refines_where_it_is_missed(here: Path, invoke: Invoke) -> None:
+    code, out, err = invoke("run", "oring", *FAST, "--tolerance", "0.3%", solver=solve_roughly)
+    folder = here / "results" / "oring"
+    assert code == 0, err
+    found = [(row[1], float(row[3]), row[-2]) for row in rows(folder)]
+    assert found == [
+        ("400", -0.25, "2"),
+        ("100", -0.25, "4"),
+        ("-400", -0.25, "2"),
+        ("-100", -0.25, "4"),
+    ]
+    assert any("error" in line for line in out)
+    assert run_json(folder)["parameters"]["tolerance"] == 0.3
+    # what meets a sharper tolerance already is kept
+    again = ("--set", "density=2", "--tolerance", "0.26", "--resume")
+    assert invoke("run", "oring", *FAST, *again, solver=solve_and_die)[0] == 0
+
+
+def test_a_tolerance_that_no_mesh_meets_is_named(here: Path, invoke: Invoke) -> None:
+    tolerance = ("--tolerance", "0.01")
+    code, _, err = invoke("run", "oring", *FAST, *tolerance, solver=solve_roughly)
+    assert code == NOT_CONVERGED
+    assert "h* not known to 0.01 %: U = +100 mm/s, U = -100 mm/s" in err[-1]
+    assert {row[-2] for row in rows(here / "results" / "oring")} == {"16"}
+
+
+def test_a_tolerance_goes_on_where_a_film_collapsed(here: Path, invoke: Invoke) -> None:
+    def solver(parameters: ORing, observer: Observer) -> Outcome:
+        return (solve_roughly if parameters.density > 2 else solve_and_collapse)(
+            parameters, observer
+        )
+
+    arguments = (*FAST, "--set", "stroke=out", "--tolerance", "1%")
+    assert invoke("run", "oring", *arguments, solver=solver)[0] == 0
+    folder = here / "results" / "oring"
+    assert [row[-2:] for row in rows(folder)] == [["4", "ok"], ["4", "ok"]]
+    assert run_json(folder)["rejected"] == []
 
 
 def test_quiet(here: Path, invoke: Invoke) -> None:
@@ -367,7 +427,7 @@ def test_a_collapsed_film_is_no_result(here: Path, invoke: Invoke) -> None:
     assert not (folder / "profile_1_100.csv").exists()
     flagged = [line for line in out if "COLLAPSED" in line]
     assert len(flagged) == 1
-    assert flagged[0].split() == ["+100", *"-------", "COLLAPSED"]
+    assert flagged[0].split() == ["+100", *"--------", "COLLAPSED"]
     assert "collapsed film, not a result: U = +100 mm/s. Use a finer mesh." in err[-1]
     assert [state["verdict"] for state in run_json(folder)["rejected"]] == [COLLAPSED]
     assert invoke(*arguments)[0] == 0

@@ -101,5 +101,5 @@ def test_area_converges_to_the_circle_with_second_order() -> None:
 
 
 def test_density_zero_is_refused() -> None:
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(ValueError, match="at least 2/3"):
         disc_mesh(_disc(), 0)

@@ -1,0 +1,75 @@
+"""The estimated error of h*: exact where h* converges with order two, near where it does not."""
+
+from fractions import Fraction
+from math import isnan, nan
+
+import pytest
+
+from cases.observer import Outcome, Silent
+from cases.oring import run
+from cases.oring_estimate import coarser_density, h_star_error
+from cases.oring_parameters import DENSITIES, ORing
+from runtime.mesh import Disc, disc_mesh
+from tests.cases.oring_cases import oring
+
+CONVERGED = {1600.0: 3.1842, 100.0: 0.59552}
+"""h* in um on graded meshes of density 8, p_s = 1 MPa, outstroke; 4 and 8 extrapolated."""
+
+
+@pytest.fixture(scope="module")
+def curve() -> Outcome:
+    return run(_case(), Silent())
+
+
+def _case(**changes: object) -> ORing:
+    given = {"mesh": "graded", "upwinding": 1.0, "stroke": "out", "speeds": tuple(CONVERGED)}
+    return oring(**{**given, **changes})
+
+
+def test_coarser_meshes_exist() -> None:
+    densities = [coarser_density(d) for d in DENSITIES]
+    assert densities == [Fraction(n, 3) for n in (2, 5, 10, 20, 40)]
+    disc = Disc(0.0, 26.0, 1.7, -34.0, 43.0)
+    assert [disc_mesh(disc, d).arc for d in densities[:3]] == [18, 45, 90]
+    with pytest.raises(ValueError, match="a multiple of 1/3"):
+        disc_mesh(disc, Fraction(3, 2))
+
+
+@pytest.mark.parametrize("density", DENSITIES)
+def test_an_error_of_order_two_is_found_exactly(density: int) -> None:
+    def thickness(d: float) -> float:
+        return 0.7 - 0.02 / d**2
+
+    h = thickness(density)
+    estimate = h_star_error(density, h, thickness(float(coarser_density(density))))
+    assert estimate == pytest.approx(100.0 * (h - 0.7) / h, rel=1e-9)
+
+
+def test_an_error_of_another_order_is_not() -> None:
+    coarser = 0.7 - 0.02 / float(coarser_density(2)) ** 4
+    error = 100.0 * (0.02 / 2**4) / 0.7
+    assert abs(h_star_error(2, 0.7 - 0.02 / 2**4, coarser)) > 1.5 * error
+
+
+def test_the_estimate_is_within_a_factor_of_two(curve: Outcome) -> None:
+    for state in curve.states:
+        error = 100.0 * (state.h_star_um / CONVERGED[state.rod_speed] - 1.0)
+        assert 0.5 < state.h_star_error_percent / error < 2.0
+
+
+def test_the_films_of_the_coarser_mesh_are_no_results(curve: Outcome) -> None:
+    assert [state.rod_speed for state in curve.states] == list(CONVERGED)
+    assert {state.density for state in curve.states} == {2}
+    names = [stage.name for stage in curve.stages]
+    assert "coarser mesh: falling speed" in names
+    assert names.index("coarser mesh: contact") < names.index("contact to film")
+
+
+def test_without_an_estimate_nothing_else_changes(curve: Outcome) -> None:
+    plain = run(_case(error_estimate=False), Silent())
+    assert [s.h_star_um for s in plain.states] == pytest.approx(
+        [s.h_star_um for s in curve.states], rel=1e-12
+    )
+    assert all(isnan(s.h_star_error_percent) for s in plain.states)
+    assert not any(stage.name.startswith("coarser") for stage in plain.stages)
+    assert isnan(h_star_error(2, 1.0, nan))
