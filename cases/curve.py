@@ -112,8 +112,9 @@ class CurveFolder:
 
     def drop(self, rod_speed: float) -> None:
         """Take a state out of the curve; its files stay until it is written again."""
-        self.rows = [row for row in self.rows if row.rod_speed_mm_s != rod_speed]
-        if self.path.exists():
+        kept = [row for row in self.rows if row.rod_speed_mm_s != rod_speed]
+        if len(kept) < len(self.rows):
+            self.rows = kept
             self.save()
 
     def save(self) -> None:
