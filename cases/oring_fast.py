@@ -27,6 +27,7 @@ LAYER = ("film", "rod", "sealed_arc", "facet", "upwind")
 
 METHOD = "chord iterations on a frozen section"
 
+_NEAR = 0.3  # residual at which the section is in equilibrium well enough to be condensed
 _LOOSE = 1e-2  # of the states on the way from contact to film, which are no results
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
 _SHEAR_STEPS = StepRule(1.0, 0.05, target_iterations=8)
@@ -51,7 +52,7 @@ class FastFilm:
         names = [name for name in LAYER if name in present]
         layer = Layer.of(section.problem.assembler, names, shared, inner)
         closing = Newton(max_iterations=1, linear=linear)
-        return cls(section, layer, FrozenBody(linear, Chord(), closing=closing))
+        return cls(section, layer, FrozenBody(linear, Chord(), near=_NEAR, closing=closing))
 
     def weight(self, stage: Stage) -> Stage:
         """The stage from contact to film, to a tolerance that is enough for a way."""
@@ -63,7 +64,7 @@ class FastFilm:
 
     def speed(self, stage: Stage) -> Stage:
         """The stage of falling speed, to the full tolerance."""
-        return self._stage(stage, self.corrector, _SPEED_STEPS)
+        return replace(self._stage(stage, self.corrector, _SPEED_STEPS), predictor="parabola")
 
     def _stage(self, stage: Stage, corrector: FrozenBody, steps: StepRule) -> Stage:
         guards = (film_guard(self.section),)

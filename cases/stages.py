@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cases.observer import Observer, StageRecord
-from runtime.continuation import Branch, Continuation, Point, StepRule
+from runtime.continuation import Branch, Continuation, Point, Predictor, StepRule
 from runtime.newton import Corrector, Newton, NonlinearProblem
 
 Array = NDArray[np.float64]
@@ -27,6 +27,7 @@ class Stage:
     name, sealed_pressure, stroke: what observers and records call it. waypoints: parameters
     hit exactly. shown: the parameter as it is reported (mm/s for a path in log |U|). method: how
     it is solved, for the record. corrector: what solves it, None for the walker's Newton.
+    predictor: how it is guessed.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Stage:
     waypoints: tuple[float, ...] = ()
     method: str = "newton"
     corrector: Corrector | None = None
+    predictor: Predictor = "secant"
     on_point: Callable[[Point], None] = _nothing
     shown: Callable[[float], float] = float
 
@@ -93,7 +95,8 @@ class Walker:
             point = Point(stage.start, first)
             return Branch((point,), first.status, f"reached {stage.start:.9g}", *spent)
         known = iter([_nothing])  # the first point is reported above, with its own history
-        branch = Continuation(stage.corrector or self.newton, stage.steps, name=stage.name).follow(
+        corrector, predictor = stage.corrector or self.newton, stage.predictor
+        branch = Continuation(corrector, stage.steps, predictor, name=stage.name).follow(
             stage.problem_at,
             stage.start,
             stage.stop,

@@ -7,7 +7,7 @@ also passes limit points, where the parameter turns back (Keller's pseudo-arclen
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
@@ -23,8 +23,10 @@ __all__ = ["Arclength", "Branch", "Continuation", "LimitPoint", "Point", "StepRu
 ProblemAt: TypeAlias = Callable[[float], NonlinearProblem]
 Derivative: TypeAlias = Callable[[float, Vector], Vector]
 OnPoint: TypeAlias = Callable[[Point], object]
+Predictor: TypeAlias = Literal["secant", "parabola", "previous"]
 
 _LONGEST_EXTRAPOLATION = 10.0  # a secant prolonged further mostly amplifies its own error
+_PARABOLA = 2.5  # the same for a parabola, in lengths of the shorter chord
 _FOLD_ITERATIONS = 20
 _ROUNDING = 1e-9  # a step this close to a waypoint, relatively, goes there
 
@@ -137,13 +139,14 @@ class Continuation:
 
     newton: the corrector; steps: the step rule, lengths in units of the parameter (which the
     caller may have transformed, for instance to log U); predictor: "secant" through the last two
-    points, or "previous" point; keep_all: keep x at every point, not just the last two;
+    points, "parabola" through the last three (the secant until there are three), or "previous"
+    point; keep_all: keep x at every point, not just the last two;
     name: what messages call the parameter.
     """
 
     newton: Corrector
     steps: StepRule
-    predictor: Literal["secant", "previous"] = "secant"
+    predictor: Predictor = "secant"
     keep_all: bool = False
     name: str = "parameter"
 
@@ -171,13 +174,14 @@ class Continuation:
         if not solution.converged:
             return log.no_start(start, solution)
         here, step = log.accept(start, solution), self.steps.first
+        behind = [] if previous is None else [previous]
         while goals:
             parameter = _approach(here.parameter, goals[0], step)
             taken = abs(parameter - here.parameter)
-            solution = self._correct(problem_at(parameter), parameter, here, previous)
+            solution = self._correct(problem_at(parameter), parameter, [here, *behind])
             log.count(solution)
             if solution.converged:
-                previous, here = here, log.accept(parameter, solution)
+                behind, here = [here, *behind[:1]], log.accept(parameter, solution)
                 goals = goals[1:] if parameter == goals[0] else goals
                 step = self.steps.after_success(step, taken, solution.iterations)
                 continue
@@ -188,17 +192,35 @@ class Continuation:
         return log.branch(Status.CONVERGED, f"reached {self.name} = {stop:.9g}")
 
     def _correct(
-        self, problem: NonlinearProblem, parameter: float, here: Point, previous: Point | None
+        self, problem: NonlinearProblem, parameter: float, known: Sequence[Point]
     ) -> Solution:
-        """Predict at `parameter`, no further than the problem admits, and correct."""
-        x = here.solution.x
-        if self.predictor == "secant" and previous is not None:
-            before = here.parameter - previous.parameter
-            ratio = (parameter - here.parameter) / before if before else 0.0
-            ratio = min(max(ratio, -_LONGEST_EXTRAPOLATION), _LONGEST_EXTRAPOLATION)
-            dx = ratio * (x - previous.solution.x)
-            x = x + _admissible(problem, x, dx) * dx
-        return self.newton.solve(problem, x)
+        """Predict at `parameter` from the known points, last first, no further than the problem
+        admits, and correct.
+        """
+        x = known[0].solution.x
+        count = {"previous": 1, "secant": 2, "parabola": 3}[self.predictor]
+        dx = _extrapolated(known[:count], parameter)
+        return self.newton.solve(problem, x + _admissible(problem, x, dx) * dx)
+
+
+def _extrapolated(known: Sequence[Point], parameter: float) -> Vector:
+    """Change (n,) from the first of the points to `parameter`, on the polynomial through them all;
+    on that of fewer points where it goes further beyond them than they are apart.
+    """
+    here, others = known[0], known[1:]
+    t = parameter - here.parameter
+    distances = [point.parameter - here.parameter for point in others]
+    if len(set(distances)) < len(distances) or 0.0 in distances:
+        return np.zeros_like(here.solution.x)
+    if len(others) == 2 and abs(t) > _PARABOLA * min(abs(d) for d in distances):
+        return _extrapolated(known[:2], parameter)
+    if len(others) == 1:
+        t = math.copysign(min(abs(t), _LONGEST_EXTRAPOLATION * abs(distances[0])), t)
+    dx = np.zeros_like(here.solution.x)
+    for point, d in zip(others, distances, strict=True):
+        rest = math.prod((t - e) / (d - e) for e in distances if e != d)
+        dx += (t / d) * rest * (point.solution.x - here.solution.x)
+    return dx
 
 
 def _goals(start: float, stop: float, waypoints: Iterable[float]) -> list[float]:

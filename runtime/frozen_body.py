@@ -28,17 +28,21 @@ class Memory:
 
 @dataclass(frozen=True)
 class FrozenBody:
-    """Chord iterations with a condensation that is renewed at converged states only.
+    """Chord iterations with a condensation that is renewed as seldom as possible.
 
     linear: makes the condensations. chord: the iteration. wear: mean reduction of the residual in
-    an outer iteration above which the condensation counts as worn. A solve that is too slow with
-    an old condensation is tried once more with one of the last accepted state. closing: exact
-    Newton steps for a solution whose residual rounding holds up more than it does Newton's.
+    an outer iteration above which the condensation counts as worn; the next solve then begins with
+    one of the last accepted state. A solve that is too slow gets up to `renewals` new ones: made
+    where it is and going on from there if its residual is at most `near`, else one of the last
+    accepted state, from the start. closing: exact Newton steps for a solution whose residual
+    rounding holds up more than it does Newton's.
     """
 
     linear: Condenser
     chord: Chord = field(default_factory=Chord)
     wear: float = 0.35
+    near: float = 0.0
+    renewals: int = 2
     closing: Newton | None = None
     memory: Memory = field(default_factory=Memory)
 
@@ -51,28 +55,50 @@ class FrozenBody:
         memory = self.memory
         if memory.settled is None:
             memory.settled = problem.admissible(x0)
-        made, first = 0, None
-        while True:
-            if memory.condensed is None or memory.worn:
-                try:
-                    self._condense(problem)
-                except SingularMatrix as error:
-                    return _no_condensation(x0, str(error), made + 1)
-                made += 1
-            assert memory.condensed is not None
-            solution = self.chord.solve(problem, memory.condensed, x0)
-            spent = solution.iterations + (first.iterations if first else 0)
-            solution = replace(solution, factorisations=made, iterations=spent)
-            if solution.converged:
-                rate = _rate(solution)
-                solution = self._closed(problem, solution)
-                memory.settled = solution.x
-                memory.worn = rate > self.wear
-                return solution
-            slow = solution.status is Status.MAX_ITERATIONS  # else age is not to blame
-            if not slow or first is not None or memory.place is memory.settled:
-                return solution
-            first, memory.worn = solution, True
+        solution = self._from(problem, x0)
+        if solution.converged:
+            rate = _rate(solution)
+            solution = self._closed(problem, solution)
+            memory.settled = solution.x
+            memory.worn = rate > self.wear
+        return solution
+
+    def _from(self, problem: LayeredProblem, x0: Vector) -> Solution:
+        """The solution from x0, with new condensations where the one in use makes it too slow."""
+        memory = self.memory
+        assert memory.settled is not None
+        solution, place, start = _not_begun(x0), memory.settled, x0
+        fresh = memory.condensed is None or memory.worn
+        for _ in range(self.renewals + 1):
+            solution = self._attempt(problem, place if fresh else None, start, solution)
+            if solution.status is not Status.MAX_ITERATIONS:
+                break
+            if solution.residual_norms[-1] <= self.near:
+                place = start = solution.x
+            elif memory.place is not memory.settled:
+                place, start = memory.settled, x0
+            else:
+                break  # age is not to blame
+            fresh = True
+        if not solution.converged and place is not memory.settled:
+            memory.worn = True  # it was made at a state that is none
+        return solution
+
+    def _attempt(
+        self, problem: LayeredProblem, place: Vector | None, start: Vector, before: Solution
+    ) -> Solution:
+        """The solution from `start`, with a condensation made at `place` if there is one; its cost
+        includes that of what was tried `before`.
+        """
+        made, spent = before.factorisations + (place is not None), before.iterations
+        if place is not None:
+            try:
+                self._condense(problem, place)
+            except SingularMatrix as error:
+                return Solution(start, Status.SINGULAR, f"the body: {error}", (), made, spent)
+        assert self.memory.condensed is not None
+        solution = self.chord.solve(problem, self.memory.condensed, start)
+        return replace(solution, factorisations=made, iterations=spent + solution.iterations)
 
     def _closed(self, problem: LayeredProblem, solution: Solution) -> Solution:
         """The solution, after exact Newton steps if its residual was held up."""
@@ -90,12 +116,11 @@ class FrozenBody:
             iterations=solution.iterations + spent,
         )
 
-    def _condense(self, problem: LayeredProblem) -> None:
+    def _condense(self, problem: LayeredProblem, place: Vector) -> None:
         memory = self.memory
-        assert memory.settled is not None
         memory.condensed = None  # its memory is free for the new one
-        memory.condensed = self.linear.condense(problem.body(memory.settled), problem.shared)
-        memory.place, memory.worn = memory.settled, False
+        memory.condensed = self.linear.condense(problem.body(place), problem.shared)
+        memory.place, memory.worn = place, False
 
 
 def _rate(solution: Solution) -> float:
@@ -106,5 +131,5 @@ def _rate(solution: Solution) -> float:
     return float((norms[-1] / norms[0]) ** (1.0 / (len(norms) - 1)))
 
 
-def _no_condensation(x0: Vector, message: str, made: int) -> Solution:
-    return Solution(x0, Status.SINGULAR, f"the body: {message}", (), made, 0)
+def _not_begun(x0: Vector) -> Solution:
+    return Solution(x0, Status.MAX_ITERATIONS, "not begun", (), 0, 0)

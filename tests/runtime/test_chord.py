@@ -283,6 +283,36 @@ def test_a_failure_with_a_new_condensation_is_handed_on() -> None:
     assert solution.factorisations == 1
 
 
+def useless() -> Memory:
+    """A condensation made far from the solution, with which a solve takes long."""
+    place = np.full(N, 3.0)
+    return Memory(condensed(SuperLU(), Chain(), place), place, 0.9 * answer(1.0))
+
+
+def test_a_slow_solve_that_is_near_goes_on_with_a_condensation_made_where_it_is() -> None:
+    chord, x0 = Chord(max_outer=6, depth=0), 0.9 * answer(1.0)
+    solved = {}
+    for near in (0.0, 1e3):
+        body = FrozenBody(SuperLU(), chord, wear=1.0, near=near, memory=useless())
+        solved[near] = body.solve(Chain(0.92), x0)
+        assert solved[near].x == pytest.approx(answer(0.92), abs=1e-8)
+        assert body.memory.settled is solved[near].x
+    assert solved[1e3].residual_norms[0] < solved[0.0].residual_norms[0]  # it did not begin again
+    assert solved[1e3].iterations < solved[0.0].iterations
+    assert solved[1e3].factorisations == 1
+
+
+def test_a_condensation_made_on_the_way_to_nowhere_is_not_used_again() -> None:
+    body = FrozenBody(SuperLU(), Chord(max_outer=1), near=1e3, memory=useless())
+    failed = body.solve(Chain(), np.zeros(N))
+    assert failed.status is Status.MAX_ITERATIONS
+    assert (failed.factorisations, failed.iterations) == (2, 3)
+    assert body.memory.worn
+    again = body.solve(Chain(0.1), np.zeros(N))
+    assert body.memory.place is not failed.x
+    assert again.factorisations >= 1
+
+
 def test_a_held_up_residual_is_closed_by_newton() -> None:
     # a useless condensation makes it so slow that rounding seems to be reached
     chord = Chord(tolerance=1e-10, stagnation=1e8, depth=0, contraction=0.999, max_outer=99)

@@ -13,7 +13,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
-from runtime.continuation import Arclength, Continuation, StepRule
+from runtime.continuation import Arclength, Continuation, Predictor, StepRule
 from runtime.linear import SparseMatrix
 from runtime.newton import Newton
 from runtime.solution import Branch, NotConverged, Point, Status, Vector
@@ -158,6 +158,40 @@ def test_secant_needs_no_iteration_on_a_straight_path() -> None:
     assert iterations("secant")[:2] == iterations("previous")[:2]
     assert iterations("secant")[2:] == [0] * 9
     assert min(iterations("previous")[2:]) >= 3
+
+
+def bend(p: float) -> Algebraic:
+    """x^3 = q^3 with q = 1 + p + p^2, a path without curvature but in its own parabola."""
+    q = 1.0 + p + p**2
+    return Algebraic(lambda x: x**3 - q**3, lambda x: np.diag(3.0 * x**2))
+
+
+def test_a_parabola_needs_no_iteration_on_a_path_that_is_one() -> None:
+    def iterations(predictor: Predictor, path: Callable[[float], Algebraic]) -> list[int]:
+        walk = Continuation(Newton(), StepRule(0.1, 0.1, 0.1), predictor)
+        waypoints = [0.47, 0.85]  # steps of different lengths
+        points = walk.follow(path, 0.0, 1.0, np.ones(1), waypoints=waypoints).points
+        return [point.solution.iterations for point in points]
+
+    assert max(iterations("parabola", bend)[3:]) <= 1  # rounding
+    assert min(iterations("secant", bend)[1:]) >= 2
+    assert iterations("parabola", bend)[:3] == iterations("secant", bend)[:3]
+    assert sum(iterations("parabola", line)[3:]) <= sum(iterations("secant", line)[3:])
+
+
+@pytest.mark.parametrize(("goal", "guess"), [(0.35, 1.0 + 0.35 + 0.35**2), (0.9, 1.24 + 0.7 * 1.3)])
+def test_a_parabola_is_not_prolonged_far(goal: float, guess: float) -> None:
+    # from 0, 0.1 and 0.2; at 0.9 the secant through 1.11 and 1.24 takes over
+    asked: dict[float, Algebraic] = {}
+
+    def path(p: float) -> Algebraic:
+        return asked.setdefault(p, bend(p))
+
+    walk = Continuation(Newton(), StepRule(0.7, 0.1), "parabola")
+    walk.follow(path, 0.0, goal, np.ones(1), waypoints=[0.1, 0.2])
+    assert asked[0.1].visited[0] == pytest.approx([1.0])
+    assert asked[0.2].visited[0] == pytest.approx([1.22])
+    assert asked[goal].visited[0] == pytest.approx([guess])
 
 
 def test_a_walk_resumes_with_the_secant_of_its_previous_point() -> None:
