@@ -2,10 +2,11 @@
 
     OMP_NUM_THREADS=1 python -m benchmarks.solver [--densities 2 4] [--pressures 1 5]
         [--strokes out in] [--routes auto:auto monolithic:superlu] [--speeds 1600 400 100]
+        [--json FILE]
 
 A route is solver:linear. Each run has a process of its own, one after the other, so that its peak
 memory is its own. CPU seconds are those of the process: on a shared machine they tell more than
-wall seconds.
+wall seconds. The summary at the end is Markdown (`benchmarks.solver_summary`).
 """
 
 from __future__ import annotations
@@ -18,11 +19,14 @@ import resource
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
-from cases.observer import Observer
+from benchmarks.solver_summary import difference, summary
+from cases.observer import COLLAPSED, Observer
 from cases.oring import run
 from cases.oring_parameters import ORing
+from runtime.io import write_json
 
 
 class Quiet(Observer):
@@ -57,6 +61,7 @@ def measure(parameters: ORing) -> dict[str, Any]:
         "cpu": marks[-1] - cpu,
         "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
         "films": {f"{s.rod_speed:g}": s.h_star_um for s in outcome.states},
+        "collapsed": [f"{s.rod_speed:g}" for s in outcome.states if s.verdict == COLLAPSED],
         "residual": max(
             (s.residual_histories[-1][-1] for s in outcome.stages if s.residual_histories),
             default=math.nan,
@@ -102,28 +107,27 @@ def show(parameters: ORing, result: dict[str, Any]) -> None:
     print(row.format("all", *counts, result["cpu"], result["wall"], f"{result['memory']:.0f} MB"))
 
 
-def compare(
-    parameters: ORing, routes: list[str], sizes: dict[str, list[tuple[int, float]]]
-) -> None:
+def compare(parameters: ORing, routes: list[str]) -> list[dict[str, Any]]:
     """All routes of one case, against the first of them."""
     first: dict[str, Any] | None = None
+    results = []
     for route in routes:
         solver, linear = route.split(":")
         p = ORing(**{**parameters.model_dump(), "solver": solver, "linear": linear})
         result = in_its_own_process(p)
         show(p, result)
-        sizes[route].append((result["unknowns"], result["cpu"]))
+        case = p.model_dump(include={"density", "sealed_pressure", "stroke"})
+        results.append({"route": route, **case, **result})
         first = first or result
-        films = first["films"]
-        ratios = [abs(h / films[u] - 1.0) for u, h in result["films"].items() if u in films]
         print(
-            f"  h* of {len(ratios)} speeds differ by at most {max(ratios, default=0.0):.1e};"
+            f"  h* differs from the first route's by {difference(result, first)};"
             f" CPU time {result['cpu'] / first['cpu']:.1f} times the first route's"
         )
+    return results
 
 
 def main() -> None:
-    """Run every combination and say how the time grows."""
+    """Run every combination and sum up."""
     parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("--densities", type=int, nargs="+", default=[2, 4])
     parser.add_argument("--pressures", type=float, nargs="+", default=[1.0])
@@ -131,23 +135,22 @@ def main() -> None:
     parser.add_argument("--routes", nargs="+", default=["auto:auto", "monolithic:superlu"])
     speeds = [1600.0, 800.0, 400.0, 200.0, 100.0, 50.0, 25.0]
     parser.add_argument("--speeds", type=float, nargs="+", default=speeds)
+    parser.add_argument("--json", type=Path, help="file for everything that was measured")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.one:
         print(json.dumps(measure(ORing.model_validate_json(given.one))))
         return
-    sizes: dict[str, list[tuple[int, float]]] = {route: [] for route in given.routes}
+    results: list[dict[str, Any]] = []
     for pressure, stroke in itertools.product(given.pressures, given.strokes):
         for density in given.densities:
             parameters = ORing(
                 density=density, sealed_pressure=pressure, stroke=stroke, speeds=tuple(given.speeds)
             )
-            compare(parameters, given.routes, sizes)
-    for route, points in sizes.items():
-        if len(points) > 1 and points[-1][0] > points[0][0]:
-            growth = math.log(points[-1][1] / points[0][1])
-            growth /= math.log(points[-1][0] / points[0][0])
-            print(f"{route}: CPU time grows with the unknowns to the power {growth:.2f}")
+            results += compare(parameters, given.routes)
+            if given.json:
+                write_json(given.json, {"runs": results})
+    print(f"\n{summary(results)}")
 
 
 if __name__ == "__main__":

@@ -28,10 +28,11 @@ LAYER = ("film", "rod", "sealed_arc", "facet", "upwind")
 METHOD = "chord iterations on a frozen section"
 
 _NEAR = 0.3  # residual at which the section is in equilibrium well enough to be condensed
-_LOOSE = 1e-2  # of the states on the way from contact to film, which are no results
+_LOOSE = 1e-3  # of the states on the way from contact to film, which are no results
+_FIRM = 1e-6  # of the state from which speeds fall: a section is condensed there that is at rest
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
 _SHEAR_STEPS = StepRule(1.0, 0.05, target_iterations=8)
-_SPEED_STEPS = StepRule(math.log(2.0), 0.04, math.log(2.0) + 1e-9, target_iterations=30)
+_SPEED_STEPS = StepRule(math.log(2.0), 0.004, math.log(2.0) + 1e-9, target_iterations=30)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +60,8 @@ class FastFilm:
         return self._stage(stage, self.corrector.loosely(_LOOSE), _WEIGHT_STEPS)
 
     def shear(self, stage: Stage) -> Stage:
-        """The stage in which the shear stress begins to act, to the same tolerance."""
-        return self._stage(stage, self.corrector.loosely(_LOOSE), _SHEAR_STEPS)
+        """The stage in which the shear stress begins to act, to a smaller tolerance."""
+        return self._stage(stage, self.corrector.loosely(_FIRM), _SHEAR_STEPS)
 
     def speed(self, stage: Stage) -> Stage:
         """The stage of falling speed, to the full tolerance."""
