@@ -95,12 +95,13 @@ class _Run:
             numbers = film_numbers(self.section, problem, film, point.solution.x)
             found[film.speed] = numbers.h_star
 
-        film = self.first_film(stroke, x)
+        film, speeds = self.first_film(stroke, x), self.section.parameters.speeds
         with suppress(Stopped):
-            if not self._fast_films(film, x, keep):
-                film, x = self.build_film(film, x)
-                speeds = self.section.parameters.speeds
-                self.walk(speed_stage(self.section, self.settings, film, speeds, keep), x)
+            if self._fast_films(film, x, keep):
+                return found
+        with suppress(Stopped):
+            film, x = self.build_film(film, x)
+            self.walk(speed_stage(self.section, self.settings, film, speeds, keep), x)
         return found
 
     def stroke(self, stroke: Stroke, x: Array) -> None:

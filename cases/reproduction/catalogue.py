@@ -3,6 +3,7 @@
 from cases.reproduction import (
     blind,
     checks,
+    cure,
     curves,
     inverse,
     onset,
@@ -30,5 +31,6 @@ ITEMS: dict[str, Item] = {
         *points.ITEMS,
         *inverse.ITEMS,
         *statements.ITEMS,
+        *cure.ITEMS,
     ]
 }

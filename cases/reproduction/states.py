@@ -34,7 +34,7 @@ _IN_NAME = ("density", "sealed_pressure")
 def setup(density: int, sealed_pressure: float, **others: Any) -> ORing:
     """Parameters of a run, without speeds and stroke (those are left at their defaults)."""
     given: dict[str, Any] = {"density": density, "sealed_pressure": float(sealed_pressure)}
-    return ORing(**PAPER, **given, **others)
+    return ORing(**{**PAPER, **given, **others})
 
 
 @dataclass(frozen=True)
