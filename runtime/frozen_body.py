@@ -9,7 +9,8 @@ from runtime.linear import Condensed, Condenser, SingularMatrix
 from runtime.newton import Newton
 from runtime.solution import Solution, Status, Vector
 
-_HELD_UP = 10.0  # times the tolerance
+_HELD_UP = 10.0  # times the tolerance, or what rounding may make of it
+_RESCUE = 3  # Newton steps after a chord iteration that ended near the solution
 
 
 @dataclass
@@ -56,9 +57,12 @@ class FrozenBody:
         if memory.settled is None:
             memory.settled = problem.admissible(x0)
         solution = self._from(problem, x0)
+        rate = self._rate(solution)
         if solution.converged:
-            rate = _rate(solution)
             solution = self._closed(problem, solution)
+        elif self._held_up(solution):
+            solution = self._rescued(problem, solution)
+        if solution.converged:
             memory.settled = solution.x
             memory.worn = rate > self.wear
         return solution
@@ -71,7 +75,7 @@ class FrozenBody:
         fresh = memory.condensed is None or memory.worn
         for _ in range(self.renewals + 1):
             solution = self._attempt(problem, place if fresh else None, start, solution)
-            if solution.status is not Status.MAX_ITERATIONS:
+            if solution.status is not Status.MAX_ITERATIONS or self._held_up(solution):
                 break
             if solution.residual_norms[-1] <= self.near:
                 place = start = solution.x
@@ -80,7 +84,7 @@ class FrozenBody:
             else:
                 break  # age is not to blame
             fresh = True
-        if not solution.converged and place is not memory.settled:
+        if place is not memory.settled and not solution.converged:
             memory.worn = True  # it was made at a state that is none
         return solution
 
@@ -100,21 +104,43 @@ class FrozenBody:
         solution = self.chord.solve(problem, self.memory.condensed, start)
         return replace(solution, factorisations=made, iterations=spent + solution.iterations)
 
+    def _held_up(self, solution: Solution) -> bool:
+        """Whether an iteration ended where rounding begins to tell, so that Newton can finish."""
+        chord = self.chord
+        failed = solution.status in (Status.MAX_ITERATIONS, Status.DIVERGED)
+        rounding = chord.stagnation > 1.0 and self.closing is not None
+        limit = _HELD_UP * chord.stagnation * chord.tolerance
+        return failed and rounding and solution.residual_norms[-1] <= limit
+
     def _closed(self, problem: LayeredProblem, solution: Solution) -> Solution:
         """The solution, after exact Newton steps if its residual was held up."""
         norms = solution.residual_norms
         if self.closing is None or norms[-1] <= _HELD_UP * self.chord.tolerance:
             return solution
         exact = self.closing.solve(problem, solution.x)
-        made, spent = exact.factorisations, exact.iterations
         if exact.residual_norms[-1] < norms[-1]:  # converged or not, it is nearer
-            norms = (*norms, *exact.residual_norms[1:])
-            solution = replace(solution, x=exact.x, residual_norms=norms)
-        return replace(
-            solution,
-            factorisations=solution.factorisations + made,
-            iterations=solution.iterations + spent,
-        )
+            return _continued(solution, exact)
+        return _continued(solution, exact, solution.x)
+
+    def _rescued(self, problem: LayeredProblem, solution: Solution) -> Solution:
+        """The solution that exact Newton steps reach by their own rules, else the failure."""
+        assert self.closing is not None
+        patient = replace(self.closing, max_iterations=_RESCUE)
+        exact = patient.solve(problem, solution.x)
+        if not exact.converged:
+            return _continued(solution, exact, solution.x)
+        return replace(_continued(solution, exact), status=exact.status, message=exact.message)
+
+    def _rate(self, solution: Solution) -> float:
+        """Mean factor by which an outer iteration, but the first, reduced the residual, as long as
+        rounding had no part in it.
+        """
+        rounding = self.chord.stagnation * self.chord.tolerance
+        norms = solution.residual_norms[1:]
+        last = next((n for n, norm in enumerate(norms) if norm <= rounding), len(norms) - 1)
+        if last < 1 or norms[0] <= 0.0:
+            return 0.0
+        return float((norms[last] / norms[0]) ** (1.0 / last))
 
     def _condense(self, problem: LayeredProblem, place: Vector) -> None:
         memory = self.memory
@@ -123,12 +149,16 @@ class FrozenBody:
         memory.place, memory.worn = place, False
 
 
-def _rate(solution: Solution) -> float:
-    """Mean factor by which an outer iteration, but the first, reduced the residual."""
-    norms = solution.residual_norms[1:]
-    if len(norms) < 2 or norms[0] <= 0.0:
-        return 0.0
-    return float((norms[-1] / norms[0]) ** (1.0 / (len(norms) - 1)))
+def _continued(solution: Solution, exact: Solution, x: Vector | None = None) -> Solution:
+    """The solution with the cost of exact steps, and their result unless x (n,) is to be kept."""
+    norms = solution.residual_norms
+    return replace(
+        solution,
+        x=exact.x if x is None else x,
+        residual_norms=(*norms, *exact.residual_norms[1:]) if x is None else norms,
+        factorisations=solution.factorisations + exact.factorisations,
+        iterations=solution.iterations + exact.iterations,
+    )
 
 
 def _not_begun(x0: Vector) -> Solution:
