@@ -329,6 +329,43 @@ def test_a_held_up_residual_is_closed_by_newton() -> None:
     assert closed.factorisations > held.factorisations
 
 
+class Rough(Chain):
+    """A chain whose residual has an error as large as rounding makes it on a fine mesh."""
+
+    error = 1e-8
+
+    def residual(self, x: Vector) -> Vector:
+        noise = np.sin(1e12 * x)
+        noise[BOTH] = 0.0
+        return np.asarray(super().residual(x) + self.error * noise)
+
+
+@pytest.mark.parametrize(("error", "converged"), [(1e-8, True), (1e-4, False)])
+def test_newton_ends_what_rounding_holds_up(error: float, converged: bool) -> None:
+    problem, closing = Rough(), Newton(max_iterations=1)
+    object.__setattr__(problem, "error", error)
+    chord = Chord(contraction=1e-3, patience=1)  # slow as soon as nothing is gained
+    without, solution = (
+        FrozenBody(SuperLU(), chord, near=1e3, closing=newton).solve(problem, 0.99 * answer(1.0))
+        for newton in (None, closing)
+    )
+    assert not without.converged
+    assert solution.converged is converged
+    assert solution.factorisations > 1
+    if converged:
+        assert solution.x == pytest.approx(answer(1.0), abs=1e-6)
+        assert solution.residual_norms[-1] <= 1e-7
+
+
+def test_rounding_does_not_wear_a_condensation() -> None:
+    body = FrozenBody(SuperLU(), Chord(), closing=Newton(max_iterations=1))
+    first = body.solve(Rough(), np.zeros(N))
+    assert first.converged
+    again = body.solve(Rough(), first.x)
+    assert again.converged
+    assert not body.memory.worn
+
+
 def test_a_singular_body_is_a_status() -> None:
     class Loose(Chain):
         def body(self, x: Vector) -> csc_array[np.float64]:
