@@ -44,7 +44,7 @@ def test_a_small_version_of_everything_and_nothing_twice(
     for name in ITEMS:
         assert first[f"{name}.txt"].startswith(ITEMS[name].title.encode())
         assert len(first[f"{name}.csv"].splitlines()) > 1, name
-        assert (f"{name}.png" in first) == (name.startswith("fig") or name == "leakage")
+        assert (f"{name}.png" in first) == (name.startswith("fig") or name in ("leakage", "cure"))
     assert b"Mesh density 1 (paper: 16)." in first["fig7.txt"]
     assert b"oscillating: U -1600" in first["fig7.txt"]
     assert b"under-resolved: U +1600 fe m_p 1" in first["fig16.txt"]
@@ -67,7 +67,7 @@ def test_runs_side_by_side_are_the_same_as_one_by_one(tmp_path: Path) -> None:
     for request in requests:
         one, two = (store.state(request.setup, 1600.0) for store in stores)
         assert one.row is not None
-        assert one.row == two.row
+        assert repr(one.row) == repr(two.row)  # nan is not equal to itself
     assert {path.name for path in stores[1].folder.iterdir()} == {
         *("contacts", "d1-ps0", "d1-ps0.5"),
     }
