@@ -28,7 +28,6 @@ from cases.oring import run
 from cases.oring_parameters import ORing
 from runtime.io import write_json
 
-
 PAPER: dict[str, Any] = {"mesh": "uniform", "upwinding": 0.0, "error_estimate": False}
 """The scheme of the paper: the reference solves it from rest, without a coarser mesh."""
 
