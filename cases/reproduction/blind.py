@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from math import exp, isfinite, log2, nan
+from typing import Any
 
 from cases.reproduction.checks import LETTERS, observed_order
 from cases.reproduction.curves import ORDERS
 from cases.reproduction.item import DENSITIES, Item, Product, Scope, Table
-from cases.reproduction.states import Request, State, Store, ask, setup
+from cases.reproduction.states import CURED, PAPER, Request, State, Store, ask, setup
 from runtime.io import Cell
 
 STUDY = (2, 4, 8, 16)
@@ -52,7 +53,8 @@ def jumps(store: Store, scope: Scope) -> Product:
 def _piezo_requests(scope: Scope) -> list[Request]:
     u, p_s = scope.speed(100.0), scope.pressure(5.0)
     return [
-        ask(setup(d, p_s, pressure_viscosity=alpha), [u, -u])
+        ask(setup(d, p_s, pressure_viscosity=alpha, **scheme), [u, -u])
+        for scheme in (PAPER, CURED)
         for d in scope.meshes(STUDY, default=8)
         for alpha in (0.02, 0.0)
     ]
@@ -61,28 +63,47 @@ def _piezo_requests(scope: Scope) -> list[Request]:
 def piezo(store: Store, scope: Scope) -> Product:
     """Changes of film by (13), the largest pressure and its viscosity, on several meshes."""
     u, p_s = scope.speed(100.0), scope.pressure(5.0)
+    caption = f"p_s = {p_s:g} MPa, |U| = {u:g} mm/s, alpha = 0.02 against 0."
+    tables = {
+        "piezo": _piezo_table(store, scope, PAPER),
+        "piezo_cured": _piezo_table(store, scope, CURED),
+    }
+    return Product(tables, caption)
+
+
+def _piezo_table(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
+    u, p_s = scope.speed(100.0), scope.pressure(5.0)
     densities = scope.meshes(STUDY, default=8)
     rows: list[list[Cell]] = []
     for sign, stroke in ((1.0, "outstroke"), (-1.0, "instroke")):
         pairs = [
-            [store.state(setup(d, p_s, pressure_viscosity=a), sign * u) for a in (0.02, 0.0)]
+            [
+                store.state(setup(d, p_s, pressure_viscosity=alpha, **scheme), sign * u)
+                for alpha in (0.02, 0.0)
+            ]
             for d in densities
         ]
-        marks = "".join(LETTERS.get(barus.verdict, "-") for barus, _ in pairs)
-        for name in ("h_star_um", "h_min_um", "p_max_MPa"):
-            changes = [_change(barus, plain, name) for barus, plain in pairs]
-            rows.append([f"change of {name}, {stroke}, %", *changes, marks, *_limit(changes)])
-        top = [_number(barus, "p_max_MPa") for barus, _ in pairs]
-        ratio = [exp(0.02 * p) for p in top]
-        rows.append([f"largest pressure, {stroke}, MPa", *top, marks, *_limit(top)])
-        rows.append([f"viscosity there / eta_0, {stroke}", *ratio, marks, *_limit(ratio)])
+        rows += _piezo_rows(stroke, pairs)
     header = (
         "quantity",
         *(f"density_{d}" for d in densities),
         *("verdicts", "observed_order", "extrapolated"),
     )
-    caption = f"p_s = {p_s:g} MPa, |U| = {u:g} mm/s, alpha = 0.02 against 0."
-    return Product({"piezo": Table(header, rows)}, caption)
+    return Table(header, rows)
+
+
+def _piezo_rows(stroke: str, pairs: list[list[State]]) -> list[list[Cell]]:
+    """Rows of one stroke from pairs of states with and without (13)."""
+    marks = "".join(LETTERS.get(barus.verdict, "-") for barus, _ in pairs)
+    rows: list[list[Cell]] = []
+    for name in ("h_star_um", "h_min_um", "p_max_MPa"):
+        changes = [_change(barus, plain, name) for barus, plain in pairs]
+        rows.append([f"change of {name}, {stroke}, %", *changes, marks, *_limit(changes)])
+    top = [_number(barus, "p_max_MPa") for barus, _ in pairs]
+    ratio = [exp(0.02 * p) for p in top]
+    rows.append([f"largest pressure, {stroke}, MPa", *top, marks, *_limit(top)])
+    rows.append([f"viscosity there / eta_0, {stroke}", *ratio, marks, *_limit(ratio)])
+    return rows
 
 
 def _change(barus: State, plain: State, name: str) -> float:

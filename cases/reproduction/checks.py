@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite, log2, nan
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import meshio
 import numpy as np
@@ -21,7 +21,7 @@ from cases.reproduction.item import (
     density_words,
     state_table,
 )
-from cases.reproduction.states import Request, State, Store, ask, setup
+from cases.reproduction.states import CURED, PAPER, Request, State, Store, ask, setup
 from runtime.io import Cell
 
 if TYPE_CHECKING:
@@ -83,7 +83,8 @@ def observed_order(values: Sequence[float]) -> tuple[float, float]:
 def _study_requests(scope: Scope) -> list[Request]:
     pressures = scope.some_pressures(STUDY_PRESSURES)
     return [
-        ask(setup(d, p), both(scope.some_speeds()))
+        ask(setup(d, p, **scheme), both(scope.some_speeds()))
+        for scheme in (PAPER, CURED)
         for d in scope.meshes(STUDY_DENSITIES, default=8)
         for p in pressures
     ]
@@ -91,11 +92,23 @@ def _study_requests(scope: Scope) -> list[Request]:
 
 def mesh_study(store: Store, scope: Scope) -> Product:
     """h* over density at two sealed pressures: observed order and extrapolated value."""
+    caption = (
+        "h* on three meshes, the order seen in the last three and Richardson's extrapolation; nan"
+        " where the differences do not fall with one sign."
+    )
+    tables = {
+        "mesh_study": _study(store, scope, PAPER),
+        "mesh_study_cured": _study(store, scope, CURED),
+    }
+    return Product(tables, caption)
+
+
+def _study(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
     densities = scope.meshes(STUDY_DENSITIES, default=8)
     rows: list[list[Cell]] = []
     for p_s in scope.some_pressures(STUDY_PRESSURES):
         for u in both(scope.some_speeds()):
-            states = [store.state(setup(d, p_s), u) for d in densities]
+            states = [store.state(setup(d, p_s, **scheme), u) for d in densities]
             films = [s.h_star for s in states]
             order, limit = observed_order(films) if len(films) >= 3 else (nan, nan)
             marks = "".join(LETTERS.get(s.verdict, "-") for s in states)
@@ -105,11 +118,7 @@ def mesh_study(store: Store, scope: Scope) -> Product:
         *(f"h_star_um_density_{d}" for d in densities),
         *("verdicts", "observed_order", "extrapolated_um"),
     )
-    caption = (
-        "h* on three meshes, the order seen in the last three and Richardson's extrapolation; nan"
-        " where the differences do not fall with one sign."
-    )
-    return Product({"mesh_study": Table(header, rows)}, caption)
+    return Table(header, rows)
 
 
 # --- net leakage --------------------------------------------------------------------------------

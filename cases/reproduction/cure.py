@@ -7,15 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from cases.reproduction import drawing
 from cases.reproduction.item import Item, Product, Scope, Table, both
-from cases.reproduction.states import Request, State, Store, ask, setup
+from cases.reproduction.states import CURED, Request, State, Store, ask, setup
 from runtime.io import Cell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-CURED: dict[str, Any] = {"mesh": "graded", "upwinding": 1.0, "error_estimate": True}
-"""What `softehl run` does by itself."""
 
 PRESSURES = (0.0, 1.0, 2.0, 5.0)
 DENSITY, REFERENCE = 2, 8
@@ -32,7 +29,7 @@ def _requests(scope: Scope) -> list[Request]:
     found = []
     for p_s in scope.some_pressures(PRESSURES):
         found += [ask(setup(density, p_s), speeds), ask(setup(density, p_s, **CURED), speeds)]
-        reference = setup(_finest(scope), p_s, **{**CURED, "error_estimate": False})
+        reference = setup(_finest(scope), p_s, **CURED)
         found.append(ask(reference, speeds))
     return found
 
@@ -42,7 +39,7 @@ def cure(store: Store, scope: Scope) -> Product:
     density, rows = scope.mesh(DENSITY), list[list[Cell]]()
     for p_s in scope.some_pressures(PRESSURES):
         paper, cured = setup(density, p_s), setup(density, p_s, **CURED)
-        reference = setup(_finest(scope), p_s, **{**CURED, "error_estimate": False})
+        reference = setup(_finest(scope), p_s, **CURED)
         for u in both(scope.some_speeds()):
             states = [store.state(which, u) for which in (paper, cured, reference)]
             rows.append(_row(p_s, u, *states))
@@ -107,7 +104,7 @@ def _profiles(axes: Axes, store: Store, density: int, p_s: float, u: float) -> N
 def _curves(axes: Axes, store: Store, scope: Scope, p_s: float) -> None:
     speeds = [-u for u in scope.some_speeds()]
     sets = [setup(scope.mesh(DENSITY), p_s, **keys) for keys in _SCHEMES]
-    reference = setup(_finest(scope), p_s, **{**CURED, "error_estimate": False})
+    reference = setup(_finest(scope), p_s, **CURED)
     labels = (*_LABELS, f"cured, density {_finest(scope)}")
     for which, label, color in zip([*sets, reference], labels, (*_COLOURS, "0.6"), strict=True):
         states = store.states(which, speeds)
