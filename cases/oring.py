@@ -29,7 +29,7 @@ from cases.oring_path import (
     speed_stage,
     weight_stage,
 )
-from cases.oring_refinement import regraded_contact
+from cases.oring_refinement import carried_contact
 from cases.oring_results import MICROMETRE, contact_state, film_numbers, film_state
 from cases.oring_section import OringSection, build_section
 from cases.oring_stopped import Stopped
@@ -84,7 +84,7 @@ class _Run:
         """The same on a coarser mesh, whose films are no results, and its contact state."""
         section, prefix = coarser_section(self.section), "coarser mesh: "
         run = _Run(section, self.observer, self.settings, self.walker, self.records, prefix=prefix)
-        return run, run.walk(*regraded_contact(self.section, section, self.settings, x, "contact"))
+        return run, run.walk(*carried_contact(self.section, section, self.settings, x, "contact"))
 
     def thicknesses(self, stroke: Stroke, x: Array) -> dict[float, float]:
         """h* (mm) at the requested speeds, as far as they are reached; nothing is reported."""

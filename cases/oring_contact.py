@@ -19,7 +19,7 @@ from cases.contact_store import ContactStore, stored_contact
 from cases.oring_grading import PASSES, graded_disc
 from cases.oring_parameters import ORing
 from cases.oring_path import PathSettings, load_stage, squeeze_stage
-from cases.oring_refinement import finer, refined_contact, regraded_contact
+from cases.oring_refinement import carried_contact, finer
 from cases.oring_section import OringSection, build_section
 from cases.oring_stopped import Stopped
 from cases.stages import Stage
@@ -90,7 +90,7 @@ class ContactRoute:
         for number in range(1, PASSES + 1):
             graded = build_section(p, graded_disc(section, x))
             name = f"contact on graded mesh {number}"
-            x = self.walk(*regraded_contact(section, graded, self.settings, x, name))
+            x = self.walk(*carried_contact(section, graded, self.settings, x, name))
             section = graded
         return section, x
 
@@ -99,7 +99,7 @@ class ContactRoute:
         while section.parameters.density < density:
             coarse = section
             section = build_section(finer(coarse.parameters), coarse.disc)
-            x = self.walk(*refined_contact(coarse, section, self.settings, x))
+            x = self.walk(*carried_contact(coarse, section, self.settings, x))
             if section.parameters.mesh == "uniform":
                 self.contacts.keep(section, x)
         return section, x

@@ -35,10 +35,15 @@ _CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
 
 
 def graded_disc(section: OringSection, x: Array) -> Disc:
-    """The disc whose mesh is fine at the contact edges of the contact state x of the section."""
+    """The disc whose mesh is fine at the contact edges of the contact state x of the section.
+
+    Segments stay equal where the contact is too small to have edges.
+    """
     disc = uniform_disc(section.parameters)
     length = arc_positions(section)[-1]
     edges = contact_edges(section, x)
+    if not edges:
+        return disc
     steepest = max(edge.rise for edge in edges)
     spots = [
         Spot(min(max(edge.place, 0.0), length), (edge.rise / steepest) ** -0.6) for edge in edges
@@ -70,21 +75,17 @@ class Edge:
     rise: float
 
 
-def contact_edges(section: OringSection, x: Array) -> tuple[Edge, Edge]:
+def contact_edges(section: OringSection, x: Array) -> list[Edge]:
     """Where and how steeply the contact of the state x begins and ends along the arc.
 
     The square of the pressure is a straight line there, taken from the second and third node that
-    touch. Raises ValueError where fewer than three do.
+    touch; none where fewer than three do.
     """
     s, pressure = arc_positions(section), -x[section.layout.part("rod")]
     touching = np.flatnonzero(pressure > 0.0)
     if len(touching) < 3:
-        raise ValueError(
-            f"contact_edges: {len(touching)} nodes touch the rod; at least 3 are needed to find "
-            "the edges of the contact: use a finer mesh (larger density)"
-        )
-    first, last = (_edge(s[i], pressure[i] ** 2) for i in (touching[1:3], touching[-2:-4:-1]))
-    return first, last
+        return []
+    return [_edge(s[i], pressure[i] ** 2) for i in (touching[1:3], touching[-2:-4:-1])]
 
 
 def _edge(s: Array, y: Array) -> Edge:

@@ -1,4 +1,4 @@
-"""From a mesh to the one of twice its density: nodal, element and chain values.
+"""From a mesh to the one of twice its density, and back: nodal, element and chain values.
 
 The nodes of both meshes are images of index space under one mapping (`runtime.mesh`), so that
 values are interpolated in the indices of each of its five blocks.
@@ -43,6 +43,32 @@ def prolong_nodes(values: Array, density: int) -> Array:
     return result
 
 
+def restrict_nodes(values: Array, density: int) -> Array:
+    """Nodal values (V', k) at half the density from those, (V, k), at an even `density`."""
+    coarse, fine = node_blocks(density // 2), node_blocks(density)
+    result = np.empty((max(int(block.max()) for block in coarse) + 1, values.shape[1]))
+    for new, old in zip(coarse, fine, strict=True):
+        result[new] = values[old[::2, ::2]]
+    return result
+
+
+def restrict_elements(values: Array, density: int) -> Array:
+    """Element values (Q',) at half the density, means of four of those, (Q,), at `density`."""
+    long, short, layers = LONG * density, SHORT * density, LAYERS * density
+    around = 2 * (long + short)
+    grids = (
+        values[: layers * around].reshape(layers, -1),
+        values[layers * around :].reshape(short, -1),
+    )
+    return np.concatenate([_fours(grid).ravel() for grid in grids])
+
+
+def _fours(grid: Array) -> Array:
+    """Means of two by two cells."""
+    rows, columns = grid.shape
+    return np.asarray(grid.reshape(rows // 2, 2, columns // 2, 2).mean(axis=(1, 3)))
+
+
 def _halve(values: Array, axis: int) -> Array:
     """Cubic spline through values at the integers, taken at the halves."""
     count = values.shape[axis]
@@ -80,3 +106,8 @@ def prolong_chain(values: Array) -> Array:
     result[::2] = values
     result[1::2] = 0.5 * (values[:-1] + values[1:])
     return result
+
+
+def restrict_chain(values: Array) -> Array:
+    """Values (n,) at every other node of a chain, from those, (2 n - 1,), at all of them."""
+    return values[::2].copy()

@@ -19,9 +19,15 @@ _NEIGHBOURS = 32  # of a local spline: about three rings of a structured mesh
 
 
 def transfer_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
-    """Nodal values (V', k) on the new mesh from those, (V, k), on the old: local splines."""
+    """Nodal values (V', k) on the new mesh from those, (V, k), on the old: local splines.
+
+    All nan, a start that no solver takes, where elements are so long that neighbours lie in a row.
+    """
     spline = RBFInterpolator(old.points, values, neighbors=_NEIGHBOURS, kernel="cubic", degree=2)
-    return np.asarray(spline(new.points))
+    try:
+        return np.asarray(spline(new.points))
+    except np.linalg.LinAlgError:
+        return np.full((len(new.points), values.shape[1]), np.nan)
 
 
 def transfer_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:

@@ -53,10 +53,10 @@ def test_the_edge_of_a_pressure_like_a_square_root_is_found_exactly() -> None:
     assert [edge.rise for edge in edges] == pytest.approx([1.0, 1.0], abs=1e-12)
 
 
-def test_a_section_that_does_not_touch_has_no_edges() -> None:
+def test_a_section_that_does_not_touch_keeps_equal_segments() -> None:
     section = build_section(oring(density=1))
-    with pytest.raises(ValueError, match="0 nodes touch the rod; at least 3 are needed"):
-        contact_edges(section, section.at_rest())
+    assert contact_edges(section, section.at_rest()) == []
+    assert graded_disc(section, section.at_rest()) == section.disc
 
 
 def test_segments_are_finest_at_the_edges_of_the_contact() -> None:

@@ -1,4 +1,4 @@
-"""Prolongation to twice the density: polynomials, the mesh itself, chains, cells."""
+"""Prolongation to twice the density and back: polynomials, the mesh itself, chains, cells."""
 
 from __future__ import annotations
 
@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from runtime.mesh import Disc, disc_mesh
-from runtime.prolongation import node_blocks, prolong_chain, prolong_elements, prolong_nodes
+from runtime.prolongation import (
+    node_blocks,
+    prolong_chain,
+    prolong_elements,
+    prolong_nodes,
+    restrict_chain,
+    restrict_elements,
+    restrict_nodes,
+)
 
 DISC = Disc(0.0, 26.0, 1.7, -34.0, 43.0)
 
@@ -75,3 +83,27 @@ def test_cells_keep_a_constant_and_their_mean(rng: np.random.Generator) -> None:
 
 def test_chain() -> None:
     assert prolong_chain(np.array([1.0, 3.0, 2.0])).tolist() == [1.0, 2.0, 3.0, 2.5, 2.0]
+
+
+@pytest.mark.parametrize("density", [2, 4])
+def test_nodes_restricted_are_those_of_the_coarser_mesh(density: int) -> None:
+    coarse, fine = disc_mesh(DISC, density // 2), disc_mesh(DISC, density)
+    assert restrict_nodes(fine.points, density) == pytest.approx(coarse.points, abs=1e-13)
+
+
+def test_elements_restricted_keep_their_sum_and_place() -> None:
+    fine = disc_mesh(DISC, 2)
+    centres = fine.points[fine.quads].mean(axis=1)
+    coarse = disc_mesh(DISC, 1)
+    expected = coarse.points[coarse.quads].mean(axis=1)
+    for k in (0, 1):
+        found = restrict_elements(centres[:, k].copy(), 2)
+        assert 4.0 * found.sum() == pytest.approx(centres[:, k].sum())
+        assert found == pytest.approx(expected[:, k], abs=0.02)
+
+
+def test_restriction_undoes_prolongation(rng: np.random.Generator) -> None:
+    values = rng.normal(size=(len(disc_mesh(DISC, 1).points), 2))
+    assert restrict_nodes(prolong_nodes(values, 1), 2) == pytest.approx(values)
+    chain = rng.normal(size=7)
+    assert restrict_chain(prolong_chain(chain)).tolist() == chain.tolist()

@@ -1,5 +1,7 @@
 """From mesh to mesh: quadratic fields are carried over exactly, chains keep their bounds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,3 +55,11 @@ def test_a_chain_keeps_to_the_values_of_its_neighbours(part: str) -> None:
     assert -3.0 <= moved.min() < -2.5
     assert moved.max() <= 0.0
     assert moved[[0, -1]].tolist() == [0.0, 0.0]
+
+
+def test_elements_that_are_too_long_give_no_start() -> None:
+    z, r = np.meshgrid(1e-3 * np.arange(40.0), np.arange(10.0))
+    rows = replace(OLD, points=np.stack([z.ravel(), r.ravel()], axis=1))
+    moved = transfer_nodes(rows, NEW, rows.points)
+    assert moved.shape == NEW.points.shape
+    assert np.isnan(moved).all()
