@@ -133,7 +133,9 @@ class _Run:
         speed = max(self.settings.start_speed, *p.speeds)
         multipliers = x[self.section.layout.part("rod")].copy()
         shear = 1.0 if p.shear_traction else 0.0
-        return Film(p.sealed_pressure, stroke, speed, multipliers, shear=shear)
+        arc = self.section.deformed(x)[self.section.mesh.arc_nodes]
+        gap = arc[:, 1] - self.section.rod_radius
+        return Film(p.sealed_pressure, stroke, speed, multipliers, gap, shear=shear)
 
     def _fast_films(self, film: Film, x: Array, on_speed: OnSpeed) -> bool:
         """Second and third stage by chord iterations; False where these do not apply."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cases.oring_path import Film, PathSettings, film_problem
-from cases.oring_section import OringSection, build_section
+from cases.oring_section import OringSection, build_section, flux_scales
 from cases.stages import Stage
 from runtime.assembly import Assembler
 from runtime.dofs import DofLayout
@@ -42,7 +42,7 @@ class OrderPair:
     def of(cls, low: OringSection) -> OrderPair:
         """The pair for a section of an order below REFERENCE_ORDER."""
         parameters = low.parameters.model_copy(update={"pressure_order": REFERENCE_ORDER})
-        high = build_section(parameters)
+        high = build_section(parameters, low.disc)
         before, count = low.layout.total, high.layout.count("pressure")
         layout = DofLayout((*low.layout.names, "higher"), (*low.layout.counts, count))
         blocks = list(low.problem.assembler.blocks)
@@ -77,7 +77,10 @@ class OrderPair:
             shared,
             fixed=np.concatenate([shared.fixed, ends]),
             values=np.concatenate([shared.values, [film.sealed_pressure, 0.0]]),
-            scales={**shared.scales, "higher": shared.scales["pressure"]},
+            scales={
+                **shared.scales,
+                "higher": flux_scales(self.both, film.speed, film.gap, "higher"),
+            },
         )
 
     def start(self, high: Array) -> Array:

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cases.oring_section import OringSection, film_guard, film_scale
+from cases.oring_section import OringSection, film_guard, flux_scales
 from cases.stages import Stage
 from runtime.continuation import Point, StepRule
 from runtime.problem import Problem
@@ -53,7 +53,8 @@ class Film:
     """Loads of the film stages.
 
     speed: |U|, mm/s. weight: of the film forces, 1 - weight of the contact forces. shear: weight of
-    the shear stress. multipliers: (arc nodes,) rod multipliers of the contact stage, MPa.
+    the shear stress. multipliers, gap: (arc nodes,) rod multipliers, MPa, and distance of the rod,
+    mm, of the contact stage.
     moment: moment on the section (N mm) if it is free to roll, None if its rotation is held.
     """
 
@@ -61,6 +62,7 @@ class Film:
     stroke: Stroke
     speed: float
     multipliers: Array
+    gap: Array
     weight: float = 1.0
     shear: float = 1.0
     moment: float | None = None
@@ -132,7 +134,7 @@ def film_problem(section: OringSection, settings: PathSettings, film: Film) -> P
         values.append(film.moment)
     return replace(
         problem.with_fixed(fixed, values),
-        scales={**problem.scales, "pressure": film_scale(film.speed)},
+        scales={**problem.scales, "pressure": flux_scales(section, film.speed, film.gap)},
         guards=(*problem.guards, film_guard(section)),
     )
 

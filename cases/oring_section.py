@@ -36,6 +36,7 @@ HOUSING = ("housing", "sealed_wall", "air_wall")
 
 # Reference sizes of residuals: 1 MPa on 1 mm of rod, a gap of 10 micrometres, 1 milliradian.
 _REFERENCE_PRESSURE, _REFERENCE_GAP, _REFERENCE_ROTATION = 1.0, 0.01, 1e-3
+_REFERENCE_DIFFERENCE = 1e-4  # MPa between the ends of a segment
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +142,24 @@ def film_guard(section: OringSection, fraction: float = 0.9) -> StaysPositive:
 def film_scale(speed: float) -> float:
     """Reference flux (mm^2/s) of a film at |U| (mm/s): mean velocity times 10 micrometres."""
     return 0.5 * speed * _REFERENCE_GAP
+
+
+def flux_scales(section: OringSection, speed: float, gap: Array, field: str = "pressure") -> Array:
+    """Reference fluxes (n,), mm^2/s, of the equations of a pressure field at |U| (mm/s).
+
+    In a film of micrometres that of `film_scale`. Where the film is thick, h^3 / (12 eta dx) turns
+    the rounding of a pressure into a flux, so there it is what a small difference of pressure would
+    drive. gap: (arc nodes,) film thickness, mm, near enough.
+    """
+    p, arc = section.parameters, section.mesh.points[section.mesh.arc_nodes]
+    block = section.problem.assembler.block("film" if field == "pressure" else f"{field}_film")
+    dofs = block.dofs[:, 4:] - section.layout.part(field).start
+    h, dx = np.maximum(gap[1:], gap[:-1]), np.linalg.norm(np.diff(arc, axis=0), axis=1)
+    order = dofs.shape[1] - 1
+    conductance = order**2 * np.maximum(h, 0.0) ** 3 / (12.0 * p.viscosity * dx)
+    largest = np.zeros(section.layout.count(field))
+    np.maximum.at(largest, dofs, conductance[:, None])
+    return film_scale(speed) + _REFERENCE_DIFFERENCE * largest
 
 
 def _obstacles(p: ORing) -> tuple[Obstacle, ...]:

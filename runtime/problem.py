@@ -77,14 +77,15 @@ class Problem:
     parameters: block name -> parameter array; a block that is not named is switched off.
     fixed, values: unknowns that are prescribed, and to what (same length). Their equations are
     x = value, and they are eliminated from the others.
-    scales: field -> reference size of its residuals: a force (N), a flux (mm^2/s), a gap
-    times area (mm^3); `norm` is then 1 for a residual of the size of the reference load.
+    scales: field -> reference size of its residuals, one or one for each: a force (N), a flux
+    (mm^2/s), a gap times area (mm^3); `norm` is then 1 for a residual of the size of the
+    reference load.
     """
 
     assembler: Assembler
     layout: DofLayout
     parameters: Mapping[str, Array]
-    scales: Mapping[str, float]
+    scales: Mapping[str, float | Array]
     fixed: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     values: Array = field(default_factory=lambda: np.empty(0))
     guards: tuple[Guard, ...] = ()
@@ -118,9 +119,9 @@ class Problem:
         return r, self._eliminate(K)
 
     def norm(self, r: Array) -> float:
-        """Root of the sum over fields of (|R| / scale)^2, 2-norms."""
+        """Root of the sum over fields of |R / scale|^2, 2-norms."""
         parts = [
-            np.linalg.norm(r[self.layout.part(name)]) / scale for name, scale in self.scales.items()
+            np.linalg.norm(r[self.layout.part(name)] / scale) for name, scale in self.scales.items()
         ]
         return float(np.linalg.norm(parts))
 

@@ -10,6 +10,7 @@ from cases.observer import Outcome, Silent
 from cases.oring import run
 from cases.oring_contact import ContactRoute
 from cases.oring_grading import arc_positions, contact_edges, graded_disc
+from cases.oring_order import OrderPair
 from cases.oring_parameters import ORing
 from cases.oring_path import PathSettings
 from cases.oring_section import OringSection, build_section
@@ -107,3 +108,9 @@ def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
 def test_a_mesh_may_be_asked_for() -> None:
     assert ORing().mesh == "graded"
     assert _contact(1, "uniform")[0].disc.spacing is None
+
+
+def test_another_pressure_order_has_the_same_mesh() -> None:
+    section, _ = _contact(2)
+    low = build_section(oring(density=2, mesh="graded", pressure_order=2), section.disc)
+    assert OrderPair.of(low).high.mesh.points.tolist() == section.mesh.points.tolist()

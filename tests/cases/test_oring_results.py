@@ -123,7 +123,7 @@ def test_numbers_of_a_film_of_constant_thickness_and_pressure() -> None:
     # without pressure gradient the flux is U h / 2 and the friction that of Couette
     section = build_section(oring(density=1, pressure_viscosity=0.0))
     mesh, layout = section.mesh, section.layout
-    film = Film(2.0, "in", 400.0, np.zeros(mesh.arc + 1))
+    film = Film(2.0, "in", 400.0, np.zeros(mesh.arc + 1), np.zeros(mesh.arc + 1))
     problem = film_problem(section, PathSettings(), film)
     x = section.at_rest()
     x[2 * mesh.arc_nodes + 1] = 25.005 - mesh.points[mesh.arc_nodes, 1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cases.oring_path import Film, PathSettings, film_problem
-from cases.oring_section import build_section, number_unknowns
+from cases.oring_section import build_section, film_scale, flux_scales, number_unknowns
 from runtime.mesh import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
@@ -85,7 +85,7 @@ def test_obstacles_touch_the_free_section_where_they_should() -> None:
 def test_tangent_of_the_whole_problem(solid: str, stroke: str, rng: np.random.Generator) -> None:
     section = build_section(oring(density=1, solid=solid))
     layout = section.layout
-    film = Film(1.0, stroke, 400.0, rng.uniform(-3, 0, 28), weight=0.6)  # type: ignore[arg-type]
+    film = Film(1.0, stroke, 400.0, rng.uniform(-3, 0, 28), np.zeros(28), weight=0.6)  # type: ignore[arg-type]
     problem = film_problem(section, PathSettings(), film)
     x = 1e-3 * rng.normal(size=layout.total)
     x[layout.part("pressure")] = rng.uniform(0.5, 3.0, layout.count("pressure"))
@@ -109,7 +109,30 @@ def test_the_film_acts_on_a_held_section_or_on_one_with_a_given_moment(
     moment: float | None,
 ) -> None:
     section = build_section(oring(density=1))
-    film = Film(1.0, "out", 400.0, np.zeros(28), moment=moment)
+    film = Film(1.0, "out", 400.0, np.zeros(28), np.zeros(28), moment=moment)
     problem = film_problem(section, PathSettings(), film)
     prescribed = dict(zip(problem.fixed.tolist(), problem.values.tolist(), strict=True))
     assert prescribed.get(int(section.layout.dofs("rotation")[0])) == moment
+
+
+def test_fluxes_are_measured_by_what_rounding_leaves_of_them() -> None:
+    section = build_section(oring(density=1))
+    gap = np.full(28, 1e-3)
+    thin = flux_scales(section, 25.0, gap)
+    assert thin == pytest.approx(np.full(109, film_scale(25.0)), rel=1e-3)
+    gap[0] = 0.1  # the film of the first segment, four of whose pressures are its own
+    scales = flux_scales(section, 25.0, gap)
+    assert scales[5:] == pytest.approx(thin[5:])
+    dx = np.linalg.norm(np.diff(section.mesh.points[section.mesh.arc_nodes[:2]], axis=0))
+    flux = 1e-4 * 4**2 * 0.1**3 / (12.0 * section.parameters.viscosity * dx)
+    assert scales[:5] == pytest.approx(np.full(5, film_scale(25.0) + flux))
+
+
+def test_a_pressure_is_rounded_to_far_less_than_the_tolerance() -> None:
+    """A last digit of 5 MPa drives through a film of 0.1 mm less than 1e-9 of its scale."""
+    section = build_section(oring(density=8))
+    scale = flux_scales(section, 25.0, np.full(217, 0.1)).max()
+    dx = 2.37 / 216 / 4  # of the four intervals of a segment, mm
+    rounding = 0.1**3 / (12.0 * section.parameters.viscosity) * np.spacing(5.0) / dx
+    assert rounding < 1e-9 * scale
+    assert rounding > 1e-9 * film_scale(25.0)

@@ -36,7 +36,7 @@ def solved(strength: float, **changes: Any) -> Outcome:
 def films(**changes: Any) -> tuple[Problem, np.ndarray]:
     """The film problem of a coarse section, and a state in which nothing is zero."""
     section, rng = build_section(oring(density=1, **changes)), np.random.default_rng(8)
-    film = Film(1.0, "out", 400.0, rng.uniform(-3, 0, 28), weight=0.6)
+    film = Film(1.0, "out", 400.0, rng.uniform(-3, 0, 28), np.zeros(28), weight=0.6)
     problem = film_problem(section, PathSettings(), film)
     x = 1e-3 * rng.normal(size=section.layout.total)
     thickness = section.layout.part("displacement").start + 2 * section.mesh.arc_nodes + 1
@@ -139,7 +139,7 @@ def test_the_section_is_as_stiff_against_a_zigzag_as_the_theory_takes_it_to_be(s
 @pytest.mark.parametrize("stroke", ["out", "in"])
 def test_both_strokes_move_the_load_downstream(stroke: str) -> None:
     section = build_section(oring(density=1, upwinding=0.5))
-    film = Film(1.0, stroke, 400.0, np.zeros(28), weight=0.7)  # type: ignore[arg-type]
+    film = Film(1.0, stroke, 400.0, np.zeros(28), np.zeros(28), weight=0.7)  # type: ignore[arg-type]
     problem = film_problem(section, PathSettings(), film)
     names = problem.assembler.block("upwind").kernel.parameters
     given = dict(zip(names, problem.parameters["upwind"].tolist(), strict=True))
