@@ -66,7 +66,12 @@ def measure(parameters: ORing) -> dict[str, Any]:
         "films": {f"{s.rod_speed:g}": s.h_star_um for s in outcome.states},
         "collapsed": [f"{s.rod_speed:g}" for s in outcome.states if s.verdict == COLLAPSED],
         "residual": max(
-            (s.residual_histories[-1][-1] for s in outcome.stages if s.residual_histories),
+            (
+                h[-1]
+                for s in outcome.stages
+                if s.name == "falling speed"
+                for h in s.residual_histories
+            ),
             default=math.nan,
         ),
         "stages": [
