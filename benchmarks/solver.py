@@ -23,16 +23,14 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.solver_summary import difference, summary
-from cases.observer import COLLAPSED, Observer
+from cases.observer import COLLAPSED, Silent
 from cases.oring import run
 from cases.oring_parameters import ORing
+from cases.reproduction.states import PAPER
 from runtime.io import write_json
 
-PAPER: dict[str, Any] = {"mesh": "uniform", "upwinding": 0.0, "error_estimate": False}
-"""The scheme of the paper: the reference solves it from rest, without a coarser mesh."""
 
-
-class Quiet(Observer):
+class Quiet(Silent):
     """Keeps the CPU time at the end of each stage."""
 
     def __init__(self) -> None:
@@ -40,15 +38,6 @@ class Quiet(Observer):
 
     def stage(self, name: str, **details: Any) -> None:
         self.marks.append(time.process_time())
-
-    def step(self, **details: Any) -> None:
-        pass
-
-    def contact_state(self, state: Any) -> None:
-        pass
-
-    def film_state(self, state: Any) -> None:
-        pass
 
 
 def measure(parameters: ORing) -> dict[str, Any]:

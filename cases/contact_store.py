@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cases.oring_parameters import ORing
-from cases.oring_path import PathSettings, contact_problem
+from cases.oring_path import PathSettings, contact_problem, contact_stage
 from cases.oring_section import OringSection
 from cases.stages import Stage
-from runtime.continuation import StepRule
 from runtime.io import read_arrays, write_arrays
 from runtime.kernels import load_kernel
 from runtime.newton import Newton
@@ -92,16 +91,9 @@ def _fields(section: OringSection) -> tuple[str, ...]:
 
 def stored_contact(section: OringSection, settings: PathSettings, newton: Newton) -> Stage:
     """A stage of one step that verifies a stored state, or corrects it in a few iterations."""
-    p = section.parameters
-    problem = contact_problem(section, settings, p.sealed_pressure)
-    return Stage(
-        name=f"contact at density {p.density}",
-        problem_at=lambda _: problem,
-        start=p.sealed_pressure,
-        stop=p.sealed_pressure,
-        steps=StepRule(1.0, 1.0),
-        sealed_pressure=p.sealed_pressure,
-        stroke="both",
+    return contact_stage(
+        section,
+        contact_problem(section, settings, section.parameters.sealed_pressure),
         method="newton, from a stored contact state",
         corrector=replace(newton, max_iterations=_ITERATIONS),
     )

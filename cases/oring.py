@@ -30,7 +30,13 @@ from cases.oring_path import (
     weight_stage,
 )
 from cases.oring_refinement import carried_contact
-from cases.oring_results import MICROMETRE, contact_state, film_numbers, film_state
+from cases.oring_results import (
+    MICROMETRE,
+    contact_pressure,
+    contact_state,
+    film_numbers,
+    film_state,
+)
 from cases.oring_section import OringSection, build_section
 from cases.oring_stopped import Stopped
 from cases.oring_verdict import Verdict, fewest_inlet_segments
@@ -48,16 +54,22 @@ OnSpeed = Callable[[Film, Point], None]
 class _Run:
     """A run in progress: the only thing in this case that changes."""
 
-    section: OringSection
     observer: Observer
     settings: PathSettings
     walker: Walker
+    section: OringSection = field(init=False)
     records: list[StageRecord] = field(default_factory=list)
     states: list[FilmState] = field(default_factory=list)
     stopped: list[tuple[Status, str]] = field(default_factory=list)
     prefix: str = ""
     contacts: ContactStore = field(default_factory=ContactStore)
     coarser: tuple[_Run, Array] | None = None
+
+    def beside(self, section: OringSection, prefix: str) -> _Run:
+        """A run on another section, whose stages are recorded with ours under a prefix."""
+        other = _Run(self.observer, self.settings, self.walker, records=self.records, prefix=prefix)
+        other.section = section
+        return other
 
     def walk(self, stage: Stage, x: Array) -> Array:
         """Unknowns at the end of a stage; raises Stopped if it is not reached."""
@@ -82,18 +94,19 @@ class _Run:
 
     def _coarser_run(self, x: Array) -> tuple[_Run, Array]:
         """The same on a coarser mesh, whose films are no results, and its contact state."""
-        section, prefix = coarser_section(self.section), "coarser mesh: "
-        run = _Run(section, self.observer, self.settings, self.walker, self.records, prefix=prefix)
-        return run, run.walk(*carried_contact(self.section, section, self.settings, x, "contact"))
+        run = self.beside(coarser_section(self.section), "coarser mesh: ")
+        start = carried_contact(self.section, run.section, self.settings, x, "contact")
+        return run, run.walk(*start)
 
     def thicknesses(self, stroke: Stroke, x: Array) -> dict[float, float]:
         """h* (mm) at the requested speeds, as far as they are reached; nothing is reported."""
         found: dict[float, float] = {}
 
         def keep(film: Film, point: Point) -> None:
-            problem = film_problem(self.section, self.settings, film)
-            numbers = film_numbers(self.section, problem, film, point.solution.x)
-            found[film.speed] = numbers.h_star
+            if film.speed in speeds:
+                problem = film_problem(self.section, self.settings, film)
+                numbers = film_numbers(self.section, problem, film, point.solution.x)
+                found[film.speed] = numbers.h_star
 
         film, speeds = self.first_film(stroke, x), self.section.parameters.speeds
         with suppress(Stopped):
@@ -107,9 +120,7 @@ class _Run:
     def stroke(self, stroke: Stroke, x: Array) -> None:
         """Second and third stage of one stroke, from the contact state x."""
         section, settings, p = self.section, self.settings, self.section.parameters
-        reference = contact_state(
-            section, contact_problem(section, settings, p.sealed_pressure), p.sealed_pressure, x
-        ).p_max_MPa
+        reference = float(contact_pressure(section, p.sealed_pressure, x).max())
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
         coarser = self.coarser[0].thicknesses(stroke, self.coarser[1]) if self.coarser else {}
         judge = _Judge(self, Verdict(reference, fewest=fewest), coarser)
@@ -133,8 +144,7 @@ class _Run:
         speed = max(self.settings.start_speed, *p.speeds)
         multipliers = x[self.section.layout.part("rod")].copy()
         shear = 1.0 if p.shear_traction else 0.0
-        arc = self.section.deformed(x)[self.section.mesh.arc_nodes]
-        gap = arc[:, 1] - self.section.rod_radius
+        _, gap = self.section.arc_film(x)
         return Film(p.sealed_pressure, stroke, speed, multipliers, gap, shear=shear)
 
     def _fast_films(self, film: Film, x: Array, on_speed: OnSpeed) -> bool:
@@ -168,8 +178,7 @@ class _Run:
         if section.parameters.pressure_order >= REFERENCE_ORDER:
             return
         pair = OrderPair.of(section)
-        prefix = f"order {REFERENCE_ORDER}: "
-        other = _Run(pair.high, self.observer, settings, self.walker, self.records, prefix=prefix)
+        other = self.beside(pair.high, f"order {REFERENCE_ORDER}: ")
         found: dict[float, tuple[Film, Array]] = {}
 
         def keep(at: Film, point: Point) -> None:
@@ -237,16 +246,15 @@ def run(
 
     contacts: folder of contact states (`cases.contact_store`) to start from and to add to.
     """
-    section = build_section(parameters)
     walker = walker or Walker(Newton(max_iterations=10, linear=choose(parameters.linear)))
-    progress = _Run(section, observer, settings or PathSettings(), walker)
-    progress.contacts = ContactStore(contacts)
+    progress = _Run(observer, settings or PathSettings(), walker, contacts=ContactStore(contacts))
     strokes: tuple[Stroke, ...] = ("out", "in")
     wanted = strokes if parameters.stroke == "both" else (parameters.stroke,)
     try:
         x = progress.contact(parameters)
     except Stopped as stop:
         progress.stopped.append(stop.explain("contact", parameters.rotation))
+        progress.section = build_section(parameters)  # for its size: none was settled
         return _outcome(progress)
     for stroke in wanted:
         try:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from cases.oring_section import OringSection, film_guard, flux_scales
 from cases.stages import Stage
 from runtime.continuation import Point, StepRule
+from runtime.newton import Corrector, NonlinearProblem
 from runtime.problem import Problem
 
 Array = NDArray[np.float64]
@@ -176,6 +177,32 @@ def load_stage(section: OringSection, settings: PathSettings, sealed_pressure: f
         steps=settings.load_steps,
         sealed_pressure=sealed_pressure,
         stroke="both",
+    )
+
+
+def contact_stage(
+    section: OringSection,
+    problem: NonlinearProblem,
+    *,
+    method: str,
+    name: str = "",
+    corrector: Corrector | None = None,
+) -> Stage:
+    """First stage in one step, from a state that is near; its name is by the density if left out.
+
+    problem: the contact problem of the section at its sealed pressure, in whatever form.
+    """
+    p = section.parameters
+    return Stage(
+        name=name or f"contact at density {p.density}",
+        problem_at=lambda _: problem,
+        start=p.sealed_pressure,
+        stop=p.sealed_pressure,
+        steps=StepRule(1.0, 1.0),
+        sealed_pressure=p.sealed_pressure,
+        stroke="both",
+        method=method,
+        corrector=corrector,
     )
 
 

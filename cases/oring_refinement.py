@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cases.oring_parameters import ORing
-from cases.oring_path import PathSettings, contact_problem
+from cases.oring_path import PathSettings, contact_problem, contact_stage
 from cases.oring_section import HOUSING, OringSection
 from cases.stages import Stage
-from runtime.continuation import StepRule
 from runtime.held_pressure import HeldPressure, element_pressures
 from runtime.kernels import load_kernel
 from runtime.mesh import LONG
@@ -98,16 +97,7 @@ def carried_contact(
         carry.elements(pressures),
         p.bulk_modulus,
     )
-    stage = Stage(
-        name=name or f"contact at density {p.density}",
-        problem_at=lambda _: problem,
-        start=p.sealed_pressure,
-        stop=p.sealed_pressure,
-        steps=StepRule(1.0, 1.0),
-        sealed_pressure=p.sealed_pressure,
-        stroke="both",
-        method=f"newton, {carry.words}",
-    )
+    stage = contact_stage(new, problem, method=f"newton, {carry.words}", name=name)
     return stage, _unknowns(old, new, carry, x)
 
 

@@ -59,8 +59,7 @@ def film_numbers(section: OringSection, problem: Problem, film: Film, x: Array) 
         flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
     q = float(flux[around].mean())
     h_star = q / (0.5 * film.rod_speed)
-    arc = section.deformed(x)[section.mesh.arc_nodes]
-    h = arc[:, 1] - section.rod_radius
+    z, h = section.arc_film(x)
     return FilmNumbers(
         speed=film.speed,
         flux=q,
@@ -70,7 +69,7 @@ def film_numbers(section: OringSection, problem: Problem, film: Film, x: Array) 
         friction=float(2.0 * pi * section.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
         flux_variation=relative_spread(flux[whole]),
         jump=jump,
-        oscillation=oscillation(arc[:, 0], h),
+        oscillation=oscillation(z, h),
         inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
     )
 
@@ -141,8 +140,7 @@ def film_state(
 ) -> FilmState:
     """The record of a converged film whose numbers are the last of `verdict`."""
     numbers = verdict.last or film_numbers(section, problem, film, x)
-    arc = section.deformed(x)[section.mesh.arc_nodes]
-    limits = interval_below(arc[:, 0], arc[:, 1] - section.rod_radius, CONTACT_FILM)
+    limits = interval_below(*section.arc_film(x), CONTACT_FILM)
     return FilmState(
         sealed_pressure=film.sealed_pressure,
         rod_speed=film.rod_speed,

@@ -81,6 +81,11 @@ class OringSection:
         """Deformed nodes (V, 2) in (z, r), mm."""
         return self.mesh.points + x[self.layout.part("displacement")].reshape(-1, 2)
 
+    def arc_film(self, x: Array) -> tuple[Array, Array]:
+        """Positions z and distances h from the rod of the deformed arc nodes, (arc nodes,), mm."""
+        z, r = self.deformed(x)[self.mesh.arc_nodes].T
+        return z, r - self.rod_radius
+
 
 def uniform_disc(p: ORing) -> Disc:
     """The circular section with equal segments on its arc."""

@@ -113,17 +113,19 @@ class RunRecord:
         return tuple(
             u
             for u in self.case.parameters.speeds
-            if sign * u not in rows or self._too_coarse(rows[sign * u], density)
+            if sign * u not in rows or self._is_too_coarse(rows[sign * u], density)
         )
 
     def outside(self) -> list[CurveRow]:
         """The rows that do not meet the tolerance, if there is one."""
-        tolerance = self.case.parameters.tolerance
-        return [row for row in self.curve.rows if tolerance and not row.within(tolerance)]
+        return [row for row in self.curve.rows if self._is_outside(row)]
 
-    def _too_coarse(self, row: CurveRow, density: int) -> bool:
+    def _is_outside(self, row: CurveRow) -> bool:
         tolerance = self.case.parameters.tolerance
-        return tolerance is not None and row.density < density and not row.within(tolerance)
+        return tolerance is not None and not row.within(tolerance)
+
+    def _is_too_coarse(self, row: CurveRow, density: int) -> bool:
+        return row.density < density and self._is_outside(row)
 
     def begin(self) -> None:
         """Create the folder, or empty it of an earlier run that is not resumed; once."""

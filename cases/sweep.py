@@ -130,16 +130,17 @@ def _named(cases: Iterable[ORing] | Mapping[str, ORing]) -> Mapping[str, ORing]:
 
 def _name(parameters: ORing) -> str:
     """What is not at its default, as a folder name; BadInput if that is too long for one."""
-    default = ORing().model_dump()
-    parts = [
-        f"{key}={_text(value)}"
-        for key, value in parameters.model_dump(exclude={"solver", "linear"}).items()
-        if value != default[key]
-    ]
-    name = "-".join(parts) or "default"
+    name = "-".join(differences(parameters, ORing(), ("solver", "linear"))) or "default"
     if len(name) > _LONGEST:
         raise BadInput(f"a folder called {name} would be too long; allowed: a dict of named cases")
     return name
+
+
+def differences(parameters: ORing, default: ORing, but: Iterable[str]) -> list[str]:
+    """What is not as in `default`, as `key=value` for a folder name, but for some keys."""
+    usual = default.model_dump()
+    given = parameters.model_dump(exclude=set(but))
+    return [f"{key}={_text(value)}" for key, value in given.items() if value != usual[key]]
 
 
 def _text(value: object) -> str:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from math import exp, isfinite, log2, nan
 from typing import Any
 
+from cases.oring_parameters import DENSITIES
 from cases.reproduction.checks import LETTERS, observed_order
 from cases.reproduction.curves import ORDERS
-from cases.reproduction.item import DENSITIES, Item, Product, Scope, Table
+from cases.reproduction.item import STUDY_DENSITIES, Item, Product, Scope, Table
 from cases.reproduction.states import CURED, PAPER, Request, State, Store, ask, setup
 from runtime.io import Cell
-
-STUDY = (2, 4, 8, 16)
-
 
 # --- Sec. 5.2: the largest pressure jump for each density and order -----------------------------
 
@@ -55,7 +53,7 @@ def _piezo_requests(scope: Scope) -> list[Request]:
     return [
         ask(setup(d, p_s, pressure_viscosity=alpha, **scheme), [u, -u])
         for scheme in (PAPER, CURED)
-        for d in scope.meshes(STUDY, default=8)
+        for d in scope.meshes(STUDY_DENSITIES, default=8)
         for alpha in (0.02, 0.0)
     ]
 
@@ -73,7 +71,7 @@ def piezo(store: Store, scope: Scope) -> Product:
 
 def _piezo_table(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
     u, p_s = scope.speed(100.0), scope.pressure(5.0)
-    densities = scope.meshes(STUDY, default=8)
+    densities = scope.meshes(STUDY_DENSITIES, default=8)
     rows: list[list[Cell]] = []
     for sign, stroke in ((1.0, "outstroke"), (-1.0, "instroke")):
         pairs = [

@@ -13,6 +13,7 @@ from cases.leakage import LEAKAGE_COLUMNS, net_leakage
 from cases.oring_parameters import ORing
 from cases.reproduction import drawing
 from cases.reproduction.item import (
+    STUDY_DENSITIES,
     Item,
     Product,
     Scope,
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 MATRIX_PRESSURES = (0.0, 1.0, 2.0, 5.0)
 STUDY_PRESSURES = (1.0, 5.0)
-STUDY_DENSITIES = (2, 4, 8, 16)
 LETTERS = {"ok": ".", "oscillating": "o", "under-resolved": "U", "collapsed": "C"}
 """Verdict -> its letter in the matrix; a state that is not reached is a dash."""
 

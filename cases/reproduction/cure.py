@@ -110,11 +110,7 @@ def _curves(axes: Axes, store: Store, scope: Scope, p_s: float) -> None:
         states = store.states(which, speeds)
         line = drawing.Line(label, [abs(u) for u in speeds], states, color)
         drawing.draw_line(axes, line)
-    axes.set_xscale("log", base=2)
-    axes.set_yscale("log")
-    axes.xaxis.set_major_formatter("{x:g}")
-    for axis_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-        axis_formatter("{x:g}")
+    drawing.logarithmic(axes, x=True, y=True)
     axes.set_xlabel("rod speed $|U|$ [mm/s]")
     axes.set_ylabel(drawing.H_STAR)
     axes.legend()

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from cases.oring_parameters import DENSITIES
 from cases.reproduction import drawing
 from cases.reproduction.drawing import Line
 from cases.reproduction.item import (
-    DENSITIES,
     Item,
     Product,
     Scope,
@@ -80,23 +80,13 @@ def _product(name: str, chart: Chart, store: Store) -> Product:
             drawing.draw_line(panels[s.panel], line)
         panels[0].set_ylabel(drawing.H_STAR)
         for axes in panels:
-            _scales(axes, chart)
+            drawing.logarithmic(axes, x=chart.log_x, y=chart.log_y)
             axes.legend(ncols=2)
 
     table = state_table([(s.label, state) for s, some in found for state in some])
     marks = "" if all(s.plain for s in states) else f" {drawing.marks_words()}"
     caption = chart.caption + marks + doubts(states)
     return Product({name: table}, caption, draw, (3.6 * len(chart.titles) + 1.4, 3.6))
-
-
-def _scales(axes: Any, chart: Chart) -> None:
-    if chart.log_y:
-        axes.set_yscale("log")
-        for axis_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-            axis_formatter("{x:g}")
-    if chart.log_x:
-        axes.set_xscale("log", base=2)
-        axes.xaxis.set_major_formatter("{x:g}")
 
 
 def fig_9(scope: Scope) -> Chart:

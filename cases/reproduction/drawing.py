@@ -143,6 +143,17 @@ def marks_words() -> str:
     return "Hollow markers: o = oscillating, u = under-resolved."
 
 
+def logarithmic(axes: Any, *, x: bool, y: bool) -> None:
+    """Logarithmic axes with plain numbers, the abscissa by halves."""
+    if y:
+        axes.set_yscale("log")
+        for axis_formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+            axis_formatter("{x:g}")
+    if x:
+        axes.set_xscale("log", base=2)
+        axes.xaxis.set_major_formatter("{x:g}")
+
+
 def around_contact(
     axes: Axes, states: Sequence[State], around: tuple[str, float, float] | None = None
 ) -> None:

@@ -7,7 +7,7 @@ from math import exp, isfinite, log
 
 import numpy as np
 
-from cases.reproduction.blind import STUDY
+from cases.reproduction.item import STUDY_DENSITIES
 from cases.reproduction.look import Finding, Look, Measure, angle, counted, difference, numbers
 from cases.reproduction.tables import FIG_4_PRESSURES, TABLE_2, table_2_densities, unknowns
 
@@ -232,7 +232,11 @@ def _piezo(sign: float) -> Measure:
     def measure(look: Look) -> Finding:
         changes = []
         for p in look.pressures:
-            fine = look.scope.meshes(STUDY, default=8)[-1] if p == look.scope.pressure(5.0) else 0
+            fine = (
+                look.scope.meshes(STUDY_DENSITIES, default=8)[-1]
+                if p == look.scope.pressure(5.0)
+                else 0
+            )
             d = max(fine, look.density)  # at 5 MPa there is a mesh study
             a = look.h(d, p, sign * 100.0)
             b = look.h(d, p, sign * 100.0, pressure_viscosity=0.0)

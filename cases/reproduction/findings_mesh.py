@@ -6,9 +6,9 @@ import itertools
 from collections.abc import Sequence
 from math import isfinite
 
+from cases.oring_parameters import DENSITIES
 from cases.reproduction.checks import observed_order
 from cases.reproduction.curves import ORDERS
-from cases.reproduction.item import DENSITIES
 from cases.reproduction.look import Finding, Look, Measure, counted, difference, numbers, ripple
 
 VISIBLE = 0.05

@@ -19,11 +19,10 @@ import numpy as np
 
 from cases.observer import Floats
 from cases.oring_parameters import ORing
-from cases.reproduction.item import Item, Product, Scope, Table, both
+from cases.reproduction.item import STUDY_DENSITIES, Item, Product, Scope, Table, both
 from cases.reproduction.states import Request, State, Store, ask, setup
 from runtime.io import Cell
 
-DENSITIES = (2, 4, 8, 16)
 PRESSURES = (1.0, 5.0)
 
 
@@ -52,7 +51,7 @@ def film_of(gradient: float, speed: float) -> float:
 def _requests(scope: Scope) -> list[Request]:
     return [
         ask(setup(d, p), both(scope.some_speeds()))
-        for d in scope.meshes(DENSITIES, default=8)
+        for d in scope.meshes(STUDY_DENSITIES, default=8)
         for p in scope.some_pressures(PRESSURES)
     ]
 
@@ -63,7 +62,7 @@ def inverse(store: Store, scope: Scope) -> Product:
         _row(store, store.state(setup(d, p_s), u))
         for p_s in scope.some_pressures(PRESSURES)
         for u in both(scope.some_speeds())
-        for d in scope.meshes(DENSITIES, default=8)
+        for d in scope.meshes(STUDY_DENSITIES, default=8)
     ]
     header = (
         *("sealed_pressure_MPa", "rod_speed_mm_s", "density", "verdict", "h_star_um"),

@@ -4,14 +4,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from cases.oring_parameters import ORing
+from cases.oring_parameters import DENSITIES, ORing
 from cases.reproduction.states import SPEEDS, Request, State, Store
 from runtime.io import Cell
 
 if TYPE_CHECKING:  # imported late: matplotlib is slow to import
     from matplotlib.figure import Figure
 
-DENSITIES = (1, 2, 4, 8, 16)
+STUDY_DENSITIES = DENSITIES[1:]
+"""Densities that mesh studies compare."""
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from cases.reproduction.checks import STUDY_DENSITIES, STUDY_PRESSURES
-from cases.reproduction.item import Item, Product, Scope, Table, both
+from cases.reproduction.checks import STUDY_PRESSURES
+from cases.reproduction.item import STUDY_DENSITIES, Item, Product, Scope, Table, both
 from cases.reproduction.look import ripple
 from cases.reproduction.states import Request, Store, ask, setup
 from runtime.io import Cell

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from cases.oring_parameters import DENSITIES
 from cases.reproduction import drawing
 from cases.reproduction.item import (
-    DENSITIES,
     Item,
     Product,
     Scope,

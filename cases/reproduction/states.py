@@ -14,6 +14,7 @@ from cases.curve import PROFILE_COLUMNS, CurveFolder, CurveRow
 from cases.observer import COLLAPSED, OK, Floats, Profile
 from cases.oring_parameters import ORing
 from cases.record import SELECTION, SIGNS
+from cases.sweep import differences
 from runtime.io import number_text, read_columns, read_json
 
 NOT_REACHED = "not reached"
@@ -50,12 +51,7 @@ class Request:
     @property
     def name(self) -> str:
         """The folder of the run: density, p_s and what is not as in the paper's default."""
-        given, default = self.setup.model_dump(), ORing(**PAPER).model_dump()
-        others = [
-            f"{key}={number_text(value) if isinstance(value, float) else value}"
-            for key, value in given.items()
-            if key not in (*SELECTION, *_IN_NAME) and value != default[key]
-        ]
+        others = differences(self.setup, ORing(**PAPER), (*SELECTION, *_IN_NAME))
         first = [f"d{self.setup.density}", f"ps{number_text(self.setup.sealed_pressure)}"]
         return "-".join([*first, *others])
 

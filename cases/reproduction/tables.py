@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cases.oring_parameters import ORing
+from cases.oring_parameters import DENSITIES, ORing
 from cases.oring_section import build_section
-from cases.reproduction.item import DENSITIES, Item, Product, Scope, Table, density_words
+from cases.reproduction.item import Item, Product, Scope, Table, density_words
 from cases.reproduction.states import SPEEDS, Request, Store, ask, setup
 from runtime.io import number_text
 
