@@ -10,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 GENERATED := $(wildcard generated/*.c generated/*.h generated/manifest.json)
-BUILDER := $(wildcard codegen/build.py codegen/abi.py)
+BUILDER := $(wildcard codegen/tools/build.py codegen/abi.py)
 
 .PHONY: help oring test slow lint check format clean
 
@@ -64,5 +64,5 @@ $(VENV)/.dev: $(VENV)/.installed
 	@touch $@
 
 $(VENV)/.kernels: $(GENERATED) $(BUILDER) $(VENV)/.installed
-	$(BIN)/python -m codegen.build
+	$(BIN)/python -m softehl.codegen.tools.build
 	@touch $@

@@ -16,9 +16,12 @@ from sympy.core.cache import clear_cache
 
 from benchmarks.candidate import ENTRY, Candidate, Stopwatch
 from benchmarks.problem import Case
-from codegen import abi, build, emit_c, pipeline, quadrature, shapes
-from codegen.model import Definition, Model
-from codegen.models import solid
+from softehl.codegen import abi, pipeline
+from softehl.codegen.emit import c as emit_c
+from softehl.codegen.language import quadrature, shapes
+from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.models import solid
+from softehl.codegen.tools import build
 
 SHIPPED = "shipped page"
 

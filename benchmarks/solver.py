@@ -23,11 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.solver_summary import difference, summary
-from cases.observer import COLLAPSED, Silent
-from cases.oring import run
-from cases.oring_parameters import ORing
-from cases.reproduction.states import PAPER
-from runtime.io import write_json
+from softehl.cases.harness.observer import COLLAPSED, Silent
+from softehl.cases.paper.states import PAPER
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.run import run
+from softehl.runtime.io import write_json
 
 
 class Quiet(Silent):

@@ -49,8 +49,8 @@ def run(
     Writes curve.csv, profiles, sections (.vtu), plots and run.json to DIR, each state as soon as it
     is there. Exit code: 0 done, 2 bad input, 3 not converged (what was reached is saved).
     """
-    from cases.case_file import read_case
-    from cases.session import run_case
+    from softehl.cases.harness.case_file import read_case
+    from softehl.cases.harness.session import run_case
 
     if tolerance is not None:
         assignments = (*assignments, f"tolerance={tolerance.strip().removesuffix('%')}")
@@ -93,8 +93,8 @@ def reproduce(
     runs in DIR/runs. States that are no plain results are marked and named in the caption. Exit
     code: 0 done, 2 bad input.
     """
-    from cases.reproduction.command import reproduce_items
-    from cases.reproduction.item import Scope
+    from softehl.cases.paper.command import reproduce_items
+    from softehl.cases.paper.item import Scope
 
     scope = Scope(density=int(density) if density else None)
     return reproduce_items(items, scope, folder, resume=resume, jobs=jobs)

@@ -2,7 +2,7 @@
 #include "softehl_kernels.h"
 
 #ifndef SOFTEHL_SIGNATURE
-#error "build with python -m codegen.build, which passes the signature of the sources"
+#error "build with python -m softehl.codegen.tools.build, which passes the signature of the sources"
 #endif
 
 const char *softehl_signature(void)

@@ -19,13 +19,13 @@ import cffi
 import numpy as np
 import numpy.typing as npt
 
-from runtime.rules import Rule
+from softehl.runtime.fem.rules import Rule
 
 Array = npt.NDArray[np.float64]
 
 GENERATED = Path(__file__).resolve().parent.parent / "generated"
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
-REMEDY = "run `python -m codegen.build` (make does it)"
+REMEDY = "run `python -m softehl.codegen.tools.build` (make does it)"
 REMEDY_OF_OTHERS = "run `softehl generate` with its model file"
 
 _SIGNATURE = (
@@ -191,7 +191,7 @@ class _Call:
         if self.rule.basis is None:
             raise ArgumentError(
                 f"{self.kernel.name} interpolates {self.kernel.interpolated}: give it a rule with "
-                "a basis, e.g. runtime.rules.film_rule(m_p)"
+                "a basis, e.g. softehl.runtime.fem.rules.film_rule(m_p)"
             )
         shape = np.shape(self.rule.basis)
         components = self.kernel.components

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from codegen.model import Definition
-from codegen.models import boundary, contact, film, solid, support
+from softehl.codegen.language.model import Definition
+from softehl.codegen.models import boundary, contact, film, solid, support
 
 ALL: dict[str, Callable[[], Definition]] = {
     "solid_q4": solid.plain,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from codegen import quadrature, shapes
-from codegen.model import Definition, Model
+from softehl.codegen.language import quadrature, shapes
+from softehl.codegen.language.model import Definition, Model
 
 
 def follower_pressure() -> Definition:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from codegen import quadrature
-from codegen.model import Definition, Model
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.model import Definition, Model
 
 
 def augmented_lagrangian() -> Definition:

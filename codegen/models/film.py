@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from codegen import quadrature, shapes
-from codegen.model import Definition, Model
+from softehl.codegen.language import quadrature, shapes
+from softehl.codegen.language.model import Definition, Model
 
 Vectors = list[list[sp.Symbol]]
 """Components, and for each its values at the nodes."""

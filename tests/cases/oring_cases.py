@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cases.oring_parameters import ORing
+from softehl.cases.seal.parameters import ORing
 
 
 def oring(**changes: Any) -> ORing:

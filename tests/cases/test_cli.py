@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 
 import softehl
-from cases import report
-from cases.case_file import Case, Solve
-from cases.observer import (
+from softehl.cases.harness.case_file import Case, Solve
+from softehl.cases.harness.observer import (
     COLLAPSED,
     OK,
     ContactState,
@@ -28,11 +27,12 @@ from cases.observer import (
     Section,
     StageRecord,
 )
-from cases.oring_parameters import ORing
-from cases.record import RunRecord
-from cases.session import NOT_CONVERGED
-from runtime.kernels import MissingKernelsError
-from runtime.solution import Status
+from softehl.cases.harness.record import RunRecord
+from softehl.cases.harness.session import NOT_CONVERGED
+from softehl.cases.seal import report
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.kernels import MissingKernelsError
+from softehl.runtime.solve.solution import Status
 
 HEADER = (
     "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_star_error_percent,h_min_um,p_max_MPa,"
@@ -159,7 +159,7 @@ def solve_and_die(parameters: ORing, observer: Observer) -> Outcome:
 
 
 def solve_without_kernels(parameters: ORing, observer: Observer) -> Outcome:
-    raise MissingKernelsError("no compiled kernels;\nrun `python -m codegen.build`")
+    raise MissingKernelsError("no compiled kernels;\nrun `python -m softehl.codegen.tools.build`")
 
 
 # --- helpers -----------------------------------------------------------------------------------
@@ -281,7 +281,7 @@ def test_bad_input(what: str, here: Path, invoke: Invoke) -> None:
 def test_no_kernels(here: Path, invoke: Invoke) -> None:
     code, out, err = invoke("run", "oring", solver=solve_without_kernels)
     assert (code, out) == (2, [])
-    assert err == ["softehl: no compiled kernels; run `python -m codegen.build`"]
+    assert err == ["softehl: no compiled kernels; run `python -m softehl.codegen.tools.build`"]
     assert list(here.iterdir()) == []
 
 
@@ -554,7 +554,7 @@ def test_a_full_disk_is_one_line(
 def test_a_linear_solver_that_is_missing_is_bad_input(
     here: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("runtime.pardiso.available", lambda: False)
+    monkeypatch.setattr("softehl.runtime.solve.pardiso.available", lambda: False)
     code, out, err = invoke("run", "oring", *FAST, "--set", "linear=pardiso")
     assert (code, out, len(err)) == (2, [], 1)
     assert 'allowed here: "auto" or "superlu"' in err[0]

@@ -10,15 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cases.contact_store import WITHOUT_INFLUENCE, ContactStore, contact_key, stored_contact
-from cases.observer import Outcome, Silent
-from cases.oring import run
-from cases.oring_parameters import ORing
-from cases.oring_path import PathSettings, contact_problem
-from cases.oring_section import build_section
-from cases.stages import Walker
-from runtime.io import read_arrays, write_arrays
-from runtime.newton import Newton
+from softehl.cases.harness.observer import Outcome, Silent
+from softehl.cases.seal.contact_store import (
+    WITHOUT_INFLUENCE,
+    ContactStore,
+    contact_key,
+    stored_contact,
+)
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathSettings, contact_problem
+from softehl.cases.seal.run import run
+from softehl.cases.seal.section import build_section
+from softehl.cases.seal.stage import Walker
+from softehl.runtime.io import read_arrays, write_arrays
+from softehl.runtime.solve.newton import Newton
 
 Damage = Callable[[Path, np.random.Generator], None]
 STORED = "newton, from a stored contact state"

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from cases.case_file import Case
-from cases.curve import CurveRow
-from cases.leakage import LEAKAGE_COLUMNS, net_leakage
-from cases.observer import OK, OSCILLATING, UNDER_RESOLVED
-from cases.oring_parameters import ORing
-from cases.record import RunRecord
-from runtime.io import read_csv, read_json
+from softehl.cases.harness.case_file import Case
+from softehl.cases.harness.curve import CurveRow
+from softehl.cases.harness.observer import OK, OSCILLATING, UNDER_RESOLVED
+from softehl.cases.harness.record import RunRecord
+from softehl.cases.seal.leakage import LEAKAGE_COLUMNS, net_leakage
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.io import read_csv, read_json
 from tests.cases.test_cli import film_state
 
 RADIUS = 25.0

@@ -6,11 +6,11 @@ from math import isnan, nan
 
 import pytest
 
-from cases.observer import Outcome, Silent
-from cases.oring import run
-from cases.oring_estimate import ORDER, coarser_density, h_star_error
-from cases.oring_parameters import DENSITIES, ORing
-from runtime.mesh import Disc, disc_mesh
+from softehl.cases.harness.observer import Outcome, Silent
+from softehl.cases.seal.estimate import ORDER, coarser_density, h_star_error
+from softehl.cases.seal.parameters import DENSITIES, ORing
+from softehl.cases.seal.run import run
+from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
 CONVERGED = {1600.0: 3.1842, 100.0: 0.59552}

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from cases import oring_fast
-from cases.observer import Outcome
-from cases.oring import run
-from cases.oring_fast import METHOD
-from runtime.frozen_body import FrozenBody
-from runtime.linear import choose
-from runtime.solution import Solution, Status, Vector
+from softehl.cases.harness.observer import Outcome
+from softehl.cases.seal import fast as oring_fast
+from softehl.cases.seal.fast import METHOD
+from softehl.cases.seal.run import run
+from softehl.runtime.solve.linear import choose
+from softehl.runtime.solve.schur import FrozenBody
+from softehl.runtime.solve.solution import Solution, Status, Vector
 from tests.cases.oring_cases import oring
 from tests.cases.test_oring_path import Recorder
 

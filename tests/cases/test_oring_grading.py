@@ -6,17 +6,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cases.observer import Outcome, Silent
-from cases.oring import run
-from cases.oring_contact import ContactRoute
-from cases.oring_grading import arc_positions, contact_edges, graded_disc
-from cases.oring_order import OrderPair
-from cases.oring_parameters import ORing
-from cases.oring_path import PathSettings
-from cases.oring_section import OringSection, build_section
-from cases.oring_stopped import Stopped
-from cases.stages import Stage, Walker
-from runtime.mesh import corner_jacobians
+from softehl.cases.harness.observer import Outcome, Silent
+from softehl.cases.seal.contact import ContactRoute
+from softehl.cases.seal.grading import arc_positions, contact_edges, graded_disc
+from softehl.cases.seal.order import OrderPair
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathSettings
+from softehl.cases.seal.run import run
+from softehl.cases.seal.section import OringSection, build_section
+from softehl.cases.seal.stage import Stage, Walker
+from softehl.cases.seal.stopped import Stopped
+from softehl.runtime.mesh.sections import corner_jacobians
 from tests.cases.oring_cases import oring
 
 

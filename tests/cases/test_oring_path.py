@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from cases.observer import (
+from softehl.cases.harness.observer import (
     COLLAPSED,
     OK,
     OSCILLATING,
@@ -16,13 +16,13 @@ from cases.observer import (
     Outcome,
     Silent,
 )
-from cases.oring import run
-from cases.oring_path import PathSettings, squeeze_stage
-from cases.oring_section import build_section
-from cases.oring_stopped import Stopped
-from cases.oring_verdict import FilmNumbers
-from runtime.continuation import Branch, Point
-from runtime.solution import Solution, Status
+from softehl.cases.seal.path import PathSettings, squeeze_stage
+from softehl.cases.seal.run import run
+from softehl.cases.seal.section import build_section
+from softehl.cases.seal.stopped import Stopped
+from softehl.cases.seal.verdict import FilmNumbers
+from softehl.runtime.solve.continuation import Branch, Point
+from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
 
 ENDED = Branch(

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cases.observer import COLLAPSED, OK, OSCILLATING, UNDER_RESOLVED
-from cases.oring_path import Film, PathSettings, contact_problem, film_problem
-from cases.oring_results import (
+from softehl.cases.harness.observer import COLLAPSED, OK, OSCILLATING, UNDER_RESOLVED
+from softehl.cases.seal.path import Film, PathSettings, contact_problem, film_problem
+from softehl.cases.seal.results import (
     contact_pressure,
     film_numbers,
     film_state,
     inlet_segments,
     oscillation,
 )
-from cases.oring_section import build_section
-from cases.oring_verdict import FilmNumbers, Verdict, fewest_inlet_segments
+from softehl.cases.seal.section import build_section
+from softehl.cases.seal.verdict import FilmNumbers, Verdict, fewest_inlet_segments
 from tests.cases.oring_cases import oring
 
 HEALTHY = FilmNumbers(

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cases.oring_path import Film, PathSettings, film_problem
-from cases.oring_section import build_section, film_scale, flux_scales, number_unknowns
-from runtime.mesh import Disc, disc_mesh
+from softehl.cases.seal.path import Film, PathSettings, film_problem
+from softehl.cases.seal.section import build_section, film_scale, flux_scales, number_unknowns
+from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
 TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16: (189941, 1729)}

@@ -14,14 +14,14 @@ from typing import Any
 import pytest
 
 import softehl
-from cases.case_file import BadInput, Case
-from cases.lanes import solve_side_by_side
-from cases.observer import Observer, Outcome, Silent
-from cases.oring_parameters import ORing
-from cases.parallel import completed, processes
-from cases.sweep import Curve, Task, in_order, solve_cases
-from runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
-from runtime.linear import MissingBackend, SingularMatrix
+from softehl.cases.harness.case_file import BadInput, Case
+from softehl.cases.harness.observer import Observer, Outcome, Silent
+from softehl.cases.harness.processes import completed, processes
+from softehl.cases.harness.sweep import Curve, Task, in_order, solve_cases
+from softehl.cases.harness.workers import solve_side_by_side
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
+from softehl.runtime.solve.linear import MissingBackend, SingularMatrix
 from tests.cases.test_cli import outcome
 
 ERRORS = (

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from cases.case_file import BadInput, read_assignment, read_case
-from cases.oring_parameters import ORing
+from softehl.cases.harness.case_file import BadInput, read_assignment, read_case
+from softehl.cases.seal.parameters import ORing
 
 TABLE_1 = {
     "inner_diameter": 50.39,

@@ -13,20 +13,20 @@ import pytest
 from matplotlib.figure import Figure
 
 import softehl
-from cases import sweep
-from cases.case_file import BadInput
-from cases.curve import CURVE_COLUMNS
-from cases.oring_parameters import ORing
-from cases.reproduction import compute as computing
-from cases.reproduction import page
-from cases.reproduction.catalogue import ITEMS
-from cases.reproduction.checks import observed_order
-from cases.reproduction.command import reproduce_items
-from cases.reproduction.inverse import film_of, largest_inlet_gradient
-from cases.reproduction.item import Scope
-from cases.reproduction.look import angle, ripple
-from cases.reproduction.states import NOT_REACHED, Store, ask, merged, setup
-from runtime.io import write_csv, write_json
+from softehl.cases.harness import sweep
+from softehl.cases.harness.case_file import BadInput
+from softehl.cases.harness.curve import CURVE_COLUMNS
+from softehl.cases.paper import compute as computing
+from softehl.cases.paper import page
+from softehl.cases.paper.catalogue import ITEMS
+from softehl.cases.paper.checks import observed_order
+from softehl.cases.paper.command import reproduce_items
+from softehl.cases.paper.inverse import film_of, largest_inlet_gradient
+from softehl.cases.paper.item import Scope
+from softehl.cases.paper.look import angle, ripple
+from softehl.cases.paper.states import NOT_REACHED, Store, ask, merged, setup
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.io import write_csv, write_json
 
 SMALL = Scope(density=1, speeds=(1600.0,), pressures=(1.0,))
 """Every item from density 1, p_s = 1 MPa, |U| = 1600 mm/s: 22 runs."""

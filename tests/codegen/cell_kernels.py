@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from codegen import build, pipeline
-from codegen.abi import Target, function_name
-from codegen.model import Definition
+from softehl.codegen import pipeline
+from softehl.codegen.abi import Target, function_name
+from softehl.codegen.language.model import Definition
+from softehl.codegen.tools import build
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

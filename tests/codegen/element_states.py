@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from codegen.evaluate import State
-from runtime.kernels import Kernel, load_kernel
-from runtime.rules import Kind, Rule, facet_rule, film_rule
+from softehl.codegen.graph.evaluate import State
+from softehl.runtime.fem.rules import Kind, Rule, facet_rule, film_rule
+from softehl.runtime.kernels import Kernel, load_kernel
 
 Array = npt.NDArray[np.float64]
 MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))

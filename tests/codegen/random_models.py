@@ -15,8 +15,8 @@ import mpmath
 import sympy as sp
 from hypothesis import strategies as st
 
-from codegen import quadrature
-from codegen.model import Definition, Model
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.model import Definition, Model
 
 DIGITS = 50
 UNKNOWNS = tuple(sp.symbols("x y z", real=True))

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import pytest
 
-from codegen import build, pipeline
-from codegen.graph import Graph, Node, Op
-from codegen.liveness import peak_live
-from codegen.models import ALL
-from codegen.schedule import Schedule, schedule
+from softehl.codegen import pipeline
+from softehl.codegen.emit.liveness import peak_live
+from softehl.codegen.emit.schedule import Schedule, schedule
+from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.models import ALL
+from softehl.codegen.tools import build
 from tests.codegen.budget import LARGEST_FILE, REMEDY, excess, published, shipped
 from tests.codegen.workshop import unknowns
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen import build, cache, library
-from codegen.build import LIBRARY
+from softehl.codegen.tools import build, cache, library
+from softehl.codegen.tools.build import LIBRARY
 
 ROOT = Path(__file__).parents[2]
 MODEL = """
@@ -141,7 +141,7 @@ def test_the_key_of_a_library_holds_all_that_it_is_built_from(
     assert library.folder_of(Path("spring.py")) == folders[0]
     (place / "spring.py").write_text(MODEL.replace("u**2", "u**4"))
     folders.append(library.folder_of(Path("spring.py")))
-    monkeypatch.setattr("codegen.abi.VERSION", 999)
+    monkeypatch.setattr("softehl.codegen.abi.VERSION", 999)
     folders.append(library.folder_of(Path("spring.py")))
     monkeypatch.setattr(build, "FLAGS", (*build.FLAGS, "-DNOTHING"))
     folders.append(library.folder_of(Path("spring.py")))

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from codegen import quadrature
-from codegen.lower import ModelError
-from codegen.model import Definition, Model
-from runtime.kernels import ArgumentError, Kernel
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.model import Definition, Model
+from softehl.runtime.kernels import ArgumentError, Kernel
 from tests.codegen.workshop import compiled
 
 

@@ -13,13 +13,19 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from codegen import linearise, quadrature
-from codegen.abi import Task
-from codegen.differentiate import DifferentiationError, Linearisation, gradient, partials
-from codegen.evaluate import Oracle, State, evaluate
-from codegen.graph import Graph, Node, Op, operations
-from codegen.model import Definition, Model
-from codegen.models import ALL
+from softehl.codegen.abi import Task
+from softehl.codegen.derive import linearise
+from softehl.codegen.derive.differentiate import (
+    DifferentiationError,
+    Linearisation,
+    gradient,
+    partials,
+)
+from softehl.codegen.graph.evaluate import Oracle, State, evaluate
+from softehl.codegen.graph.graph import Graph, Node, Op, operations
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.models import ALL
 from tests.codegen.workshop import (
     close,
     difference,

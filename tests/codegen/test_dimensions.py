@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from codegen import kinematics as kin
-from codegen import quadrature, shapes
-from codegen.evaluate import Oracle, State
-from codegen.lower import ModelError
-from codegen.model import Definition, Model
-from runtime.kernels import ArgumentError, Kernel
+from softehl.codegen.graph.evaluate import Oracle, State
+from softehl.codegen.language import kinematics as kin
+from softehl.codegen.language import quadrature, shapes
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.model import Definition, Model
+from softehl.runtime.kernels import ArgumentError, Kernel
 from tests.codegen.workshop import compiled
 
 CUBE = (np.array(shapes.HEX_NODES) + 1.0) / 2

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codegen.abi import Target
-from codegen.models import ALL
-from codegen.pipeline import compile_model
-from runtime.assembly import Assembler, ElementBlock
-from runtime.kernels import load_kernel
+from softehl.codegen.abi import Target
+from softehl.codegen.models import ALL
+from softehl.codegen.pipeline import compile_model
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.kernels import load_kernel
 from tests.codegen.cell_kernels import TENSOR, Array, CellKernels, Plane, cell_kernels, distorted
 from tests.codegen.element_states import MATERIALS
 
@@ -127,7 +127,7 @@ def test_the_comparison_sees_our_order_of_vertices(
     tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A kernel that takes DOLFINx's vertices for ours is found out."""
-    monkeypatch.setattr("codegen.abi.VERTEX_ORDER", {})
+    monkeypatch.setattr("softehl.codegen.abi.VERTEX_ORDER", {})
     plane = distorted(rng)
     assert "1 at 0, 2 at 1, 3 at 2, 4 at 3" in compile_model(ALL["solid_q4"](), Target.UFCX).text
     cells, kernels = Cells(plane), cell_kernels(ALL["solid_q4"](), tmp_path)

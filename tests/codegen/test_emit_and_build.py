@@ -12,18 +12,16 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from codegen import build, emit_c, pipeline, quadrature
-from codegen.abi import Task
-from codegen.evaluate import Oracle, State
-from codegen.model import Definition, Model
-from codegen.models import ALL
-from runtime.kernels import (
-    Kernel,
-    MissingKernelsError,
-    StaleKernelsError,
-    load_kernel,
-)
-from runtime.rules import film_rule, gauss
+from softehl.codegen import pipeline
+from softehl.codegen.abi import Task
+from softehl.codegen.emit import c as emit_c
+from softehl.codegen.graph.evaluate import Oracle, State
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.models import ALL
+from softehl.codegen.tools import build
+from softehl.runtime.fem.rules import film_rule, gauss
+from softehl.runtime.kernels import Kernel, MissingKernelsError, StaleKernelsError, load_kernel
 from tests.codegen.workshop import compiled, write
 
 x0, x1 = 0.37, -0.81

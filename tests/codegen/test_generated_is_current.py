@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from codegen import cli
-from codegen.build import GENERATED
-from codegen.models import ALL
+from softehl.codegen.models import ALL
+from softehl.codegen.tools import cli
+from softehl.codegen.tools.build import GENERATED
 
 DIGEST = """
 import hashlib
 from codegen import pipeline
-from codegen.models import ALL
+from softehl.codegen.models import ALL
 for name, text in pipeline.files(pipeline.compile_model(make()) for make in ALL.values()).items():
     print(name, hashlib.sha256(text.encode()).hexdigest())
 """

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from codegen.graph import FREE, Graph, Node, Op, operations, reachable
+from softehl.codegen.graph.graph import FREE, Graph, Node, Op, operations, reachable
 from tests.codegen.workshop import unknowns
 
 

@@ -11,15 +11,17 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from codegen import build, pipeline, quadrature
-from codegen.differentiate import gradient
-from codegen.evaluate import Oracle, State, evaluate
-from codegen.graph import Graph, Node, Op, reachable
-from codegen.lower import ModelError
-from codegen.model import Definition, Model
-from codegen.routines import Newton, inverse
-from codegen.spec import IllegalGraphError, check
-from runtime.kernels import ArgumentError, Kernel, load_kernel
+from softehl.codegen import pipeline
+from softehl.codegen.derive.differentiate import gradient
+from softehl.codegen.graph.evaluate import Oracle, State, evaluate
+from softehl.codegen.graph.graph import Graph, Node, Op, reachable
+from softehl.codegen.graph.routines import Newton, inverse
+from softehl.codegen.graph.spec import IllegalGraphError, check
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.tools import build
+from softehl.runtime.kernels import ArgumentError, Kernel, load_kernel
 from tests.codegen.workshop import compiled, difference, element_state, off, tangent_errors
 
 HISTORY = np.array([[0.3], [0.5]])

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codegen.lower import SUPPORTED
-from codegen.model import Definition, Model
-from runtime.kernels import Kernel
+from softehl.codegen.language.lower import SUPPORTED
+from softehl.codegen.language.model import Definition, Model
+from softehl.runtime.kernels import Kernel
 from tests.codegen.workshop import compiled, tangent_errors
 
 PAGE = (Path(__file__).parents[2] / "docs" / "language.md").read_text(encoding="utf-8")

@@ -9,12 +9,12 @@ import mpmath
 import pytest
 import sympy as sp
 
-from codegen import kinematics as kin
-from codegen import quadrature
-from codegen.evaluate import evaluate
-from codegen.graph import Graph, Node, Op, operations, reachable
-from codegen.lower import Lowering, ModelError
-from codegen.model import Model
+from softehl.codegen.graph.evaluate import evaluate
+from softehl.codegen.graph.graph import Graph, Node, Op, operations, reachable
+from softehl.codegen.language import kinematics as kin
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.lower import Lowering, ModelError
+from softehl.codegen.language.model import Model
 from tests.codegen.workshop import close, inputs, unknowns
 
 x, y = sp.symbols("x y", real=True)

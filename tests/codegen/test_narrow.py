@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from codegen.graph import Graph, Node, Op
-from codegen.narrow import Narrowed, narrow
+from softehl.codegen.derive.invariants import Narrowed, narrow
+from softehl.codegen.graph.graph import Graph, Node, Op
 from tests.codegen.workshop import inputs, same_value, unknowns
 
 

@@ -17,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from codegen.evaluate import Oracle
-from codegen.graph import Node, Op, reachable
-from codegen.model import Definition
-from codegen.models import ALL
-from runtime.kernels import Kernel, load_kernel
+from softehl.codegen.graph.evaluate import Oracle
+from softehl.codegen.graph.graph import Node, Op, reachable
+from softehl.codegen.language.model import Definition
+from softehl.codegen.models import ALL
+from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases
 from tests.codegen.workshop import compiled
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from codegen.graph import FREE, Graph, Node, Op, operations, reachable
-from codegen.order import arranged
+from softehl.codegen.emit.order import arranged
+from softehl.codegen.graph.graph import FREE, Graph, Node, Op, operations, reachable
 from tests.codegen.workshop import inputs, same_value, unknowns
 
 

@@ -9,11 +9,11 @@ import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
 
-from codegen import shapes
-from codegen.evaluate import Oracle
-from codegen.model import Definition
-from runtime.kernels import Kernel
-from runtime.rules import Rule
+from softehl.codegen.graph.evaluate import Oracle
+from softehl.codegen.language import shapes
+from softehl.codegen.language.model import Definition
+from softehl.runtime.fem.rules import Rule
+from softehl.runtime.kernels import Kernel
 from tests.codegen.pages.gent import gent
 from tests.codegen.pages.maxwell import maxwell
 from tests.codegen.pages.ogden_hex8 import ogden

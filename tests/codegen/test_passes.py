@@ -7,15 +7,16 @@ from fractions import Fraction
 import mpmath
 import pytest
 
-from codegen import linearise, passes
-from codegen.abi import Task
-from codegen.evaluate import evaluate
-from codegen.graph import Graph, Node, Op, operations, reachable
-from codegen.models import ALL
-from codegen.passes import STANDARD, Pass
-from codegen.schedule import schedule
-from codegen.spec import check
-from codegen.sums import common_sums
+from softehl.codegen.abi import Task
+from softehl.codegen.derive import linearise
+from softehl.codegen.emit.schedule import schedule
+from softehl.codegen.graph.evaluate import evaluate
+from softehl.codegen.graph.graph import Graph, Node, Op, operations, reachable
+from softehl.codegen.graph.spec import check
+from softehl.codegen.models import ALL
+from softehl.codegen.optimise import passes
+from softehl.codegen.optimise.passes import STANDARD, Pass
+from softehl.codegen.optimise.sums import common_sums
 from tests.codegen.workshop import close, inputs, same_value, unknowns
 
 AT = inputs("1.3", "0.7", "2.9", "0.41")

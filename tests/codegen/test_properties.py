@@ -18,15 +18,18 @@ import pytest
 import sympy as sp
 from hypothesis import HealthCheck, Phase, given, settings
 
-from codegen import build, linearise, passes, pipeline
-from codegen.abi import Target, Task
-from codegen.arithmetic import number
-from codegen.evaluate import State
-from codegen.graph import Graph, Input, Node, Op
-from codegen.model import Definition
-from codegen.schedule import If, Schedule, Statement, schedule
-from codegen.spec import check
-from runtime.kernels import Kernel, load_kernel
+from softehl.codegen import pipeline
+from softehl.codegen.abi import Target, Task
+from softehl.codegen.derive import linearise
+from softehl.codegen.emit.schedule import If, Schedule, Statement, schedule
+from softehl.codegen.graph.arithmetic import number
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.spec import check
+from softehl.codegen.language.model import Definition
+from softehl.codegen.optimise import passes
+from softehl.codegen.tools import build
+from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.random_models import (
     DIGITS,
     UNKNOWNS,

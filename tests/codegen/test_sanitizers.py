@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from codegen import build
-from codegen.abi import Task, function_name
-from runtime.kernels import load_kernel, manifest
+from softehl.codegen.abi import Task, function_name
+from softehl.codegen.tools import build
+from softehl.runtime.kernels import load_kernel, manifest
 from tests.codegen.element_states import Case, all_cases
 
 BATCHES = (0, 1, 2, 3, 4, 5, 7, 9)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from codegen.graph import Graph, Node, Op
-from codegen.schedule import If, Loop, Statement, schedule
+from softehl.codegen.emit.schedule import If, Loop, Statement, schedule
+from softehl.codegen.graph.graph import Graph, Node, Op
 from tests.codegen.workshop import unknowns
 
 

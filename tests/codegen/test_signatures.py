@@ -11,11 +11,11 @@ import sympy as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from codegen.evaluate import evaluate
-from codegen.graph import Graph, Node, Op, operations, reachable
-from codegen.lower import Lowering
-from codegen.signatures import merge_equal
-from codegen.spec import check
+from softehl.codegen.graph.evaluate import evaluate
+from softehl.codegen.graph.graph import Graph, Node, Op, operations, reachable
+from softehl.codegen.graph.spec import check
+from softehl.codegen.language.lower import Lowering
+from softehl.codegen.optimise.signatures import merge_equal
 from tests.codegen.random_models import UNKNOWNS, Digits, K, Meaning, OutsideError, Recipe
 from tests.codegen.random_models import expressions as random_expressions
 from tests.codegen.workshop import inputs, same_value
@@ -154,7 +154,7 @@ def test_merging_keeps_random_values_as_they_were_written(expressions: list[Any]
 
 def test_a_merge_at_two_points_only_is_not_enough() -> None:
     """Values that agree at the points of the signature are told apart at the fresh ones."""
-    import codegen.signatures as s
+    import softehl.codegen.optimise.signatures as s
 
     g = Graph()
     u = g.input("dofs", 0)

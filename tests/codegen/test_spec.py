@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import pytest
 
-from codegen.graph import Graph, Node, Op
-from codegen.spec import ARITY, IllegalGraphError, check
+from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.spec import ARITY, IllegalGraphError, check
 
 
 def test_a_legal_graph_passes() -> None:

@@ -11,14 +11,15 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 
-from codegen import build, quadrature
-from codegen.differentiate import gradient
-from codegen.evaluate import Oracle, State
-from codegen.graph import Op, reachable
-from codegen.lower import ModelError
-from codegen.model import Definition, Model
-from codegen.routines import Isotropic, upper
-from runtime.kernels import Kernel, load_kernel
+from softehl.codegen.derive.differentiate import gradient
+from softehl.codegen.graph.evaluate import Oracle, State
+from softehl.codegen.graph.graph import Op, reachable
+from softehl.codegen.graph.routines import Isotropic, upper
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.tools import build
+from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors, write
 
 Array = npt.NDArray[np.float64]

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codegen import build, cli, pipeline
-from codegen.abi import Target
-from codegen.models import ALL
-from runtime.kernels import Kernel, load_kernel
+from softehl.codegen import pipeline
+from softehl.codegen.abi import Target
+from softehl.codegen.models import ALL
+from softehl.codegen.tools import build, cli
+from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases
 
 FAMILIES = ("solid_taylor", "contact", "axial_spring")

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from codegen import abi, pipeline, quadrature, shapes
-from codegen import kinematics as kin
-from codegen.evaluate import Oracle
-from codegen.lower import ModelError
-from codegen.model import Definition, Model
-from runtime.kernels import ArgumentError, Kernel
-from runtime.rules import film_rule
+from softehl.codegen import abi, pipeline
+from softehl.codegen.graph.evaluate import Oracle
+from softehl.codegen.language import kinematics as kin
+from softehl.codegen.language import quadrature, shapes
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.model import Definition, Model
+from softehl.runtime.fem.rules import film_rule
+from softehl.runtime.kernels import ArgumentError, Kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors
 
 X = np.array([[0.1, 0.0, 1.1, 0.2, 0.9, 1.0, -0.1, 0.9]])

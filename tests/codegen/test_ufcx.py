@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codegen import emit_ufcx, pipeline, quadrature
-from codegen.abi import Target
-from codegen.model import Definition, Model
-from codegen.models import ALL
-from runtime.assembly import Assembler, ElementBlock
-from runtime.kernels import load_kernel
+from softehl.codegen import pipeline
+from softehl.codegen.abi import Target
+from softehl.codegen.emit import ufcx as emit_ufcx
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.models import ALL
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.kernels import load_kernel
 from tests.codegen.cell_kernels import TENSOR, Array, CellKernels, Plane, cell_kernels, distorted
 from tests.codegen.element_states import MATERIALS, Case, all_cases
 from tests.codegen.workshop import compiled

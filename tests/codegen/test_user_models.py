@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import softehl
-from codegen import cache, cli, cli_files, library, model_text, user, verify
-from codegen.build import LIBRARY
-from codegen.model_text import ModelFileError
-from runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
+from softehl.codegen.tools import cache, cli, library, model_text, user, verify
+from softehl.codegen.tools import files as cli_files
+from softehl.codegen.tools.build import LIBRARY
+from softehl.codegen.tools.model_text import ModelFileError
+from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
 
 SPRING = """
 from softehl import Definition, Model, quadrature

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from codegen import linearise, pipeline, quadrature
-from codegen.evaluate import Oracle, State
-from codegen.model import Definition, Model
-from codegen.models import ALL
-from codegen.waists import Waist, linear_waist, strip
+from softehl.codegen import pipeline
+from softehl.codegen.derive import linearise
+from softehl.codegen.derive.interfaces import Waist, linear_waist, strip
+from softehl.codegen.graph.evaluate import Oracle, State
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.models import ALL
 from tests.codegen.workshop import compiled, linearised
 
 QUAD = ((1, 1, 1, 1), (-1, 1, 1, -1), (-1, -1, 1, 1), (1, -1, 1, -1))

@@ -10,13 +10,15 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from codegen import build, linearise, pipeline
-from codegen.abi import Task
-from codegen.emit_c import Slot
-from codegen.evaluate import Oracle, State, evaluate
-from codegen.graph import Graph, Node
-from codegen.model import Definition
-from runtime.kernels import Kernel, load_kernel
+from softehl.codegen import pipeline
+from softehl.codegen.abi import Task
+from softehl.codegen.derive import linearise
+from softehl.codegen.emit.c import Slot
+from softehl.codegen.graph.evaluate import Oracle, State, evaluate
+from softehl.codegen.graph.graph import Graph, Node
+from softehl.codegen.language.model import Definition
+from softehl.codegen.tools import build
+from softehl.runtime.kernels import Kernel, load_kernel
 
 Number = Any
 Inputs = Mapping[tuple[str, int], Number]
@@ -24,7 +26,7 @@ DIGITS = 50
 
 
 def inputs(*values: Number) -> dict[tuple[str, int], Number]:
-    """Values of `dofs[0]`, `dofs[1]`, ... for `codegen.evaluate.evaluate`."""
+    """Values of `dofs[0]`, `dofs[1]`, ... for `codegen.graph.evaluate.evaluate`."""
     return {("dofs", k): v for k, v in enumerate(values)}
 
 

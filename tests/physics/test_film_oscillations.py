@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from runtime import rules
+from softehl.runtime.fem import rules
 from tests.reference.calling import Part, assemble
 
 ROD, OIL, G, H, DX = 25.0, 6.59e-8, 3.66, 6e-4, 0.05

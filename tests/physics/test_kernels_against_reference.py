@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runtime.kernels import load_kernel
+from softehl.runtime.kernels import load_kernel
 from tests.reference import film, material, oracles, rules, solids, upwind
 from tests.reference.calling import call, rule_of
 from tests.reference.differentiate import PI, Matrix, Vector, hessian, jacobian, numbers

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from runtime import rules
+from softehl.runtime.fem import rules
 from tests.reference.calling import Part, assemble, fitted_order, solve
 from tests.reference.slider import ROD, Slider
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from runtime import rules
-from runtime.dofs import separate_dofs
+from softehl.runtime.fem import rules
+from softehl.runtime.fem.dofs import separate_dofs
 from tests.reference.calling import Part, fitted_order
 from tests.reference.slider import ROD, Slider
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runtime import rules
-from runtime.kernels import load_kernel
+from softehl.runtime.fem import rules
+from softehl.runtime.kernels import load_kernel
 from tests.reference.calling import Part, fitted_order
 
 ROD, U, OIL, G = 25.0, 400.0, 6.59e-8, 3.66

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from runtime import rules
-from runtime.kernels import load_kernel
+from softehl.runtime.fem import rules
+from softehl.runtime.kernels import load_kernel
 from tests.reference.states import State
 
 

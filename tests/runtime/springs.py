@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.assembly import Array
-from runtime.rules import Rule
+from softehl.runtime.fem.assembly import Array
+from softehl.runtime.fem.rules import Rule
 
 
 @dataclass(frozen=True)

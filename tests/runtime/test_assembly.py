@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from runtime import assembly
-from runtime.assembly import Array, Assembler, ElementBlock, Integers
-from runtime.dofs import DofLayout
-from runtime.newton import Newton
-from runtime.pattern import build_pattern
-from runtime.problem import KeepsOrientation, Problem, StaysPositive
+from softehl.runtime.fem import assembly
+from softehl.runtime.fem.assembly import Array, Assembler, ElementBlock, Integers
+from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.fem.pattern import build_pattern
+from softehl.runtime.fem.problem import KeepsOrientation, Problem, StaysPositive
+from softehl.runtime.solve.newton import Newton
 from tests.runtime.springs import Spring
 
 SIZE, ELEMENTS = 12, 25

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from runtime import pardiso
-from runtime.chord import Chord, solve_banded
-from runtime.continuation import Continuation, StepRule
-from runtime.frozen_body import FrozenBody, Memory
-from runtime.linear import Condenser, SingularMatrix, SuperLU
-from runtime.newton import Newton
-from runtime.pardiso import Pardiso
-from runtime.solution import Status, Vector
+from softehl.runtime.solve import pardiso
+from softehl.runtime.solve.continuation import Continuation, StepRule
+from softehl.runtime.solve.linear import Condenser, SingularMatrix, SuperLU
+from softehl.runtime.solve.modified_newton import Chord, solve_banded
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.pardiso import Pardiso
+from softehl.runtime.solve.schur import FrozenBody, Memory
+from softehl.runtime.solve.solution import Status, Vector
 
 N, M, K = 30, 4, 5
 SHARED, OWN = np.arange(10, 10 + M), np.arange(N - K, N)

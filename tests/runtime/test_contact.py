@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from runtime.contact import (
+from softehl.runtime.fem.contact import (
     contact_block,
     inner_cylinder,
     outer_cylinder,

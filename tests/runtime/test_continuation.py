@@ -13,10 +13,10 @@ import pytest
 from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
-from runtime.continuation import Arclength, Continuation, Predictor, StepRule
-from runtime.linear import SparseMatrix
-from runtime.newton import Newton
-from runtime.solution import Branch, NotConverged, Point, Status, Vector
+from softehl.runtime.solve.continuation import Arclength, Continuation, Predictor, StepRule
+from softehl.runtime.solve.linear import SparseMatrix
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import Branch, NotConverged, Point, Status, Vector
 
 
 def _full_step(x: Vector, dx: Vector) -> float:

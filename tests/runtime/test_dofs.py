@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from runtime.dofs import DofLayout, chain_dofs, displacement_dofs, gather_rows, separate_dofs
+from softehl.runtime.fem.dofs import (
+    DofLayout,
+    chain_dofs,
+    displacement_dofs,
+    gather_rows,
+    separate_dofs,
+)
 
 
 def test_fields_follow_each_other_without_gaps() -> None:

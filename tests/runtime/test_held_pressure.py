@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cases.oring_path import PathSettings, contact_problem
-from cases.oring_section import OringSection, build_section
-from runtime.held_pressure import HeldPressure, element_pressures
-from runtime.kernels import load_kernel
-from runtime.problem import Problem
-from runtime.solution import Vector
+from softehl.cases.seal.path import PathSettings, contact_problem
+from softehl.cases.seal.section import OringSection, build_section
+from softehl.runtime.fem.lagged_pressure import HeldPressure, element_pressures
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.kernels import load_kernel
+from softehl.runtime.solve.solution import Vector
 from tests.cases.oring_cases import oring
 
 KAPPA = 500.0

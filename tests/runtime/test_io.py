@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime import io
+from softehl.runtime import io
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from runtime.kernels import (
+from softehl.runtime.fem.rules import Rule, facet_rule, film_rule, gauss
+from softehl.runtime.kernels import (
     ArgumentError,
     Kernel,
     KernelError,
@@ -17,7 +18,6 @@ from runtime.kernels import (
     load_kernel,
     manifest,
 )
-from runtime.rules import Rule, facet_rule, film_rule, gauss
 
 Array = npt.NDArray[np.float64]
 FAMILIES = tuple(manifest())

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, csc_matrix
 
-from runtime.linear import SingularMatrix, SparseMatrix, SuperLU
-from runtime.solution import Vector
+from softehl.runtime.solve.linear import SingularMatrix, SparseMatrix, SuperLU
+from softehl.runtime.solve.solution import Vector
 
 
 def laplacian(n: int) -> Vector:

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from runtime.linear import SparseMatrix
-from runtime.newton import Newton
-from runtime.solution import NotConverged, Solution, Status, Vector
+from softehl.runtime.solve.linear import SparseMatrix
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import NotConverged, Solution, Status, Vector
 
 
 def _full_step(x: Vector, dx: Vector) -> float:

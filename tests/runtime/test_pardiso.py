@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, random_array
 
-from runtime import pardiso
-from runtime.linear import (
+from softehl.runtime.solve import pardiso
+from softehl.runtime.solve.linear import (
     Factorisation,
     LinearSolver,
     MissingBackend,
@@ -19,9 +19,9 @@ from runtime.linear import (
     SuperLU,
     choose,
 )
-from runtime.newton import Newton
-from runtime.pardiso import Pardiso
-from runtime.solution import Status, Vector
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.pardiso import Pardiso
+from softehl.runtime.solve.solution import Status, Vector
 from tests.runtime.test_linear import grid, laplacian
 
 installed = pytest.mark.skipif(not pardiso.available(), reason="the extra `fast` is not installed")

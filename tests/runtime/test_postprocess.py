@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from runtime.postprocess import (
+from softehl.runtime.fem.postprocess import (
     element_means,
     interval_below,
     local_exponent,

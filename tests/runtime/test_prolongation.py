@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runtime.mesh import Disc, disc_mesh
-from runtime.prolongation import (
+from softehl.runtime.mesh.prolongation import (
     node_blocks,
     prolong_chain,
     prolong_elements,
@@ -15,6 +14,7 @@ from runtime.prolongation import (
     restrict_elements,
     restrict_nodes,
 )
+from softehl.runtime.mesh.sections import Disc, disc_mesh
 
 DISC = Disc(0.0, 26.0, 1.7, -34.0, 43.0)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from runtime.rules import (
+from softehl.runtime.fem.rules import (
     facet_rule,
     film_rule,
     gauss,

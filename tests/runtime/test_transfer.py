@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runtime.mesh import Disc, disc_mesh
-from runtime.spacing import Spot, graded
-from runtime.transfer import transfer_chain, transfer_elements, transfer_nodes
+from softehl.runtime.mesh.sections import Disc, disc_mesh
+from softehl.runtime.mesh.spacing import Spot, graded
+from softehl.runtime.mesh.transfer import transfer_chain, transfer_elements, transfer_nodes
 
 OLD = disc_mesh(Disc(0.0, 26.0, 1.7, -34.0, 43.0), 2)
 NEW = disc_mesh(

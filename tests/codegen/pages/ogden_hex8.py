@@ -4,9 +4,9 @@ from typing import Any
 
 import sympy as sp
 
-from codegen import kinematics as kin
-from codegen import quadrature, shapes
-from codegen.model import Definition, Model
+from softehl.codegen.language import kinematics as kin
+from softehl.codegen.language import quadrature, shapes
+from softehl.codegen.language.model import Definition, Model
 
 
 def ogden() -> Definition:

@@ -2,8 +2,8 @@
 
 import sympy as sp
 
-from codegen import quadrature
-from codegen.model import Definition, Model
+from softehl.codegen.language import quadrature
+from softehl.codegen.language.model import Definition, Model
 
 
 def penalty_spring() -> Definition:

@@ -1,0 +1,1 @@
+"""What every case needs around it: parameters, files, progress, processes; no physics."""

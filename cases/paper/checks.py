@@ -1,0 +1,234 @@
+"""What is no figure of the paper: verdict matrix, mesh study, shear traction, leakage, inverse."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite, log2, nan
+from typing import TYPE_CHECKING, Any
+
+import meshio
+import numpy as np
+
+from softehl.cases.paper import drawing
+from softehl.cases.paper.item import (
+    STUDY_DENSITIES,
+    Item,
+    Product,
+    Scope,
+    Table,
+    both,
+    density_words,
+    state_table,
+)
+from softehl.cases.paper.states import CURED, PAPER, Request, State, Store, ask, setup
+from softehl.cases.seal.leakage import LEAKAGE_COLUMNS, net_leakage
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.io import Cell
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MATRIX_PRESSURES = (0.0, 1.0, 2.0, 5.0)
+STUDY_PRESSURES = (1.0, 5.0)
+LETTERS = {"ok": ".", "oscillating": "o", "under-resolved": "U", "collapsed": "C"}
+"""Verdict -> its letter in the matrix; a state that is not reached is a dash."""
+
+
+# --- every combination of p_s, stroke, speed and density ----------------------------------------
+
+
+def _matrix_setups(scope: Scope) -> list[ORing]:
+    pressures = scope.some_pressures(MATRIX_PRESSURES)
+    return [setup(d, p) for d in scope.meshes((4, 8, 16)) for p in pressures]
+
+
+def _matrix_requests(scope: Scope) -> list[Request]:
+    return [ask(s, both(scope.some_speeds())) for s in _matrix_setups(scope)]
+
+
+def matrix(store: Store, scope: Scope) -> Product:
+    """The verdict on every state, and its numbers."""
+    speeds, rows, states = scope.some_speeds(), [], []
+    for p in _matrix_setups(scope):
+        strokes = [[store.state(p, sign * u) for u in speeds] for sign in (1.0, -1.0)]
+        other = "-" if store.ended(p) else "?"
+        letters = ["".join(LETTERS.get(s.verdict, other) for s in some) for some in strokes]
+        rows.append((p.density, p.sealed_pressure, *letters))
+        states += [("", s) for some in strokes for s in some]
+    header = ("density", "sealed_pressure_MPa", "outstroke", "instroke")
+    caption = (
+        f"A letter for each |U| = {', '.join(f'{u:g}' for u in speeds)} mm/s: . ok, o oscillating,"
+        " U under-resolved, C collapsed, - not reached, ? not run to its end."
+    )
+    tables = {"matrix": Table(header, rows), "matrix_states": state_table(states)}
+    return Product(tables, caption)
+
+
+# --- mesh study ---------------------------------------------------------------------------------
+
+
+def observed_order(values: Sequence[float]) -> tuple[float, float]:
+    """Order of convergence and extrapolated value of three results, each mesh twice as fine.
+
+    nan where the differences do not fall with one sign, so that no order can be seen.
+    """
+    coarse, middle, fine = values[-3:]
+    first, second = middle - coarse, fine - middle
+    if not (isfinite(first) and isfinite(second)) or second == 0.0 or first / second <= 1.0:
+        return nan, nan
+    ratio = first / second
+    return log2(ratio), fine + second / (ratio - 1.0)
+
+
+def _study_requests(scope: Scope) -> list[Request]:
+    pressures = scope.some_pressures(STUDY_PRESSURES)
+    return [
+        ask(setup(d, p, **scheme), both(scope.some_speeds()))
+        for scheme in (PAPER, CURED)
+        for d in scope.meshes(STUDY_DENSITIES, default=8)
+        for p in pressures
+    ]
+
+
+def mesh_study(store: Store, scope: Scope) -> Product:
+    """h* over density at two sealed pressures: observed order and extrapolated value."""
+    caption = (
+        "h* on three meshes, the order seen in the last three and Richardson's extrapolation; nan"
+        " where the differences do not fall with one sign."
+    )
+    tables = {
+        "mesh_study": _study(store, scope, PAPER),
+        "mesh_study_cured": _study(store, scope, CURED),
+    }
+    return Product(tables, caption)
+
+
+def _study(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
+    densities = scope.meshes(STUDY_DENSITIES, default=8)
+    rows: list[list[Cell]] = []
+    for p_s in scope.some_pressures(STUDY_PRESSURES):
+        for u in both(scope.some_speeds()):
+            states = [store.state(setup(d, p_s, **scheme), u) for d in densities]
+            films = [s.h_star for s in states]
+            order, limit = observed_order(films) if len(films) >= 3 else (nan, nan)
+            marks = "".join(LETTERS.get(s.verdict, "-") for s in states)
+            rows.append([p_s, u, *films, marks, order, limit])
+    header = (
+        *("sealed_pressure_MPa", "rod_speed_mm_s"),
+        *(f"h_star_um_density_{d}" for d in densities),
+        *("verdicts", "observed_order", "extrapolated_um"),
+    )
+    return Table(header, rows)
+
+
+# --- net leakage --------------------------------------------------------------------------------
+
+
+def _leakage_setups(scope: Scope) -> list[ORing]:
+    return [setup(scope.mesh(16), p) for p in scope.some_pressures(MATRIX_PRESSURES)]
+
+
+def leakage(store: Store, scope: Scope) -> Product:
+    """Net leakage of a cycle over sealed pressure and speed, `cases.seal.leakage`."""
+    setups, speeds = _leakage_setups(scope), both(scope.some_speeds())
+    rows = []
+    for p in setups:
+        kept = [s.row for s in store.states(p, speeds) if s.usable and s.row is not None]
+        rows += net_leakage(kept)
+    cells = [[getattr(row, name) for name in LEAKAGE_COLUMNS] for row in rows]
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for p, color in zip(setups, drawing.shades(len(setups)), strict=True):
+            mine = [r for r in rows if r.sealed_pressure_MPa == p.sealed_pressure]
+            u, net = [r.speed_mm_s for r in mine], [r.net_film_um for r in mine]
+            axes.plot(u, net, color=color, label=f"$p_s$ = {p.sealed_pressure:g} MPa")
+            for r in mine:
+                face = color if r.verdict == "ok" else "white"
+                point = ([r.speed_mm_s], [r.net_film_um])
+                axes.plot(*point, marker="o", color=color, markerfacecolor=face)
+        axes.set_xscale("log")
+        axes.set_xlabel("rod speed $|U|$ [mm/s]")
+        axes.set_ylabel(r"$h^*_\mathrm{out} - h^*_\mathrm{in}$ [$\mu$m]")
+        axes.legend()
+
+    words = " What leaves in a cycle per unit of stroke and area; positive: the seal leaks."
+    caption = density_words(scope.mesh(16), 16) + words + " Hollow: no plain result."
+    return Product({"leakage": Table(LEAKAGE_COLUMNS, cells)}, caption, draw, (4.6, 3.2))
+
+
+# --- the shear traction -------------------------------------------------------------------------
+
+
+def _shear_requests(scope: Scope) -> list[Request]:
+    speeds = both(scope.some_speeds())
+    return [ask(s, speeds) for s in _shear_setups(scope)]
+
+
+def _shear_setups(scope: Scope) -> list[ORing]:
+    density, p_s = scope.mesh(16), scope.pressure(1.0)
+    return [setup(density, p_s), setup(density, p_s, shear_traction=False)]
+
+
+def shear(store: Store, scope: Scope) -> Product:
+    """What the shear stress (17) on the seal changes: deformation and h*."""
+    with_it, without = _shear_setups(scope)
+    rows: list[list[Cell]] = []
+    for u in both(scope.some_speeds()):
+        a, b = store.state(with_it, u), store.state(without, u)
+        if a.row is None or b.row is None or not (a.usable and b.usable):
+            rows.append([u, a.verdict, b.verdict, *[nan] * 8])
+            continue
+        shift, largest = _movement(a, b)
+        films = [a.row.h_star_um, b.row.h_star_um, 100 * (a.row.h_star_um / b.row.h_star_um - 1)]
+        minima = 100 * (a.row.h_min_um / b.row.h_min_um - 1)
+        ends = [1e3 * (getattr(a.row, k) - getattr(b.row, k)) for k in _ENDS]
+        rows.append([u, a.verdict, b.verdict, largest, shift, *ends, *films, minima])
+    header = (
+        *("rod_speed_mm_s", "verdict_with", "verdict_without"),
+        *("largest_movement_um", "mean_axial_movement_of_contact_um"),
+        *("contact_start_moves_um", "contact_end_moves_um"),
+        *("h_star_with_um", "h_star_without_um", "h_star_change_percent", "h_min_change_percent"),
+    )
+    p_s = with_it.sealed_pressure
+    caption = f"{density_words(scope.mesh(16), 16)} p_s = {p_s:g} MPa, mean rotation held."
+    return Product({"shear": Table(header, rows)}, caption)
+
+
+_ENDS = ("contact_start_mm", "contact_end_mm")
+
+
+def _movement(a: State, b: State) -> tuple[float, float]:
+    """Of the nodes in b's contact the mean axial movement from b to a, and the largest, um."""
+    points = [np.asarray(meshio.read(_section(s)).points)[:, :2] for s in (a, b)]
+    moved = 1e3 * (points[0] - points[1])
+    assert b.row is not None
+    start, end = b.row.contact_start_mm, b.row.contact_end_mm
+    z, r = points[1].T
+    inside = (z > start) & (z < end) & (r < 0.5 * b.setup.rod_diameter + 0.02)
+    shift = float(moved[inside, 0].mean()) if inside.any() else nan
+    return shift, float(np.hypot(*moved.T).max())
+
+
+def _section(state: State) -> str:
+    assert state.path is not None
+    name = state.path.name.replace("profile_", "section_").replace(".csv", ".vtu")
+    return str(state.path.with_name(name))
+
+
+ITEMS = (
+    Item(
+        "matrix",
+        "Verdicts over sealed pressure, stroke, speed and density",
+        matrix,
+        _matrix_requests,
+    ),
+    Item("mesh_study", "Mesh convergence of h*", mesh_study, _study_requests),
+    Item(
+        "leakage",
+        "Net leakage of a cycle",
+        leakage,
+        lambda scope: [ask(s, both(scope.some_speeds())) for s in _leakage_setups(scope)],
+    ),
+    Item("shear", "Effect of the shear traction", shear, _shear_requests),
+)

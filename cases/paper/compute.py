@@ -1,0 +1,103 @@
+"""Computing the runs that items need: each once, several at a time, and none that is complete."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from softehl.cases.harness.case_file import Case
+from softehl.cases.harness.processes import processes
+from softehl.cases.harness.record import strokes_of
+from softehl.cases.harness.sweep import CONTACTS, Curve, Task, solved
+from softehl.cases.paper.states import ENDED, Request, Store
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.io import read_json
+
+
+def compute(requests: Sequence[Request], store: Store, *, resume: bool, jobs: int) -> None:
+    """Run what is requested into the folders of the store; with `resume` only what is missing.
+
+    A run that does not reach a speed is no error: its states say so. Raises BadInput for kernels
+    that are to be built or folders that cannot be written to.
+    """
+    waiting = [r for r in requests if not (resume and is_complete(r, store))]
+    tasks = [
+        Task(_case(request, store, resume), store.run_folder(request.setup), resume)
+        for request in waiting
+    ]
+    with _progress(len(tasks)) as advance, _executor(jobs) as executor:
+        for curve in solved(tasks, executor):
+            advance(curve)
+
+
+def _executor(jobs: int) -> AbstractContextManager[Executor | None]:
+    return processes(jobs) if jobs > 1 else nullcontext()
+
+
+def is_complete(request: Request, store: Store) -> bool:
+    """Whether a run has ended that was asked for all these speeds (reached or not)."""
+    earlier = _earlier(request, store)
+    if earlier is None or earlier[0] not in ENDED:
+        return False
+    wanted = request.parameters
+    return set(strokes_of(wanted)) <= set(strokes_of(earlier[1])) and set(wanted.speeds) <= set(
+        earlier[1].speeds
+    )
+
+
+def _case(request: Request, store: Store, resume: bool) -> Case:
+    """The case to run: what is asked for, and what an earlier run was asked for if it is kept."""
+    speeds = set(request.speeds)
+    earlier = _earlier(request, store) if resume else None
+    if earlier:
+        signs = {"out": (1.0,), "in": (-1.0,), "both": (1.0, -1.0)}[earlier[1].stroke]
+        speeds |= {sign * u for sign in signs for u in earlier[1].speeds}
+    parameters = Request(request.setup, frozenset(speeds)).parameters
+    return Case("oring", parameters, store.folder / CONTACTS)
+
+
+def _earlier(request: Request, store: Store) -> tuple[str, ORing] | None:
+    """Status and parameters of an earlier run in the folder, None if there is none to be read."""
+    path = store.run_folder(request.setup) / "run.json"
+    try:
+        content = read_json(path)
+        return str(content["status"]), ORing(**content["parameters"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+class _Advance:
+    """Called with each curve when it is there."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self.progress, self.total, self.done = progress, total, 0
+        self.task = progress.add_task("runs", total=total) if progress else None
+
+    def __call__(self, curve: Curve) -> None:
+        self.done += 1
+        note = f"{curve.folder.name}: {'; '.join(curve.complaints) or 'done'}"
+        if self.progress and self.task is not None:
+            self.progress.update(self.task, advance=1)
+            self.progress.console.print(note, highlight=False, markup=False)
+        else:
+            click.echo(f"[{self.done}/{self.total}] {note}", err=True)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[_Advance]:
+    """A bar over the runs on a terminal, a line a run elsewhere, both on stderr."""
+    console = Console(stderr=True)
+    if not console.is_terminal or total == 0:
+        yield _Advance(None, total)
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=32),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        yield _Advance(progress, total)

@@ -1,0 +1,11 @@
+"""Every statement of the paper as (place, words, measure), in its order."""
+
+from collections.abc import Callable
+
+from softehl.cases.paper.findings_film import FILM
+from softehl.cases.paper.findings_mesh import MESH
+from softehl.cases.paper.look import Finding, Look
+
+__all__ = ["FINDINGS", "Finding", "Look"]
+
+FINDINGS: tuple[tuple[str, str, Callable[[Look], Finding]], ...] = (*FILM, *MESH)

@@ -1,0 +1,301 @@
+"""Statements on the lubricated seal: section 5.1, section 5.3 and the introduction."""
+
+from __future__ import annotations
+
+import itertools
+from math import exp, isfinite, log
+
+import numpy as np
+
+from softehl.cases.paper.item import STUDY_DENSITIES
+from softehl.cases.paper.look import Finding, Look, Measure, angle, counted, difference, numbers
+from softehl.cases.paper.tables import FIG_4_PRESSURES, TABLE_2, table_2_densities, unknowns
+
+_LAYERS = (5.0, 20.0)
+"""Film thicknesses between which the inclination is taken, um."""
+
+
+def _unknowns(look: Look) -> Finding:
+    densities = table_2_densities(look.scope)
+    ours = [unknowns(d)[0] for d in densities]
+    off = [100.0 * (n / TABLE_2[d][0] - 1.0) for d, n in zip(densities, ours, strict=True)]
+    text = f"{', '.join(map(str, ours))}: {numbers(off, '+.2f')} %"
+    return Finding(text, all(x == 0.0 for x in off))
+
+
+def _pressure_unknowns(look: Look) -> Finding:
+    densities = table_2_densities(look.scope)
+    ours = [unknowns(d)[1] for d in densities]
+    return Finding(", ".join(map(str, ours)), ours == [TABLE_2[d][1] for d in densities])
+
+
+def _zone_expands(look: Look) -> Finding:
+    density = look.scope.mesh(2, 2)
+    ends = []
+    for p_s in look.scope.some_pressures(FIG_4_PRESSURES):
+        row = look.row(density, p_s, 400.0)
+        ends.append((row.contact_start_mm, row.contact_end_mm))
+    starts, stops = zip(*ends, strict=True)
+    moved = (max(starts) - min(starts), stops[-1] - stops[0])
+    text = f"air end {numbers(stops)} mm, sealed end {numbers(starts)} mm over p_s"
+    if len(ends) < 2:
+        return Finding(text, None)
+    return Finding(text, list(stops) == sorted(stops) and moved[0] < 0.25 * moved[1])
+
+
+def _minimum_at_outlet(look: Look) -> Finding:
+    shares = []
+    for sign in (1.0, -1.0):
+        row = look.row(look.density, 1.0, sign * 100.0)
+        profile = look.state(look.density, 1.0, sign * 100.0).profile
+        x = float(profile.x_mm[int(np.argmin(profile.h_um))])
+        inside = row.contact_end_mm - x if sign > 0 else x - row.contact_start_mm
+        shares.append(100.0 * inside / (row.contact_end_mm - row.contact_start_mm))
+    text = f"{numbers(shares)} % of the width (h < 20 um) from the outlet end (out, in)"
+    return Finding(text, all(0.0 <= share < 10.0 for share in shares))
+
+
+def _pressure_drop(look: Look) -> Finding:
+    p_s = look.scope.pressure(2.0)
+    out = look.state(look.density, p_s, 100.0).profile
+    back = look.state(look.density, p_s, -100.0)
+    row, profile = look.row(look.density, p_s, -100.0), back.profile
+    near = np.abs(profile.x_mm - row.contact_start_mm) < 0.1
+    drop = p_s - float(profile.p_MPa[near].min())
+    text = (
+        f"instroke: p falls {drop:.2f} MPa below p_s at the sealed end; outstroke: least p "
+        f"{float(out.p_MPa.min()):.1e} MPa"
+    )
+    return Finding(text, drop > 0.1 and float(out.p_MPa.min()) > -0.05)
+
+
+def _inclination(look: Look) -> Finding:
+    angles = []
+    for p_s in (1.0, 2.0):
+        for sign in (1.0, -1.0):
+            profile = look.state(look.density, p_s, sign * 100.0).profile
+            x, h = profile.x_mm, profile.h_um
+            low = int(np.argmin(h))
+            angles.append(angle(x[: low + 1][::-1], h[: low + 1][::-1], *_LAYERS))
+            angles.append(angle(x[low:], h[low:], *_LAYERS))
+    holds = all(10.0 <= a <= 15.0 for a in angles)
+    text = f"p_s 1: out {numbers(angles[:2])}, in {numbers(angles[2:4])}; p_s 2: out "
+    text += (
+        f"{numbers(angles[4:6])}, in {numbers(angles[6:])} degrees (sealed, air; h = 5 to 20 um)"
+    )
+    return Finding(text, holds)
+
+
+def _thinner_instroke(look: Look) -> Finding:
+    d = look.density
+    pairs = [
+        (look.h(d, p, -u), look.h(d, p, u)) for p in look.pressures if p > 0 for u in look.speeds
+    ]
+    return counted(pairs, "pairs at p_s > 0 with the thinner film at instroke")
+
+
+def _falls_with_speed(look: Look) -> Finding:
+    d, slopes = look.density, []
+    fast, slow = look.speeds[0], look.speeds[-1]
+    for p in look.pressures:
+        for sign in (1.0, -1.0):
+            films = [(u, look.h(d, p, sign * u)) for u in (fast, slow)]
+            if fast > slow and all(isfinite(h) for _, h in films):
+                slopes.append(log(films[0][1] / films[1][1]) / log(fast / slow))
+    if not slopes:
+        return Finding("not measured", None)
+    text = f"h* ~ |U|^n with n = {min(slopes):.3f} to {max(slopes):.3f} between the end speeds"
+    return Finding(text, min(slopes) > 0.3)
+
+
+def _with_sealed_pressure(sign: float) -> Measure:
+    def measure(look: Look) -> Finding:
+        d, pairs = look.density, []
+        for u in look.speeds:
+            films = [look.h(d, p, sign * u) for p in look.pressures]
+            pairs += [(a, b) if sign > 0 else (b, a) for a, b in itertools.pairwise(films)]
+        word = "rises" if sign > 0 else "falls"
+        found = counted(pairs, f"steps of p_s over which h* {word}")
+        films = [look.h(d, p, sign * 400.0) for p in look.pressures]
+        return Finding(f"{found.text}; h* at |U| = 400: {numbers(films, '.4g')} um", found.holds)
+
+    return measure
+
+
+def _weaker_at_outstroke(look: Look) -> Finding:
+    low, high = look.pressures[0], look.pressures[-1]
+    changes = [
+        100.0 * (look.h(look.density, high, s * 400.0) / look.h(look.density, low, s * 400.0) - 1.0)
+        for s in (1.0, -1.0)
+    ]
+    text = f"|U| = 400, p_s {low:g} to {high:g}: outstroke {changes[0]:+.1f} %, instroke "
+    return Finding(f"{text}{changes[1]:+.1f} %", _less(abs(changes[0]), abs(changes[1])))
+
+
+def _less(a: float, b: float) -> bool | None:
+    return a < b if isfinite(a) and isfinite(b) and (a or b) else None
+
+
+def _h_star_at_maximum(look: Look) -> Finding:
+    off = []
+    for sign in (1.0, -1.0):
+        state = look.state(look.density, 1.0, sign * 400.0)
+        profile = state.profile
+        h = float(profile.h_um[int(np.argmax(profile.p_MPa))])
+        off.append(100.0 * (h / state.h_star - 1.0))
+    return Finding(
+        f"h there differs from q/u by {numbers(off, '+.2g')} %", max(map(abs, off)) < 1.0
+    )
+
+
+def _flux_constant(look: Look) -> Finding:
+    rows = [
+        look.state(look.density, p, s * u).row
+        for p in look.pressures
+        for u in look.speeds
+        for s in (1.0, -1.0)
+    ]
+    worst = max(
+        row.flux_variation for row in rows if row is not None and row.verdict != "collapsed"
+    )
+    return Finding(
+        f"element means vary by at most {worst:.1e} of q outside cavitation", worst < 1e-5
+    )
+
+
+def _zones_shrink(look: Look) -> Finding:
+    pairs, d = [], look.density
+    for sign in (1.0, -1.0):
+        rows = [look.state(d, 1.0, sign * u).row for u in look.speeds]
+        widths = [r.inlet_segments if r else float("nan") for r in rows]
+        pairs += list(zip(widths[1:], widths, strict=False))
+    return counted(pairs, "halvings of |U| over which the inlet (10 h* to 1.5 h*) gets shorter")
+
+
+def _near_contact(look: Look) -> Finding:
+    off, p_s = [], look.scope.pressure(1.0)
+    for sign in (1.0, -1.0):
+        row = look.row(look.density, p_s, sign * 100.0)
+        off.append(100.0 * (row.p_max_MPa / row.contact_p_max_MPa - 1.0))
+    return Finding(
+        f"largest pressure against dry contact: {numbers(off, '+.2f')} %", max(map(abs, off)) < 2.0
+    )
+
+
+def _contact_width(look: Look) -> Finding:
+    def width(p_s: float, u: float) -> float:
+        row = look.row(look.density, p_s, u)
+        return row.contact_end_mm - row.contact_start_mm
+
+    fast, slow = look.speeds[0], look.speeds[-1]
+    low, high = look.pressures[0], look.pressures[-1]
+    by_p, by_u = width(high, fast) - width(low, fast), width(1.0, slow) - width(1.0, fast)
+    text = f"width changes by {by_p:+.3f} mm over p_s and {by_u:+.3f} mm over |U| (outstroke)"
+    return Finding(text, _less(abs(by_u), abs(by_p)))
+
+
+def _thin(look: Look) -> Finding:
+    rows = [
+        look.state(look.density, p, s * u).row
+        for p in look.pressures
+        for u in look.speeds
+        for s in (1.0, -1.0)
+    ]
+    least = min(row.h_star_um for row in rows if row is not None and row.verdict == "ok")
+    return Finding(f"smallest h* with verdict ok: {least:.3f} um", least < 1.0)
+
+
+def _shear(look: Look) -> Finding:
+    p_s, d = look.scope.pressure(1.0), look.density
+    changes: dict[str, list[float]] = {"h_star_um": [], "h_min_um": []}
+    for u in (sign * speed for sign in (1.0, -1.0) for speed in look.speeds):
+        a, b = look.state(d, p_s, u), look.state(d, p_s, u, shear_traction=False)
+        if a.row and b.row and a.plain and b.plain:
+            for name, values in changes.items():
+                values.append(100.0 * (getattr(a.row, name) / getattr(b.row, name) - 1.0))
+    if not changes["h_star_um"]:
+        return Finding("no plain results", None)
+    ends = {name: (min(values), max(values)) for name, values in changes.items()}
+    text = (
+        f"with it h* changes by {numbers(ends['h_star_um'], '+.2f')} %, the least h by "
+        f"{numbers(ends['h_min_um'], '+.2f')} % at most (down, up)"
+    )
+    return Finding(text, max(abs(x) for pair in ends.values() for x in pair) > 1.0)
+
+
+def _barus_30(look: Look) -> Finding:
+    ratio = exp(0.02 * 30.0)
+    return Finding(f"{ratio:.2f}", abs(ratio - 1.8) < 0.05)
+
+
+def _piezo(sign: float) -> Measure:
+    def measure(look: Look) -> Finding:
+        changes = []
+        for p in look.pressures:
+            fine = (
+                look.scope.meshes(STUDY_DENSITIES, default=8)[-1]
+                if p == look.scope.pressure(5.0)
+                else 0
+            )
+            d = max(fine, look.density)  # at 5 MPa there is a mesh study
+            a = look.h(d, p, sign * 100.0)
+            b = look.h(d, p, sign * 100.0, pressure_viscosity=0.0)
+            changes.append(100.0 * (a / b - 1.0))
+        text = f"p_s {numbers(look.pressures)}: {numbers(changes, '+.2f')} %"
+        known = [c for c in changes if isfinite(c)]
+        if sign > 0:
+            return Finding(
+                text, known == sorted(known) and known[-1] > 1.0 if len(known) > 1 else None
+            )
+        return Finding(text, max(map(abs, known)) < 1.0 if known else None)
+
+    return measure
+
+
+def _piezo_pressure(look: Look) -> Finding:
+    d, off = look.density, []
+    for sign in (1.0, -1.0):
+        look.row(d, 5.0, sign * 100.0)
+        pair = (
+            look.state(d, 5.0, sign * 100.0, pressure_viscosity=0.0),
+            look.state(d, 5.0, sign * 100.0),
+        )
+        off.append(difference(*pair, margin=0.1) / look.row(d, 5.0, sign * 100.0).p_max_MPa)
+    text = (
+        f"largest difference in the mid contact {numbers([100 * x for x in off], '.2g')} % of p_max"
+    )
+    return Finding(text, max(off) < 0.01)
+
+
+FILM: tuple[tuple[str, str, Measure], ...] = (
+    ("Table 2", "unknowns 1076, 3587, 12929, 48893, 189941", _unknowns),
+    ("Table 2", "pressure unknowns 109, 217, 433, 865, 1729", _pressure_unknowns),
+    (
+        "5.1, Fig. 4",
+        "contact expands at the air side with p_s, the sealed side hardly moves",
+        _zone_expands,
+    ),
+    ("5.1", "sharp film minimum at the end of the contact, in the outlet", _minimum_at_outlet),
+    (
+        "5.1",
+        "instroke: sudden pressure drop at the sealed side; outstroke: excluded by cavitation",
+        _pressure_drop,
+    ),
+    ("5.1", "inclination of 10 to 15 degrees in the inlet and outlet zones", _inclination),
+    ("5.1", "film thinner at instroke than at outstroke", _thinner_instroke),
+    ("5.1", "film thickness strongly decreases if the rod speed decreases", _falls_with_speed),
+    ("5.1, Fig. 9", "instroke: film decreases with p_s", _with_sealed_pressure(-1.0)),
+    ("5.1, Fig. 9", "outstroke: film increases with p_s", _with_sealed_pressure(1.0)),
+    ("5.1, Fig. 9", "the effect of p_s is weaker at outstroke", _weaker_at_outstroke),
+    ("3, (16)", "h* is the film thickness at the point of maximum pressure", _h_star_at_maximum),
+    ("3, (14)", "flux is constant along the boundary", _flux_constant),
+    ("5.1, Fig. 8", "lower speed: smaller inlet and outlet zones", _zones_shrink),
+    ("5.1", "pressure is very close to that of pure contact", _near_contact),
+    ("6", "size of the contact depends on p_s, much more weakly on speed", _contact_width),
+    ("6", "film in some cases well below 1 um", _thin),
+    ("3", "effect of the shear stress not negligible in some conditions", _shear),
+    ("5.3", "viscosity 1.8 times at 30 MPa", _barus_30),
+    ("5.3, Fig. 20", "outstroke: (13) raises the film, more with p_s", _piezo(1.0)),
+    ("5.3, Fig. 20", "instroke: (13) has no visible effect", _piezo(-1.0)),
+    ("5.3", "pressure not visibly affected by (13)", _piezo_pressure),
+)

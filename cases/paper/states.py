@@ -1,0 +1,171 @@
+"""States that figures share: what is asked for, where it is kept, and how it is read back.
+
+Each set of parameters is one ordinary run folder in `runs/`; speeds and strokes are what a run
+may add to. A state that a run did not reach, or that collapsed, is still a :class:`State`.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from math import nan
+from pathlib import Path
+from typing import Any
+
+from softehl.cases.harness.curve import PROFILE_COLUMNS, CurveFolder, CurveRow
+from softehl.cases.harness.observer import COLLAPSED, OK, Floats, Profile
+from softehl.cases.harness.record import SELECTION, SIGNS
+from softehl.cases.harness.sweep import differences
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.io import number_text, read_columns, read_json
+
+NOT_REACHED = "not reached"
+"""Verdict of a state that its run could not reach."""
+
+SPEEDS = (1600.0, 800.0, 400.0, 200.0, 100.0, 50.0, 25.0)
+"""The rod speeds |U| of Table 1, halved from the fastest to the slowest, mm/s."""
+
+ENDED = ("converged", "not converged")
+"""What run.json says of a run that came to its end; of another one the rest is still to be run."""
+
+PAPER: dict[str, Any] = {"mesh": "uniform", "upwinding": 0.0, "error_estimate": False}
+"""What the paper does where a run by itself would do better."""
+
+CURED: dict[str, Any] = {"mesh": "graded", "upwinding": 1.0, "error_estimate": True}
+"""What `softehl run` does by itself."""
+
+_IN_NAME = ("density", "sealed_pressure")
+
+
+def setup(density: int, sealed_pressure: float, **others: Any) -> ORing:
+    """Parameters of a run, without speeds and stroke (those are left at their defaults)."""
+    given: dict[str, Any] = {"density": density, "sealed_pressure": float(sealed_pressure)}
+    return ORing(**{**PAPER, **given, **others})
+
+
+@dataclass(frozen=True)
+class Request:
+    """A run that is needed: its parameters and the signed speeds U (mm/s, + = outstroke)."""
+
+    setup: ORing
+    speeds: frozenset[float]
+
+    @property
+    def name(self) -> str:
+        """The folder of the run: density, p_s and what is not as in the paper's default."""
+        others = differences(self.setup, ORing(**PAPER), (*SELECTION, *_IN_NAME))
+        first = [f"d{self.setup.density}", f"ps{number_text(self.setup.sealed_pressure)}"]
+        return "-".join([*first, *others])
+
+    @property
+    def parameters(self) -> ORing:
+        """What `softehl run` takes; both strokes get the same speeds where both are needed."""
+        strokes = [
+            stroke for stroke, sign in SIGNS.items() if any(sign * u > 0 for u in self.speeds)
+        ]
+        magnitudes = tuple(sorted({abs(u) for u in self.speeds}, reverse=True))
+        stroke = "both" if len(strokes) == 2 else strokes[0]
+        return self.setup.model_copy(update={"stroke": stroke, "speeds": magnitudes})
+
+
+def ask(parameters: ORing, speeds: Iterable[float]) -> Request:
+    """A request for signed speeds U."""
+    return Request(parameters, frozenset(float(u) for u in speeds))
+
+
+def merged(requests: Iterable[Request]) -> list[Request]:
+    """One request for each run folder, the finest meshes first, which take longest."""
+    found: dict[str, Request] = {}
+    for request in requests:
+        other = found.get(request.name)
+        speeds = request.speeds | (other.speeds if other else frozenset())
+        found[request.name] = Request(request.setup, speeds)
+    return sorted(found.values(), key=lambda r: (-r.setup.density, r.setup.reynolds, r.name))
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A requested state: its row and profile if there are any, and its verdict in any case."""
+
+    setup: ORing
+    rod_speed: float
+    row: CurveRow | None = None
+    path: Path | None = None
+
+    @property
+    def verdict(self) -> str:
+        """One of `cases.harness.observer`, or :data:`NOT_REACHED`."""
+        return self.row.verdict if self.row else NOT_REACHED
+
+    @property
+    def usable(self) -> bool:
+        """Whether there are numbers to be shown, if only marked ones."""
+        return self.row is not None and self.row.verdict != COLLAPSED
+
+    @property
+    def plain(self) -> bool:
+        """Whether this is a result without reservation."""
+        return self.verdict == OK
+
+    @property
+    def h_star(self) -> float:
+        """Film thickness h* in um, nan if there is none or it collapsed."""
+        return self.row.h_star_um if self.row is not None and self.usable else nan
+
+    @property
+    def profile(self) -> Profile:
+        """The fields along the film.  Raises ValueError for a state that was not reached."""
+        if self.path is None:
+            raise ValueError(f"no profile at U = {self.rod_speed:g} mm/s: {self.verdict}")
+        return Profile(**read_columns(self.path, PROFILE_COLUMNS))
+
+    @property
+    def title(self) -> str:
+        """Density, p_s and U in words."""
+        p = self.setup
+        return f"density {p.density}, p_s = {p.sealed_pressure:g}, U = {self.rod_speed:+g}"
+
+
+@dataclass(frozen=True)
+class Store:
+    """The states in a folder of runs.  Raises OSError, ValueError where a file is damaged."""
+
+    folder: Path
+    _rows: dict[Path, list[CurveRow]] = field(default_factory=dict, repr=False)
+
+    def run_folder(self, parameters: ORing) -> Path:
+        """Where the run of these parameters is or would be."""
+        return self.folder / Request(parameters, frozenset()).name
+
+    def ended(self, parameters: ORing) -> bool:
+        """Whether the run of these parameters came to its end.  Raises OSError, ValueError."""
+        path = self.run_folder(parameters) / "run.json"
+        return path.exists() and read_json(path).get("status") in ENDED
+
+    def state(self, parameters: ORing, rod_speed: float) -> State:
+        """The state at a signed speed U, mm/s."""
+        run = self.run_folder(parameters)
+        for place in (run, run / "rejected"):
+            for row in self._read(place):
+                if row.rod_speed_mm_s == rod_speed:
+                    path = place / f"profile_{row.name}.csv"
+                    return State(parameters, rod_speed, row, path)
+        return State(parameters, rod_speed)
+
+    def states(self, parameters: ORing, speeds: Sequence[float]) -> list[State]:
+        """The states at several signed speeds."""
+        return [self.state(parameters, u) for u in speeds]
+
+    def contact(self, parameters: ORing) -> tuple[Floats, Floats] | None:
+        """x (mm) and frictionless contact pressure (MPa) along the arc, None if not reached."""
+        name = number_text(parameters.sealed_pressure)
+        path = self.run_folder(parameters) / f"contact_{name}.csv"
+        if not path.exists():
+            return None
+        columns = read_columns(path, ("x_mm", "p_MPa"))
+        return columns["x_mm"], columns["p_MPa"]
+
+    def _read(self, place: Path) -> list[CurveRow]:
+        if place not in self._rows:
+            folder = CurveFolder(place)
+            folder.load()
+            self._rows[place] = folder.rows
+        return self._rows[place]

@@ -1,0 +1,99 @@
+"""Contact states that runs leave for each other: the contact stage knows neither speed nor film.
+
+A state is a file, named by all that it depends on. It is never trusted: it is where Newton's
+method starts on the section's own equations, which a state that belongs to them fulfils already.
+A wrong or damaged file can cost a few iterations, never a result. Files are written atomically;
+processes that need the same state at the same time each find it for themselves.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathSettings, contact_problem, contact_stage
+from softehl.cases.seal.section import OringSection
+from softehl.cases.seal.stage import Stage
+from softehl.runtime.io import read_arrays, write_arrays
+from softehl.runtime.kernels import load_kernel
+from softehl.runtime.solve.newton import Newton
+
+Array = NDArray[np.float64]
+
+WITHOUT_INFLUENCE = (
+    *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
+    *("viscosity", "pressure_viscosity", "shear_traction", "cavitation_penalty"),
+    *("rotation", "solver", "linear", "upwinding", "error_estimate", "tolerance"),
+)
+"""Parameters that the contact stage does not know."""
+
+_KERNELS = ("contact", "follower_pressure", "mean_rotation")
+_ITERATIONS = 10  # a state of another section is not worth more
+
+
+def contact_key(parameters: ORing) -> str:
+    """Name of a contact state: all parameters but those without influence, and the kernels."""
+    kernels = (f"solid_{parameters.solid}", *_KERNELS)
+    given = parameters.model_dump(exclude=set(WITHOUT_INFLUENCE))
+    given["kernels"] = {name: load_kernel(name).signature for name in kernels}
+    return hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()[:32]
+
+
+@dataclass(frozen=True)
+class ContactStore:
+    """Contact states in a folder; without a folder there are none."""
+
+    folder: Path | None = None
+
+    def densities(self, parameters: ORing, among: Sequence[int]) -> list[int]:
+        """Those of some densities of which there is a state, good or not; finest first."""
+        if self.folder is None:
+            return []
+        sections = [parameters.model_copy(update={"density": d}) for d in among]
+        return sorted((p.density for p in sections if self._path(p).exists()), reverse=True)
+
+    def read(self, section: OringSection) -> Array:
+        """Unknowns to start from; nan, a start that is refused, where no file fits the section."""
+        stored = read_arrays(self._path(section.parameters)) or {}
+        x, layout = section.at_rest(), section.layout
+        for name in _fields(section):
+            part = stored.get(name)
+            fits = part is not None and part.shape == (layout.count(name),)
+            x[layout.part(name)] = part if fits else np.nan
+        return x
+
+    def keep(self, section: OringSection, x: Array) -> None:
+        """Leave the contact state x for others; one that cannot be written is not missed."""
+        if self.folder is None:
+            return
+        parts = {name: x[section.layout.part(name)] for name in _fields(section)}
+        with suppress(OSError):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_arrays(self._path(section.parameters), parts)
+
+    def _path(self, parameters: ORing) -> Path:
+        assert self.folder is not None
+        return self.folder / f"{contact_key(parameters)}.npz"
+
+
+def _fields(section: OringSection) -> tuple[str, ...]:
+    """Fields of a contact state: film pressures, whose number depends on m_p, are all zero."""
+    return tuple(name for name in section.layout.names if name != "pressure")
+
+
+def stored_contact(section: OringSection, settings: PathSettings, newton: Newton) -> Stage:
+    """A stage of one step that verifies a stored state, or corrects it in a few iterations."""
+    return contact_stage(
+        section,
+        contact_problem(section, settings, section.parameters.sealed_pressure),
+        method="newton, from a stored contact state",
+        corrector=replace(newton, max_iterations=_ITERATIONS),
+    )

@@ -1,0 +1,112 @@
+"""The contact state of a mesh from that of another, without a path.
+
+Displacements, multipliers and element pressures are carried over and corrected by Newton's method,
+which holds on to the pressures in its tangent (`runtime.fem.lagged_pressure`). The multipliers are
+unknowns, so contact is stiff from the first iteration on. What is solved is the same as on the
+path of `cases.seal.path`; only the start is another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathSettings, contact_problem, contact_stage
+from softehl.cases.seal.section import HOUSING, OringSection
+from softehl.cases.seal.stage import Stage
+from softehl.runtime.fem.lagged_pressure import HeldPressure, element_pressures
+from softehl.runtime.kernels import load_kernel
+from softehl.runtime.mesh.prolongation import (
+    prolong_chain,
+    prolong_elements,
+    prolong_nodes,
+    restrict_chain,
+    restrict_elements,
+    restrict_nodes,
+)
+from softehl.runtime.mesh.sections import LONG
+from softehl.runtime.mesh.transfer import transfer_chain, transfer_elements, transfer_nodes
+
+Array = NDArray[np.float64]
+
+
+def finer(parameters: ORing) -> ORing:
+    """The same case at twice the density."""
+    return parameters.model_copy(update={"density": 2 * parameters.density})
+
+
+@dataclass(frozen=True)
+class _Carrier:
+    """How values go from one mesh to another: of nodes, of elements, of the arc or the rest."""
+
+    words: str
+    nodes: Callable[[Array], Array]
+    elements: Callable[[Array], Array]
+    chain: Callable[[str, Array], Array]
+
+
+def _carrier(old: OringSection, new: OringSection) -> _Carrier:
+    """The sharpest way there is: between meshes whose nodes are shared, or by local splines."""
+    density = old.mesh.arc // LONG
+    if old.disc == new.disc and new.mesh.arc == 2 * old.mesh.arc:
+        return _Carrier(
+            f"prolonged from density {density}",
+            lambda values: prolong_nodes(values, density),
+            lambda values: prolong_elements(values, density),
+            lambda _, values: prolong_chain(values),
+        )
+    if old.disc == new.disc and old.mesh.arc == 2 * new.mesh.arc:
+        return _Carrier(
+            f"restricted from density {density}",
+            lambda values: restrict_nodes(values, density),
+            lambda values: restrict_elements(values, density),
+            lambda _, values: restrict_chain(values),
+        )
+    meshes = old.mesh, new.mesh
+
+    def chain(name: str, values: Array) -> Array:
+        before, after = (m.arc_nodes if name == "rod" else m.outer_nodes for m in meshes)
+        return transfer_chain(*meshes, before, after, values)
+
+    return _Carrier(
+        "moved from another mesh",
+        lambda values: transfer_nodes(*meshes, values),
+        lambda values: transfer_elements(*meshes, values),
+        chain,
+    )
+
+
+def carried_contact(
+    old: OringSection, new: OringSection, settings: PathSettings, x: Array, name: str = ""
+) -> tuple[Stage, Array]:
+    """A stage of one step that solves for contact on another mesh of a section, and its start.
+
+    x: unknowns of the contact state on the old mesh. name: of the stage, by the density if left
+    out. The start is nan, which is refused, where the state cannot be carried over.
+    """
+    carry, p = _carrier(old, new), new.parameters
+    pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), "solid", x)
+    problem = HeldPressure.of(
+        contact_problem(new, settings, p.sealed_pressure),
+        "solid",
+        load_kernel("follower_pressure"),
+        carry.elements(pressures),
+        p.bulk_modulus,
+    )
+    stage = contact_stage(new, problem, method=f"newton, {carry.words}", name=name)
+    return stage, _unknowns(old, new, carry, x)
+
+
+def _unknowns(old: OringSection, new: OringSection, carry: _Carrier, x: Array) -> Array:
+    of, to = old.layout, new.layout
+    y = new.at_rest()
+    u = x[of.part("displacement")].reshape(-1, 2)
+    y[to.part("displacement")] = carry.nodes(u).ravel()
+    for name in ("rod", *HOUSING):
+        y[to.part(name)] = carry.chain(name, x[of.part(name)])
+    y[to.part("rotation")] = x[of.part("rotation")]
+    return y

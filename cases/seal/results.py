@@ -1,0 +1,203 @@
+"""What a converged O-ring state means: h*, pressure, friction, leakage, limits, resolution."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softehl.cases.harness.observer import ContactState, FilmState, Profile, Section
+from softehl.cases.seal.path import Film
+from softehl.cases.seal.section import OringSection
+from softehl.cases.seal.verdict import FilmNumbers, Verdict
+from softehl.runtime.fem.contact import tributary_areas
+from softehl.runtime.fem.postprocess import (
+    alternating_difference,
+    element_means,
+    first_below,
+    interval_below,
+    nodal_average,
+    relative_spread,
+    run_around,
+)
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.rules import trace_rule
+
+Array = NDArray[np.float64]
+
+CONTACT_FILM = 0.02
+"""Film thickness that counts as contact, mm."""
+
+MICROMETRE = 1e-3  # mm
+
+INLET = (10.0, 1.5)
+"""Film thicknesses, in h*, between which the segments of the inlet are counted."""
+
+MID_CONTACT = 0.1
+"""Share of the contact that is left out at either end where oscillations are looked for."""
+
+
+def film_numbers(section: OringSection, problem: Problem, film: Film, x: Array) -> FilmNumbers:
+    """Scalars of a converged film with the unknowns x.
+
+    The flux is that at the largest pressure: the mean over the segment for continuous, the mean
+    of (23) at the facets of the segment for discontinuous pressures, which (21) and (22) make
+    constant. Its relative spread is taken over the neighbours on both sides up to where the film
+    cavitates, eqs. (16) and (25).
+    """
+    at = problem.fields("film", x)
+    top = int(np.argmax(at["p"].max(axis=1)))
+    whole = run_around(at["p"].min(axis=1) >= 0.0, top)
+    jump = 0.0
+    if section.parameters.reynolds == "dg":
+        facets = problem.fields("facet", x)
+        flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
+        around, whole = slice(max(top - 1, 0), top + 1), slice(max(whole.start - 1, 0), whole.stop)
+    else:
+        flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
+    q = float(flux[around].mean())
+    h_star = q / (0.5 * film.rod_speed)
+    z, h = section.arc_film(x)
+    return FilmNumbers(
+        speed=film.speed,
+        flux=q,
+        h_star=h_star,
+        h_min=float(h.min()),
+        p_max=float(at["p"].max()),
+        friction=float(2.0 * pi * section.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
+        flux_variation=relative_spread(flux[whole]),
+        jump=jump,
+        oscillation=oscillation(z, h),
+        inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
+    )
+
+
+def oscillation(x: Array, h: Array) -> float:
+    """Oscillation index of the nodal film thickness h (nodes,) at x (nodes,), dimensionless.
+
+    The largest alternating second difference over the mid contact relative to the median of h
+    there: D_i = h_(i-1) - 2 h_i + h_(i+1), and a pair of neighbours of opposite sign counts with
+    the smaller of |D_i|, |D_(i+1)|. A zigzag of amplitude a about h has the index 4 a / h, a
+    smooth film next to none. The mid contact is the middle four fifths of where h < 20 um.
+    """
+    start, end = interval_below(x, h, CONTACT_FILM)
+    margin = MID_CONTACT * (end - start)
+    inside = h[(x >= start + margin) & (x <= end - margin)]
+    return alternating_difference(inside) / float(np.median(inside)) if len(inside) else 0.0
+
+
+def inlet_segments(h: Array, h_star: float) -> float:
+    """Length of the inlet in segments; h (nodes,) from the inlet on.
+
+    From where h, coming from outside, first falls below ten times h* to where it first falls below
+    one and a half times h*: there the pressure rises that makes the film.
+    """
+    outer, inner = (first_below(h, level * h_star) for level in INLET)
+    return inner - outer
+
+
+def contact_state(
+    section: OringSection, problem: Problem, sealed_pressure: float, x: Array
+) -> ContactState:
+    """The frictionless contact state with the unknowns x."""
+    mesh = section.mesh
+    deformed = section.deformed(x)
+    arc = deformed[mesh.arc_nodes]
+    pressure = contact_pressure(section, sealed_pressure, x)
+    touching = np.flatnonzero(x[section.layout.part("rod")] < 0.0)
+    ends = arc[touching[[0, -1]], 0] if len(touching) else np.full(2, np.nan)
+    return ContactState(
+        sealed_pressure=sealed_pressure,
+        p_max_MPa=float(pressure.max()),
+        contact_start_mm=float(ends[0]),
+        contact_end_mm=float(ends[1]),
+        x_mm=arc[:, 0].copy(),
+        p_MPa=pressure,
+        section=section_view(section, problem, x),
+    )
+
+
+def contact_pressure(section: OringSection, sealed_pressure: float, x: Array) -> Array:
+    """True pressure (arc nodes,): multipliers per current area, plus p_s where it acts, MPa."""
+    mesh = section.mesh
+    current = tributary_areas(section.deformed(x), mesh.arc_segments, mesh.arc_nodes)
+    multipliers = np.minimum(x[section.layout.part("rod")], 0.0)
+    pressure = -multipliers * section.rod_areas / current
+    pressure[: section.lowest] += sealed_pressure
+    pressure[section.lowest] += 0.5 * sealed_pressure  # the pressure ends at this node
+    return np.asarray(pressure)
+
+
+def film_state(
+    section: OringSection,
+    problem: Problem,
+    film: Film,
+    x: Array,
+    verdict: Verdict,
+    iterations: int,
+) -> FilmState:
+    """The record of a converged film whose numbers are the last of `verdict`."""
+    numbers = verdict.last or film_numbers(section, problem, film, x)
+    limits = interval_below(*section.arc_film(x), CONTACT_FILM)
+    return FilmState(
+        sealed_pressure=film.sealed_pressure,
+        rod_speed=film.rod_speed,
+        h_star_um=numbers.h_star / MICROMETRE,
+        density=section.parameters.density,
+        h_min_um=numbers.h_min / MICROMETRE,
+        p_max_MPa=numbers.p_max,
+        pressure_jump_max_MPa=numbers.jump,
+        rod_friction_N=numbers.friction,
+        leak_rate_mm3_s=2.0 * pi * section.rod_radius * numbers.flux,
+        contact_start_mm=limits[0],
+        contact_end_mm=limits[1],
+        newton_iterations=iterations,
+        flux_variation=numbers.flux_variation,
+        moment_N_mm=float(x[section.layout.part("rotation")][0]),
+        contact_p_max_MPa=verdict.reference,
+        oscillation_index=numbers.oscillation,
+        inlet_segments=numbers.inlet_segments,
+        verdict=verdict.word,
+        advice=verdict.advice,
+        profile=_profile(section, problem, x),
+        section=section_view(section, problem, x),
+    )
+
+
+def section_view(section: OringSection, problem: Problem, x: Array) -> Section:
+    """The deformed section with nodal Cauchy stresses (MPa) and displacements (mm)."""
+    mesh = section.mesh
+    stresses = problem.fields("solid", x)
+    nodal = nodal_average(
+        mesh.quads,
+        {name: value for name, value in stresses.items() if name not in ("z", "r")},
+        len(mesh.points),
+    )
+    displacement = x[section.layout.part("displacement")].reshape(-1, 2).copy()
+    return Section(
+        points=section.deformed(x),
+        cells=mesh.quads,
+        point_data={"displacement": displacement, **nodal},
+    )
+
+
+def _profile(section: OringSection, problem: Problem, x: Array) -> Profile:
+    """Fields at the quadrature points of the film, from the sealed to the air side.
+
+    Discontinuous pressures are also shown at both ends of each segment: a facet has two rows.
+    """
+    block, p = problem.assembler.block("film"), section.parameters
+    if p.reynolds == "dg":
+        traces = trace_rule(p.pressure_order, p.quadrature, p.quadrature_points)
+        block = replace(block, rule=traces)
+    values = block.fields(x, problem.parameters["film"])
+    at = {name: value.ravel() for name, value in values.items()}
+    return Profile(
+        x_mm=at["x"],
+        h_um=at["h"] / MICROMETRE,
+        p_MPa=at["p"],
+        tau_MPa=at["tau"],
+        flux_mm2_s=at["flux"],
+    )

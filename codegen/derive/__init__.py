@@ -1,0 +1,1 @@
+"""Differentiation: interfaces, invariants and chain rules, from a potential to a tangent."""

@@ -1,0 +1,1 @@
+"""From an optimised graph to C: outputs, schedule, order, and the text of each target."""

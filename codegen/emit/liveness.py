@@ -1,0 +1,69 @@
+"""How many temporaries of a plan are live at once: what a compiler has to keep in registers.
+
+Counted backwards over the statements in the plan's order.  A temporary is live from where it is
+computed to where it is last read on a path that is taken; constants and arguments are not
+temporaries, and an output counts as stored the moment it is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from softehl.codegen.emit.schedule import If, Loop, Schedule, Statement
+from softehl.codegen.graph.graph import Node, Op
+
+_NEVER = frozenset({Op.CONST, Op.PI, Op.INPUT, Op.NAME})
+
+
+def peak_live(plan: Schedule) -> int:
+    """Largest number of temporaries that are live at the same time."""
+    walk = _Backwards()
+    live: frozenset[Node] = frozenset()
+    for stage in reversed(plan.stages):
+        if stage.loop is not None:
+            live = walk.loop(stage.loop, live)
+        live = walk.block(stage.before, live)
+    return walk.peak
+
+
+class _Backwards:
+    """Sets of live temporaries before a piece of the plan, from those after it."""
+
+    def __init__(self) -> None:
+        self.peak = 0
+
+    def block(self, statements: Sequence[Statement], live: frozenset[Node]) -> frozenset[Node]:
+        for s in reversed(statements):
+            live = self.branch(s, live) if isinstance(s, If) else self.value(s, live)
+        return live
+
+    def value(self, n: Node, live: frozenset[Node]) -> frozenset[Node]:
+        self.seen(live | {n})
+        return self.seen((live - {n}) | _temporaries(n.args))
+
+    def branch(self, s: If, live: frozenset[Node]) -> frozenset[Node]:
+        self.seen(live | set(s.merged))
+        after = live - set(s.merged)
+        sides = [
+            self.block(inner, self.seen(after | _temporaries(n.args[k] for n in s.merged)))
+            for k, inner in ((1, s.then), (2, s.otherwise))
+        ]
+        return self.seen(sides[0] | sides[1] | _temporaries([s.condition]))
+
+    def loop(self, loop: Loop, live: frozenset[Node]) -> frozenset[Node]:
+        """Sums live through the loop, and so does what every turn reads anew."""
+        once = _Backwards()
+        through = live | set(loop.sums)
+        summed = _temporaries(s.args[0] for s in loop.sums)
+        ends = summed | _temporaries(loop.outputs)
+        read = once.block(loop.body, through | ends)
+        again = self.block(loop.body, self.seen(read | through | ends))
+        return self.seen(again | read | through) - set(loop.sums)
+
+    def seen(self, live: frozenset[Node]) -> frozenset[Node]:
+        self.peak = max(self.peak, len(live))
+        return live
+
+
+def _temporaries(nodes: Iterable[Node]) -> frozenset[Node]:
+    return frozenset(n for n in nodes if n.op not in _NEVER)

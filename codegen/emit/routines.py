@@ -1,0 +1,256 @@
+"""Printing the routines that a kernel calls, as static functions in front of it.
+
+`int f(const double *in, double *out)` returns 0, or 1 when it has no result; the results are then
+not-a-number and the kernel marks the whole element (`codegen.abi`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from softehl.codegen.emit.c import Printer, number
+from softehl.codegen.emit.schedule import schedule
+from softehl.codegen.graph.graph import Graph, Node, Op, Routine, reachable
+from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, derivatives_of_energy
+from softehl.codegen.language.model import Definition
+from softehl.codegen.optimise import passes
+
+
+def called(roots: Iterable[Node]) -> list[Routine]:
+    """Routines below `roots`, in the order of their calls."""
+    calls = [n.payload for n in reachable(roots) if n.op is Op.CALL]
+    return list(dict.fromkeys(r for r in calls if isinstance(r, Routine)))
+
+
+def texts(d: Definition, routines: Iterable[Routine]) -> list[str]:
+    """C functions of `routines` and what they need, each once, callees first."""
+    out: dict[str, None] = {}
+    for r in routines:
+        out.update(dict.fromkeys(_text(d, r)))
+    return list(out)
+
+
+def _text(d: Definition, r: Routine) -> list[str]:
+    match r:
+        case Newton():
+            return _newton(d, r)
+        case Inverse():
+            return [_ELIMINATE, _inverse(d, r)]
+        case Isotropic():
+            return [_JACOBI, *([_DIVIDED] if r.order == 2 else []), *_isotropic(d, r)]
+    raise TypeError(f"no C for {r}")
+
+
+def _signature(d: Definition, r: Routine) -> str:
+    return f"static int softehl_{d.name}_{r.name}(const double *restrict p, double *restrict s)\n"
+
+
+class _Body:
+    """Statements that compute localised values in a routine."""
+
+    def __init__(self, d: Definition, g: Graph, roots: Sequence[Node]) -> None:
+        self.roots, _ = passes.run(g, list(roots), passes.STANDARD)
+        self.printer = Printer(d)
+        self.before = texts(d, called(self.roots))
+
+    def lines(self, depth: int, targets: Sequence[str]) -> list[str]:
+        """The values and their stores."""
+        p = self.printer
+        for stage in schedule(self.roots).stages:
+            p.block(depth, stage.before)
+        for target, n in zip(targets, self.roots, strict=True):
+            p.line(depth, f"{target} = {p.ref(n)};")
+        return p.lines
+
+
+def _newton(d: Definition, r: Newton) -> list[str]:
+    n, first = r.outputs, r.inputs - r.outputs
+    jacobian = [a for row in r.by_local for a in row]
+    body = _Body(d, d.graph, [*r.equations, *jacobian])
+    targets = [*(f"g[{i}]" for i in range(n)), *(f"A[{i}]" for i in range(n * n))]
+    control = r.control
+    close = f"{number(float(control.tolerance))} * ({number(float(control.size))} + fabs(s[k]))"
+    text = f"""/* {r.name}: {n} local unknowns, at most {control.iterations} Newton steps */
+{_signature(d, r)}{{
+    int failed = 0;
+    for (int k = 0; k < {n}; ++k) s[k] = p[{first} + k];
+    for (int step = 0; step < {control.iterations}; ++step) {{
+        double g[{n}], A[{n * n}];
+{_joined(body.lines(2, targets))}
+        if (failed || softehl_eliminate({n}, A, 1, g)) break;
+        int far = 0;
+        for (int k = 0; k < {n}; ++k) {{
+            s[k] -= g[k];
+            far |= !(fabs(g[k]) <= {close});
+        }}
+        if (!far) return 0;
+    }}
+    for (int k = 0; k < {n}; ++k) s[k] = NAN;
+    return 1;
+}}
+"""
+    return [_ELIMINATE, *body.before, text]
+
+
+def _inverse(d: Definition, r: Inverse) -> str:
+    n = r.size
+    return f"""{_signature(d, r)}{{
+    double A[{n * n}];
+    for (int k = 0; k < {n * n}; ++k) A[k] = p[k], s[k] = k % {n + 1} == 0;
+    if (!softehl_eliminate({n}, A, {n}, s)) return 0;
+    for (int k = 0; k < {n * n}; ++k) s[k] = NAN;
+    return 1;
+}}
+"""
+
+
+def _isotropic(d: Definition, r: Isotropic) -> list[str]:
+    body = _Body(d, d.graph, derivatives_of_energy(d.graph, r))
+    name = f"softehl_{d.name}_{r.name}_of_eigenvalues"
+    local = f"""/* {r.name}: {_CONTENT[r.order]} by the eigenvalues */
+static int {name}(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{{
+    int failed = 0;
+    (void)s, (void)p;
+{_joined(body.lines(1, [f"w[{k}]" for k in range(len(body.roots))]))}
+    return failed;
+}}
+"""
+    text = f"""{_signature(d, r)}{{
+    double c[3], Q[9], w[{len(body.roots)}];
+    if (softehl_eigenvalues(p, c, Q) || {name}(c, p + 6, w)) {{
+        for (int k = 0; k < {r.outputs}; ++k) s[k] = NAN;
+        return 1;
+    }}
+{_ASSEMBLE[r.order].replace("OF_EIGENVALUES", name)}    return 0;
+}}
+"""
+    return [*body.before, local, text]
+
+
+def _joined(lines: Sequence[str]) -> str:
+    return "\n".join(lines)
+
+
+_CONTENT = ("energy", "first derivatives", "first and second derivatives")
+
+_ELIMINATE = """/* Solve A x = b for `count` columns b in place, with partial pivoting. */
+static int softehl_eliminate(int n, double *A, int count, double *b)
+{
+    for (int k = 0; k < n; ++k) {
+        int best = k;
+        for (int i = k + 1; i < n; ++i)
+            if (fabs(A[i * n + k]) > fabs(A[best * n + k])) best = i;
+        const double pivot = A[best * n + k];
+        if (!(fabs(pivot) > 0.0)) return 1;
+        for (int j = 0; j < n; ++j) {
+            const double swapped = A[best * n + j];
+            A[best * n + j] = A[k * n + j], A[k * n + j] = swapped;
+        }
+        for (int j = 0; j < count; ++j) {
+            const double swapped = b[best * count + j];
+            b[best * count + j] = b[k * count + j], b[k * count + j] = swapped;
+        }
+        for (int i = k + 1; i < n; ++i) {
+            const double factor = A[i * n + k] / pivot;
+            for (int j = k; j < n; ++j) A[i * n + j] -= factor * A[k * n + j];
+            for (int j = 0; j < count; ++j) b[i * count + j] -= factor * b[k * count + j];
+        }
+    }
+    for (int k = n - 1; k >= 0; --k)
+        for (int j = 0; j < count; ++j) {
+            for (int i = k + 1; i < n; ++i) b[k * count + j] -= A[k * n + i] * b[i * count + j];
+            b[k * count + j] /= A[k * n + k];
+        }
+    return 0;
+}
+"""
+
+_JACOBI = """/* Eigenvalues c and vectors (columns of Q) of C_11, C_22, C_33, C_12, C_13, C_23
+   by Jacobi's rotations.  Returns 1 unless C is positive definite. */
+static int softehl_eigenvalues(const double *restrict C, double *restrict c, double *restrict Q)
+{
+    double A[3][3] = {{C[0], C[3], C[4]}, {C[3], C[1], C[5]}, {C[4], C[5], C[2]}};
+    for (int k = 0; k < 9; ++k) Q[k] = k % 4 == 0;
+    for (int sweep = 0; sweep < 12; ++sweep)
+        for (int i = 0; i < 2; ++i)
+            for (int j = i + 1; j < 3; ++j) {
+                if (!(fabs(A[i][j]) > 1e-30 * (fabs(A[i][i]) + fabs(A[j][j])))) {
+                    A[i][j] = A[j][i] = 0.0;
+                    continue;
+                }
+                const double half = (A[j][j] - A[i][i]) / (2.0 * A[i][j]);
+                const double t = (half < 0.0 ? -1.0 : 1.0) / (fabs(half) + sqrt(half * half + 1.0));
+                const double cosine = 1.0 / sqrt(t * t + 1.0), sine = t * cosine;
+                const int k = 3 - i - j;
+                const double a = A[i][k], b = A[j][k];
+                A[i][i] -= t * A[i][j], A[j][j] += t * A[i][j];
+                A[i][j] = A[j][i] = 0.0;
+                A[i][k] = A[k][i] = cosine * a - sine * b;
+                A[j][k] = A[k][j] = sine * a + cosine * b;
+                for (int r = 0; r < 3; ++r) {
+                    const double x = Q[3 * r + i], y = Q[3 * r + j];
+                    Q[3 * r + i] = cosine * x - sine * y, Q[3 * r + j] = sine * x + cosine * y;
+                }
+            }
+    for (int k = 0; k < 3; ++k) c[k] = A[k][k];
+    return !(c[0] > 0.0 && c[1] > 0.0 && c[2] > 0.0);
+}
+"""
+
+_DIVIDED = """/* (w_a - w_b) / (c_a - c_b) of a symmetric function; w holds w_1, w_2, w_3, w_11, ...
+   Where c_a and c_b differ by less than 5 %, as the mean of (w_aa - 2 w_ab + w_bb) / 2 on the line
+   between (c_a, c_b) and (c_b, c_a), by Gauss's rule of four points: exact to rounding. */
+static double softehl_divided(
+    int (*of_eigenvalues)(const double *, const double *, double *), const double *c,
+    const double *p, const double *w, int a, int b)
+{
+    const double gap = c[a] - c[b], middle = 0.5 * (c[a] + c[b]);
+    if (fabs(gap) > 0.05 * middle) return (w[a] - w[b]) / gap;
+    static const double at[2] = {0.33998104358485626, 0.86113631159405258};
+    static const double weight[2] = {0.65214515486254614, 0.34785484513745386};
+    double mean = 0.0;
+    for (int k = 0; k < 2; ++k) {
+        double near[3] = {c[0], c[1], c[2]}, there[12];
+        near[a] = middle + 0.5 * at[k] * gap, near[b] = middle - 0.5 * at[k] * gap;
+        if (of_eigenvalues(near, p, there)) return NAN;
+        const double *second = there + 3;
+        mean += weight[k] * (second[4 * a] - 2.0 * second[3 * a + b] + second[4 * b]);
+    }
+    return 0.5 * mean;
+}
+"""
+
+_ENTRIES = """    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+"""
+_ASSEMBLE = (
+    """    s[0] = w[0];
+""",
+    f"""{_ENTRIES}    for (int i = 0; i < 6; ++i) {{
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }}
+""",
+    f"""{_ENTRIES}    double E[6][6], H[6][6] = {{{{0.0}}}};
+    for (int k = 0, a = 0; a < 3; ++a)
+        for (int b = a; b < 3; ++b, ++k) {{
+            for (int i = 0; i < 6; ++i) {{
+                const double *x = Q + 3 * row[i], *y = Q + 3 * column[i];
+                E[k][i] = (i > 2 ? 1.0 : 0.5) * (x[a] * y[b] + x[b] * y[a]);
+            }}
+            if (a != b)
+                H[k][k] = 2.0 * softehl_divided(OF_EIGENVALUES, c, p + 6, w, a, b);
+        }}
+    static const int own[3] = {{0, 3, 5}};
+    for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b) H[own[a]][own[b]] = w[3 + 3 * a + b];
+    for (int n = 0, i = 0; i < 6; ++i)
+        for (int j = i; j < 6; ++j, ++n) {{
+            s[n] = 0.0;
+            for (int k = 0; k < 6; ++k)
+                for (int l = 0; l < 6; ++l) s[n] += H[k][l] * E[k][i] * E[l][j];
+        }}
+""",
+)

@@ -1,0 +1,147 @@
+"""Printing for DOLFINx: UFCx `tabulate_tensor` functions of one cell, in self-contained C.
+
+`codegen.abi` says what the pointers are.  The order of DOLFINx's vertices is woven into the
+subscripts, so that nothing is copied; a loop over points keeps its rule in a table of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from softehl.codegen import abi
+from softehl.codegen.emit import support as support_c
+from softehl.codegen.emit.c import Entry, Printer, number
+from softehl.codegen.emit.schedule import Loop, Schedule
+from softehl.codegen.graph.graph import Input, Node, Op, reachable
+from softehl.codegen.language.model import Definition
+
+
+class TargetError(ValueError):
+    """The model has something that the target cannot hold; the message names it."""
+
+
+def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
+    """The tasks that a form of DOLFINx can use; raises `TargetError` for an unfit model."""
+    if d.interpolated:
+        raise TargetError(
+            f"{d.name} interpolates {d.interpolated} with any number of unknowns: target ufcx "
+            "needs a fixed number, use simd or scalar"
+        )
+    if d.point_data or any(n.op is Op.CALL for n in reachable([d.potential])):
+        raise TargetError(
+            f"{d.name} has local unknowns, stretches or data per point, which target ufcx cannot "
+            "hold: use simd or scalar"
+        )
+    return [t for t in offered if t not in (abi.Task.FIELDS, abi.Task.PRODUCT)]
+
+
+def chosen(entries: Sequence[Entry], task: str) -> list[Entry]:
+    """Outputs of one form: the matrix alone for the tangent."""
+    return [x for x in entries if task != abi.Task.TANGENT or x.column is not None]
+
+
+def vertices(d: Definition) -> tuple[int, ...]:
+    """DOLFINx vertex of each node of the model."""
+    return abi.VERTEX_ORDER.get((d.nodes, d.rule.dimension), tuple(range(d.nodes)))
+
+
+def places(d: Definition) -> list[int]:
+    """Place of each unknown of the model among the unknowns of the DOLFINx cell."""
+    out = list(range(len(d.unknowns)))
+    for start, components in d.nodal:
+        for node, vertex in enumerate(vertices(d)):
+            for c in range(components):
+                out[start + node * components + c] = start + vertex * components + c
+    return out
+
+
+class _CellPrinter(Printer):
+    """A printer whose arguments are those of UFCx."""
+
+    def __init__(self, definition: Definition) -> None:
+        super().__init__(definition)
+        self.vertices, self.places = vertices(definition), places(definition)
+
+    def ref(self, n: Node) -> str:
+        return self.argument(n.payload) if isinstance(n.payload, Input) else super().ref(n)
+
+    def argument(self, source: Input) -> str:
+        k = source.index
+        match source.array:
+            case "coordinates":
+                node, component = divmod(k, len(self.d.coordinates))
+                return f"coordinate_dofs[{3 * self.vertices[node] + component}]"
+            case "dofs":
+                return f"w[{self.places[k]}]"
+            case "data":
+                return f"w[{len(self.places) + k}]"
+            case "parameters":
+                return f"c[{k}]"
+        return f"rule[{self.d.rule.dimension + 1} * q + {k}]"
+
+
+def function(
+    definition: Definition, task: str, entries: Sequence[Entry], plan: Schedule
+) -> tuple[str, int]:
+    """C text of one cell kernel and the number of its temporaries."""
+    p = _CellPrinter(definition)
+    p.line(1, "(void)w, (void)c, (void)coordinate_dofs;")
+    p.line(1, "(void)entity_local_index, (void)quadrature_permutation, (void)custom_data;")
+    if any(stage.loop is not None for stage in plan.stages):
+        _table(p)
+    for stage in plan.stages:
+        p.block(1, stage.before)
+        if stage.loop is not None:
+            _loop(p, stage.loop)
+    zero = definition.graph.zero
+    outputs = {_target(p, task, x): x.node for x in entries if x.node is not zero}
+    for k in sorted(outputs):
+        p.line(1, f"A[{k}] += {p.ref(outputs[k])};")
+    declaration = abi.ufcx_declaration(definition.name, task)
+    body = "\n".join(p.lines)
+    return f"{declaration};\n\n{declaration}\n{{\n{body}\n}}\n", p.temporaries
+
+
+def _target(p: _CellPrinter, task: str, x: Entry) -> int:
+    if task == abi.Task.ENERGY:
+        return 0
+    row = p.places[x.row.position]
+    if x.column is None:
+        return row
+    return row * len(p.places) + p.places[x.column.position]
+
+
+def _table(p: Printer) -> None:
+    """Rows (coordinates..., weight) of the model's rule."""
+    p.line(1, "static const double rule[] = {")
+    for point, weight in zip(p.d.rule.points, p.d.rule.weights, strict=True):
+        row = ", ".join(number(float(x.evalf(30))) for x in (*point, weight))
+        p.line(2, f"{row},")
+    p.line(1, "};")
+
+
+def _loop(p: Printer, loop: Loop) -> None:
+    for s in loop.sums:
+        p.line(1, f"double {p.fresh(s, 's')} = 0.0;")
+    p.line(1, f"for (int q = 0; q < {len(p.d.rule.weights)}; ++q) {{")
+    p.block(2, loop.body)
+    for s in loop.sums:
+        p.line(2, f"{p.ref(s)} += {p.ref(s.args[0])};")
+    p.line(1, "}")
+
+
+def source(definition: Definition, functions: Iterable[str]) -> str:
+    """The C file of a kernel family."""
+    head = [_banner(definition), "#include <math.h>", "#include <stdint.h>", support_c.ROOTS]
+    return "\n".join([*head, *functions])
+
+
+def _banner(d: Definition) -> str:
+    at = dict(zip(places(d), d.unknowns, strict=True))
+    rows = [f"w[{k}]  {at[k]}" for k in sorted(at)]
+    rows += [f"w[{len(at) + k}]  {a.name}: {a.meaning}" for k, a in enumerate(d.data)]
+    rows += [f"c[{k}]  {a.name}: {a.meaning}" for k, a in enumerate(d.parameters)]
+    order = ", ".join(f"{a + 1} at {v}" for a, v in enumerate(vertices(d)))
+    lines = [f"{d.name}: {d.doc}", "", f"nodes and their vertices: {order}", *rows]
+    text = "\n".join(f" * {line}".rstrip() for line in lines).replace("*/", "* /")
+    return f"/* Generated by softehl for UFCx from a model page; do not edit.\n *\n{text}\n */"

@@ -1,0 +1,358 @@
+"""Hash-consed expression graph with exact numbers.
+
+A `Graph` interns `Node` values, so that equal expressions are one node and `is` compares them.
+Node ids grow from operands to users: ascending ids are a topological order.  The constructors
+apply only identities that never cost anything (zero, one, signs pulled outwards, exact constant
+arithmetic); everything else is a named pass (`codegen.optimise.passes`).
+
+A node *varies* when its value depends on the quadrature point; `SUM` adds its operand over the
+points of the element and does not vary.
+
+A `CALL` runs a `Routine`, a function of its own with several results, on its operands; `ITEM`
+is one of the results.  How a routine is differentiated is the routine's affair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from fractions import Fraction
+
+
+class Op(StrEnum):
+    """Operations of the graph; `codegen.graph.spec` says what each may hold."""
+
+    CONST = "const"
+    PI = "pi"
+    INPUT = "input"
+    NAME = "name"
+    ADD = "add"
+    SUB = "sub"
+    MUL = "mul"
+    NEG = "neg"
+    RECIP = "recip"
+    POW = "pow"
+    SQRT = "sqrt"
+    CBRT = "cbrt"
+    RCBRT = "rcbrt"
+    LOG = "log"
+    EXP = "exp"
+    SIN = "sin"
+    COS = "cos"
+    TAN = "tan"
+    ASIN = "asin"
+    ACOS = "acos"
+    ATAN = "atan"
+    SINH = "sinh"
+    COSH = "cosh"
+    TANH = "tanh"
+    ATAN2 = "atan2"
+    LT = "lt"
+    LE = "le"
+    EQ = "eq"
+    AND = "and"
+    OR = "or"
+    NOT = "not"
+    BRANCH = "branch"
+    SUM = "sum"
+    CALL = "call"
+    ITEM = "item"
+
+
+BOOLEAN = frozenset({Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR, Op.NOT})
+ELEMENTARY = frozenset(
+    {Op.TAN, Op.ASIN, Op.ACOS, Op.ATAN, Op.SINH, Op.COSH, Op.TANH},
+)
+"""Functions of one argument that are those of the C library and nothing more."""
+FREE = frozenset({Op.CONST, Op.PI, Op.INPUT, Op.NAME})
+"""Operations that cost nothing at run time."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """One scalar argument of a kernel: `array[index]`, at the point when it varies."""
+
+    array: str
+    index: int
+    varying: bool = False
+
+
+@dataclass(frozen=True)
+class Place:
+    """Position of an `ITEM` among the results of its routine."""
+
+    index: int
+
+
+@dataclass(frozen=True, eq=False)
+class Routine:
+    """A function with several results that the graph calls and does not look into.
+
+    `name` is unique in a model; `inputs` and `outputs` are the numbers of operands and results.
+    """
+
+    name: str
+    inputs: int
+    outputs: int
+
+    def partials(self, g: Graph, item: Node) -> list[tuple[Node, Node]]:
+        """Derivatives of one result with respect to the operands it depends on."""
+        raise NotImplementedError
+
+
+Payload = Fraction | Input | str | Place | Routine | None
+
+
+class Node:
+    """One interned value.  Compare with `is`; `id` orders operands before users."""
+
+    __slots__ = ("args", "id", "op", "payload", "varying")
+
+    def __init__(
+        self, ident: int, op: Op, args: tuple[Node, ...], payload: Payload, varying: bool
+    ) -> None:
+        self.id = ident
+        self.op = op
+        self.args = args
+        self.payload = payload
+        self.varying = varying
+
+    def __repr__(self) -> str:
+        inner = ", ".join(f"#{a.id}" for a in self.args)
+        return f"#{self.id} {self.op}({inner}){'' if self.payload is None else f' {self.payload}'}"
+
+    @property
+    def value(self) -> Fraction:
+        """The exact number of a constant."""
+        assert isinstance(self.payload, Fraction)
+        return self.payload
+
+
+class Graph:
+    """Arena of interned nodes and their constructors."""
+
+    def __init__(self) -> None:
+        self._table: dict[tuple[Op, tuple[int, ...], Payload], Node] = {}
+        self.zero = self.const(0)
+        self.one = self.const(1)
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def node(self, op: Op, args: tuple[Node, ...] = (), payload: Payload = None) -> Node:
+        """Intern a node without any rewriting."""
+        key = (op, tuple(a.id for a in args), payload)
+        found = self._table.get(key)
+        if found is None:
+            varying = (isinstance(payload, Input) and payload.varying) or (
+                op is not Op.SUM and any(a.varying for a in args)
+            )
+            found = self._table[key] = Node(len(self._table), op, args, payload, varying)
+        return found
+
+    # leaves -------------------------------------------------------------------------------------
+
+    def const(self, value: int | Fraction) -> Node:
+        return self.node(Op.CONST, (), Fraction(value))
+
+    def pi(self) -> Node:
+        return self.node(Op.PI)
+
+    def input(self, array: str, index: int, *, varying: bool = False) -> Node:
+        return self.node(Op.INPUT, (), Input(array, index, varying))
+
+    def name(self, label: str, value: Node) -> Node:
+        """Give `value` an identity that differentiation can refer to."""
+        return self.node(Op.NAME, (value,), label)
+
+    # arithmetic ---------------------------------------------------------------------------------
+
+    def neg(self, a: Node) -> Node:
+        if a.op is Op.CONST:
+            return self.const(-a.value)
+        if a.op is Op.NEG:
+            return a.args[0]
+        if a.op is Op.SUB:
+            return self.sub(a.args[1], a.args[0])
+        return self.node(Op.NEG, (a,))
+
+    def add(self, a: Node, b: Node) -> Node:
+        if a is self.zero:
+            return b
+        if b is self.zero:
+            return a
+        if a.op is Op.CONST and b.op is Op.CONST:
+            return self.const(a.value + b.value)
+        if b.op is Op.NEG:
+            return self.sub(a, b.args[0])
+        if a.op is Op.NEG:
+            return self.sub(b, a.args[0])
+        if a is b:
+            return self.mul(self.const(2), a)
+        return self.node(Op.ADD, _ordered(a, b))
+
+    def sub(self, a: Node, b: Node) -> Node:
+        if b is self.zero:
+            return a
+        if a is self.zero:
+            return self.neg(b)
+        if a is b:
+            return self.zero
+        if a.op is Op.CONST and b.op is Op.CONST:
+            return self.const(a.value - b.value)
+        if b.op is Op.NEG:
+            return self.add(a, b.args[0])
+        if a.op is Op.NEG:
+            return self.neg(self.add(a.args[0], b))
+        return self.node(Op.SUB, (a, b))
+
+    def mul(self, a: Node, b: Node) -> Node:
+        if a is self.zero or b is self.zero:
+            return self.zero
+        if a is self.one:
+            return b
+        if b is self.one:
+            return a
+        if a.op is Op.NEG:
+            return self.neg(self.mul(a.args[0], b))
+        if b.op is Op.NEG:
+            return self.neg(self.mul(a, b.args[0]))
+        if b.op is Op.CONST:
+            a, b = b, a
+        if a.op is Op.CONST:
+            return self._scaled(a.value, b)
+        if (a.op is Op.RECIP and a.args[0] is b) or (b.op is Op.RECIP and b.args[0] is a):
+            return self.one
+        return self.node(Op.MUL, _ordered(a, b))
+
+    def _scaled(self, factor: Fraction, b: Node) -> Node:
+        if b.op is Op.CONST:
+            return self.const(factor * b.value)
+        if b.op is Op.MUL and b.args[0].op is Op.CONST:
+            return self.mul(self.const(factor * b.args[0].value), b.args[1])
+        if factor < 0:
+            return self.neg(self.mul(self.const(-factor), b))
+        return self.node(Op.MUL, (self.const(factor), b))
+
+    def recip(self, a: Node) -> Node:
+        if a.op is Op.CONST:
+            if a.value == 0:
+                raise ZeroDivisionError("division by an exact zero")
+            return self.const(1 / a.value)
+        if a.op is Op.RECIP:
+            return a.args[0]
+        if a.op is Op.NEG:
+            return self.neg(self.recip(a.args[0]))
+        return self.node(Op.RECIP, (a,))
+
+    def div(self, a: Node, b: Node) -> Node:
+        return self.mul(a, self.recip(b))
+
+    def power(self, a: Node, exponent: Fraction | int) -> Node:
+        e = Fraction(exponent)
+        if e == 0:
+            return self.one
+        if e == 1:
+            return a
+        if e == -1:
+            return self.recip(a)
+        if a.op is Op.CONST and e.denominator == 1:
+            return self.const(a.value ** int(e))
+        if a.op is Op.POW and e.denominator == 1:
+            inner = a.payload
+            assert isinstance(inner, Fraction)
+            return self.power(a.args[0], inner * e)
+        return self.node(Op.POW, (a,), e)
+
+    def call(self, op: Op, a: Node) -> Node:
+        """A function of one argument: SQRT, CBRT, RCBRT = 1/CBRT, LOG, EXP, SIN, ..."""
+        if op is Op.LOG and a is self.one:
+            return self.zero
+        if op is Op.EXP and a is self.zero:
+            return self.one
+        if a is self.zero and op in (Op.TAN, Op.ASIN, Op.ATAN, Op.SINH, Op.TANH):
+            return a
+        if op in (Op.SQRT, Op.CBRT) and a in (self.zero, self.one):
+            return a
+        if op is Op.RCBRT and a is self.one:
+            return a
+        return self.node(op, (a,))
+
+    # logic and loops ----------------------------------------------------------------------------
+
+    def compare(self, op: Op, a: Node, b: Node) -> Node:
+        return self.node(op, (a, b))
+
+    def branch(self, condition: Node, then: Node, otherwise: Node) -> Node:
+        """`then` where the condition holds; only the taken side is ever evaluated."""
+        if then is otherwise:
+            return then
+        if condition.op is Op.NOT:
+            return self.branch(condition.args[0], otherwise, then)
+        return self.node(Op.BRANCH, (condition, then, otherwise))
+
+    def sum(self, body: Node) -> Node:
+        """Sum of `body` over the quadrature points."""
+        if body is self.zero:
+            return body
+        if body.op is Op.NEG:
+            return self.neg(self.sum(body.args[0]))
+        return self.node(Op.SUM, (body,))
+
+    def run(self, routine: Routine, args: Sequence[Node]) -> list[Node]:
+        """The results of a routine."""
+        call = self.node(Op.CALL, tuple(args), routine)
+        return [self.node(Op.ITEM, (call,), Place(k)) for k in range(routine.outputs)]
+
+    def rebuild(self, op: Op, args: Sequence[Node], payload: Payload) -> Node:
+        """The constructor of `op`, with its identities, on new operands."""
+        if op in FREE and op is not Op.NAME:
+            return self.node(op, (), payload)
+        if op is Op.POW:
+            assert isinstance(payload, Fraction)
+            return self.power(args[0], payload)
+        if op is Op.NAME:
+            assert isinstance(payload, str)
+            return self.name(payload, args[0])
+        maker = self._makers().get(op)
+        if maker is not None:
+            return maker(*args)
+        if op in (Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS, *ELEMENTARY):
+            return self.call(op, args[0])
+        return self.node(op, tuple(args), payload)
+
+    def _makers(self) -> dict[Op, Callable[..., Node]]:
+        return {
+            Op.ADD: self.add,
+            Op.SUB: self.sub,
+            Op.MUL: self.mul,
+            Op.NEG: self.neg,
+            Op.RECIP: self.recip,
+            Op.BRANCH: self.branch,
+            Op.SUM: self.sum,
+        }
+
+
+def _ordered(a: Node, b: Node) -> tuple[Node, Node]:
+    return (a, b) if a.id <= b.id else (b, a)
+
+
+def reachable(roots: Iterable[Node], stop: Callable[[Node], bool] | None = None) -> list[Node]:
+    """All nodes below `roots` (operands of nodes that satisfy `stop` excluded), ids ascending."""
+    seen: dict[int, Node] = {}
+    stack = list(roots)
+    while stack:
+        n = stack.pop()
+        if n.id in seen:
+            continue
+        seen[n.id] = n
+        if stop is None or not stop(n):
+            stack.extend(n.args)
+    return [seen[i] for i in sorted(seen)]
+
+
+def operations(roots: Iterable[Node]) -> int:
+    """Number of run-time operations below `roots` (each shared value counted once)."""
+    free = (Op.SUM, Op.ITEM)
+    return sum(1 for n in reachable(roots) if n.op not in FREE and n.op not in free)

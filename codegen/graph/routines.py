@@ -1,0 +1,282 @@
+"""Routines that a graph can call: local Newton iteration, inverse matrix, function of stretches.
+
+Each is opaque to the passes and printed as a C function of its own (`codegen.emit.routines`).  Its
+derivatives are results of routines and ordinary nodes, so that they can be differentiated again.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+
+from softehl.codegen.derive.differentiate import DifferentiationError, gradient
+from softehl.codegen.derive.interfaces import substitute
+from softehl.codegen.graph.arithmetic import number
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine, reachable
+
+Matrix = list[list[Node]]
+Pairs = list[tuple[Node, Node]]
+
+
+@dataclass(frozen=True)
+class Local:
+    """Values written in `local` and `external` inputs; `external` are the nodes behind these."""
+
+    values: tuple[Node, ...]
+    external: tuple[Node, ...]
+
+
+def localise(g: Graph, values: Sequence[Node], unknowns: Sequence[Node]) -> Local:
+    """Cut `values` off from the graph around them: what `unknowns` do not enter comes from outside.
+
+    What can be computed once, outside, is; but not across a branch, whose other side may have no
+    value there.
+    """
+    inside: set[Node] = set(unknowns)
+    nodes = reachable(values)
+    for n in nodes:
+        if any(a in inside for a in n.args):
+            inside.add(n)
+    branched = any(n.op is Op.BRANCH for n in nodes)
+    leaves = (Op.NAME, Op.INPUT, Op.SUM, Op.ITEM)
+    seen: set[Node] = set(unknowns)
+    external: list[Node] = []
+    stack = [*values, *(a for n in nodes if n in inside for a in n.args)]
+    while stack:
+        n = stack.pop()
+        if n in seen or n in inside or n.op in (Op.CONST, Op.PI):
+            continue
+        seen.add(n)
+        if n.op in BOOLEAN or (branched and n.op not in leaves):
+            stack.extend(n.args)
+        else:
+            external.append(n)
+    found = sorted(external, key=lambda n: n.id)
+    replacement = {u: g.input("local", k) for k, u in enumerate(unknowns)}
+    replacement |= {n: g.input("external", k) for k, n in enumerate(found)}
+    return Local(tuple(substitute(g, values, replacement)[0]), tuple(found))
+
+
+def lifted(
+    g: Graph, values: Iterable[Node], local: Sequence[Node], external: Sequence[Node]
+) -> list[Node]:
+    """Localised values in the graph around them, with `local` and `external` put in."""
+    replacement = {g.input("local", k): n for k, n in enumerate(local)}
+    replacement |= {g.input("external", k): n for k, n in enumerate(external)}
+    return substitute(g, list(values), replacement)[0]
+
+
+def items(g: Graph, call: Node) -> list[Node]:
+    """All results of a call."""
+    routine = call.payload
+    assert isinstance(routine, Routine)
+    return [g.node(Op.ITEM, (call,), Place(k)) for k in range(routine.outputs)]
+
+
+def place(item: Node) -> int:
+    """Position of a result."""
+    assert isinstance(item.payload, Place)
+    return item.payload.index
+
+
+# ------------------------------------------------------------------------------- local unknowns
+
+
+@dataclass(frozen=True)
+class Control:
+    """A local iteration ends when no step exceeds tolerance * (size + |s_k|), or fails."""
+
+    tolerance: Fraction
+    size: Fraction
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Newton(Routine):
+    """Solution s of g(s, p) = 0 by Newton's method; operands: p, then the start of s.
+
+    `by_local` is dg/ds, `by_external` dg/dp; all are localised.  The derivatives of s are those of
+    the implicit function theorem, ds/dp = -(dg/ds)^-1 dg/dp, and none by the start.
+    """
+
+    equations: tuple[Node, ...]
+    by_local: tuple[tuple[Node, ...], ...]
+    by_external: tuple[tuple[Node, ...], ...]
+    control: Control
+    _slopes: dict[Node, Matrix] = field(default_factory=dict)
+
+    def partials(self, g: Graph, item: Node) -> Pairs:
+        call = item.args[0]
+        if call not in self._slopes:
+            self._slopes[call] = self._slope(g, call)
+        row = self._slopes[call][place(item)]
+        return list(zip(call.args, row, strict=False))
+
+    def _slope(self, g: Graph, call: Node) -> Matrix:
+        s, p = items(g, call), call.args[: self.inputs - self.outputs]
+        A = [lifted(g, row, s, p) for row in self.by_local]
+        B = [lifted(g, row, s, p) for row in self.by_external]
+        X = inverse(g, A)
+        size = range(self.outputs)
+        return [
+            [g.neg(_sum(g, [(X[k][i], B[i][j]) for i in size])) for j in range(len(p))]
+            for k in size
+        ]
+
+
+def newton(g: Graph, name: str, local: Local, control: Control) -> Newton:
+    """The routine that solves `local.values` = 0 for as many local unknowns."""
+    count = len(local.values)
+    s = [g.input("local", k) for k in range(count)]
+    p = [g.input("external", k) for k in range(len(local.external))]
+    slopes = [gradient(g, value, [*s, *p]) for value in local.values]
+    return Newton(
+        name,
+        len(p) + count,
+        count,
+        local.values,
+        tuple(tuple(row[n] for n in s) for row in slopes),
+        tuple(tuple(row[n] for n in p) for row in slopes),
+        control,
+    )
+
+
+# --------------------------------------------------------------------------------------- matrices
+
+
+@dataclass(frozen=True, eq=False)
+class Inverse(Routine):
+    """Inverse X of a matrix A, row by row, with partial pivoting: dX_ij = -X_ik dA_kl X_lj."""
+
+    size: int
+
+    def partials(self, g: Graph, item: Node) -> Pairs:
+        X, (i, j) = items(g, item.args[0]), divmod(place(item), self.size)
+        out = []
+        for position, a in enumerate(item.args[0].args):
+            k, l = divmod(position, self.size)  # noqa: E741
+            out.append((a, g.neg(g.mul(X[i * self.size + k], X[l * self.size + j]))))
+        return out
+
+
+_INVERSES = {n: Inverse(f"inverse_{n}", n * n, n * n, n) for n in range(4, 33)}
+
+
+def inverse(g: Graph, A: Matrix) -> Matrix:
+    """Inverse of a square matrix of nodes: written out up to 3, a routine from 4 on."""
+    n = len(A)
+    if n > 3:
+        flat = g.run(_INVERSES[n], [a for row in A for a in row])
+        return [flat[i * n : (i + 1) * n] for i in range(n)]
+    cofactors = [[_cofactor(g, A, i, j) for j in range(n)] for i in range(n)]
+    determinant = _sum(g, list(zip(A[0], cofactors[0], strict=True)))
+    return [[g.div(cofactors[j][i], determinant) for j in range(n)] for i in range(n)]
+
+
+def _cofactor(g: Graph, A: Matrix, i: int, j: int) -> Node:
+    n = len(A)
+    if n == 1:
+        return g.one
+    rows, columns = ([k for k in range(n) if k != skip] for skip in (i, j))
+    if n == 2:
+        minor = A[rows[0]][columns[0]]
+    else:
+        (a, b), (c, d) = ([A[r][q] for q in columns] for r in rows)
+        minor = g.sub(g.mul(a, d), g.mul(b, c))
+    return g.neg(minor) if (i + j) % 2 else minor
+
+
+def _sum(g: Graph, products: Iterable[tuple[Node, Node]]) -> Node:
+    total = g.zero
+    for a, b in products:
+        total = g.add(total, g.mul(a, b))
+    return total
+
+
+# ------------------------------------------------------------------------ functions of stretches
+
+SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Order of the six independent entries of a symmetric 3x3 matrix."""
+
+
+@dataclass(frozen=True, eq=False)
+class Isotropic(Routine):
+    """A symmetric function w of the eigenvalues of C, or its derivatives by the entries of C.
+
+    Operands: C_11, C_22, C_33, C_12, C_13, C_23, then what else enters w.  Results by `order`: 0:
+    w; 1: the six derivatives; 2: the upper triangle of the 6x6 second derivatives, row by row.
+    They are exact also where eigenvalues are equal or nearly so.
+    """
+
+    energy: Node
+    order: int
+    _relatives: dict[str, Routine] = field(default_factory=dict)
+
+    def partials(self, g: Graph, item: Node) -> Pairs:
+        if self.order == 2:
+            raise DifferentiationError(f"{self.name}: no third derivatives by the stretches")
+        args, k = item.args[0].args, place(item)
+        raised = g.run(self._relative(self.energy, self.order + 1, self.name), args)
+        by_C = raised if self.order == 0 else [raised[upper(k, i)] for i in range(6)]
+        pairs = list(zip(args, by_C, strict=False))
+        for j, p in enumerate(args[6:]):
+            source = g.input("external", j)
+            slope = gradient(g, self.energy, [source])[source]
+            if slope is not g.zero:
+                label = f"{self.name}_by_{j}"
+                pairs.append((p, g.run(self._relative(slope, self.order, label), args)[k]))
+        return pairs
+
+    def _relative(self, energy: Node, order: int, name: str) -> Routine:
+        label = f"{name}_{order}" if order != self.order else name
+        if label not in self._relatives:
+            self._relatives[label] = isotropic(label, self.inputs, energy, order)
+        return self._relatives[label]
+
+
+def isotropic(name: str, inputs: int, energy: Node, order: int = 0) -> Isotropic:
+    """The routine of a localised symmetric function of three eigenvalues."""
+    return Isotropic(name, inputs, (1, 6, 21)[order], energy, order)
+
+
+def symmetric(value: Node, unknowns: Sequence[Node]) -> bool:
+    """True when `value` does not change under exchanges of `unknowns` (at one random point)."""
+    rng = random.Random(0)
+    known: dict[Node, Any] = {}
+    with mpmath.workdps(30):
+        point = [mpmath.mpf(rng.uniform(0.5, 1.5)) for _ in unknowns]
+        found = []
+        for k in range(len(unknowns)):
+            swapped = [*point[k:], *point[:k]] if k else list(reversed(point))
+            for order in (point, swapped):
+                at = dict(zip(unknowns, order, strict=True))
+                for n in reachable([value]):
+                    if n.op in (Op.INPUT, Op.SUM, Op.ITEM) and n not in at:
+                        at[n] = known.setdefault(n, mpmath.mpf(rng.uniform(0.5, 1.5)))
+                    elif n not in at and n.op is not Op.CALL:
+                        at[n] = number(n, [at[a] for a in n.args])
+                found.append(at[value])
+        return all(abs(v - found[0]) <= 1e-20 * (1 + abs(found[0])) for v in found)
+
+
+def upper(i: int, j: int) -> int:
+    """Position of entry (i, j) in the upper triangle of a symmetric 6x6 matrix."""
+    i, j = min(i, j), max(i, j)
+    return i * 6 - i * (i - 1) // 2 + j - i
+
+
+def derivatives_of_energy(g: Graph, r: Isotropic) -> list[Node]:
+    """What the C function of order 0, 1 or 2 needs: w; w_a; w_a, then the rows of w_ab."""
+    if r.order == 0:
+        return [r.energy]
+    c = [g.input("local", k) for k in range(3)]
+    first = gradient(g, r.energy, c)
+    if r.order == 1:
+        return [first[a] for a in c]
+    second = [[gradient(g, first[a], c)[b] for b in c] for a in c]
+    return [*(first[a] for a in c), *(n for row in second for n in row)]

@@ -1,0 +1,1 @@
+"""What a model page is written in: the model, its symbols, kinematics, shapes and rules."""

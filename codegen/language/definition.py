@@ -1,0 +1,70 @@
+"""A finished model as one record: what the compiler gets from a model page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from softehl.codegen.graph.graph import Graph, Node
+from softehl.codegen.language.quadrature import QuadratureRule
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A named scalar argument of a kernel and what it means (with its unit)."""
+
+    name: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What a parameter or datum must satisfy: `name relation bound`, and the page's line."""
+
+    name: str
+    relation: str
+    bound: float
+    where: str
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A finished model: everything the compiler needs, nothing differentiated yet."""
+
+    name: str
+    doc: str
+    nodes: int
+    coordinates: tuple[str, ...]
+    unknowns: tuple[str, ...]
+    interpolated: str | None
+    parameters: tuple[Argument, ...]
+    data: tuple[Argument, ...]
+    point_data: tuple[Argument, ...]
+    rule: QuadratureRule
+    unroll: bool
+    graph: Graph
+    potential: Node
+    constant: tuple[Node, ...]
+    given: Mapping[Node, Mapping[Node, Node]]
+    directions: tuple[Node, ...]
+    waist: tuple[Node, ...]
+    fields: tuple[tuple[str, Node], ...]
+    product: bool = False
+    derivatives: tuple[tuple[str, Node], ...] = ()
+    example: tuple[tuple[str, float], ...] = ()
+    tasks: tuple[str, ...] | None = None
+    conditions: tuple[Condition, ...] = ()
+    components: int = 2
+    """Basis values of the interpolated field: value and derivative, on each side of a facet."""
+    nodal: tuple[tuple[int, int], ...] = ()
+    """First unknown and number of components of every field with unknowns at the nodes."""
+
+    @property
+    def coordinate_width(self) -> int:
+        """Coordinates of one element: components times nodes."""
+        return len(self.coordinates) * self.nodes
+
+    @property
+    def conservative(self) -> bool:
+        """True when the residual is the gradient of the potential (no exceptions)."""
+        return not self.constant and not self.given

@@ -1,0 +1,148 @@
+"""Kinematics of solids: any dimension first, then the axisymmetric ones of the paper, (3)-(6).
+
+Axisymmetric coordinates are ordered (axial, radial) = (z, r); the deformation gradient of an
+axisymmetric motion is a 2x2 block and the hoop stretch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from softehl.codegen.language import shapes
+from softehl.codegen.language.model import Model
+
+
+@dataclass(frozen=True)
+class Isoparametric:
+    """Shape function gradients by the reference coordinates, [node][component], and Jacobian."""
+
+    dN: list[list[Any]]
+    detJ: Any
+
+
+def isoparametric(m: Model, X: Any, parent: Any) -> Isoparametric:
+    """Geometry at the point from nodal coordinates [component][node] and parent gradients.
+
+    Works in one, two and three dimensions; `parent` is e.g. `shapes.hex8_gradient(xi, eta, zeta)`.
+    """
+    size = len(X)
+    J = sp.Matrix(size, size, lambda i, k: shapes.interpolate([g[k] for g in parent], X[i]))
+    J = m.define("dX", J)
+    detJ = m.define("detJ", J.det(method="berkowitz"))
+    inverse = m.define("dX_inverse", J.adjugate() / detJ)
+    dN = [list(sp.Matrix([list(g)]) * inverse) for g in parent]
+    return Isoparametric(
+        [[m.define(f"dN_{a}{k}", v) for k, v in enumerate(row)] for a, row in enumerate(dN)], detJ
+    )
+
+
+def deformation_gradient(m: Model, dN: Any, u: Any) -> Any:
+    """Matrix F = 1 + Grad u, named F_00, F_01, ..., from displacements [component][node]."""
+    size = len(u)
+    F = sp.Matrix(
+        size, size, lambda i, k: (1 if i == k else 0) + shapes.interpolate([g[k] for g in dN], u[i])
+    )
+    return m.define("F", F, waist=True)
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Axisymmetric deformation gradient: in-plane block `plane` (2x2) and `hoop` stretch."""
+
+    plane: Any
+    hoop: Any
+
+    @property
+    def J(self) -> Any:
+        """Volume ratio det F."""
+        F = self.plane
+        return (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * self.hoop
+
+    def scaled(self, factor: Any) -> Gradient:
+        """The gradient `factor` * F."""
+        return Gradient(factor * self.plane, factor * self.hoop)
+
+
+@dataclass(frozen=True)
+class Quad4:
+    """Geometry of the 4-node axisymmetric element at one parent point."""
+
+    N: list[Any]
+    dN: list[tuple[Any, Any]]
+    R: Any
+    dX: list[list[Any]]
+    detJ: Any
+
+
+def quad4(m: Model, label: str, X: Any, xi: Any, eta: Any) -> Quad4:
+    """Shape functions, their gradients in (Z, R), radius and Jacobian at (xi, eta)."""
+    N = [m.define(f"N{label}_{a}", n) for a, n in enumerate(shapes.quad4(xi, eta))]
+    parent = shapes.quad4_gradient(xi, eta)
+    J = [[shapes.interpolate([g[k] for g in parent], x) for k in range(2)] for x in X]
+    J = [[m.define(f"X{label}_{i}{k}", J[i][k]) for k in range(2)] for i in range(2)]
+    detJ = m.define(f"detJ{label}", J[0][0] * J[1][1] - J[0][1] * J[1][0])
+    dN = [
+        (
+            m.define(f"dN{label}_{a}z", (g[0] * J[1][1] - g[1] * J[1][0]) / detJ),
+            m.define(f"dN{label}_{a}r", (g[1] * J[0][0] - g[0] * J[0][1]) / detJ),
+        )
+        for a, g in enumerate(parent)
+    ]
+    radius = m.define(f"R{label}", shapes.interpolate(N, X[1]))
+    return Quad4(N, dN, radius, J, detJ)
+
+
+def gradient(
+    m: Model, label: str, dN: Any, hoop_shape: Any, u: Any, *, waist: bool = True
+) -> Gradient:
+    """F = 1 + Grad u, hoop stretch 1 + u_r / R with `hoop_shape` = N_a / R."""
+    F = sp.Matrix(
+        2, 2, lambda i, k: (1 if i == k else 0) + shapes.interpolate([g[k] for g in dN], u[i])
+    )
+    hoop = 1 + shapes.interpolate(hoop_shape, u[1])
+    return Gradient(
+        m.define(f"F{label}", F, waist=waist), m.define(f"F{label}_t", hoop, waist=waist)
+    )
+
+
+def invariants(m: Model, label: str, F: Gradient) -> tuple[Any, Any, Any]:
+    """I1bar, I2bar and I3 of (4)-(5); det B is the square of J, without expanding it."""
+    B = F.plane * F.plane.T
+    b = [m.define(f"B{label}_{k}", v) for k, v in enumerate((B[0, 0], B[1, 1], B[0, 1]))]
+    bt = m.define(f"B{label}_t", F.hoop**2)
+    I3 = m.define(f"I3{label}", F.J**2)
+    scale = m.define(f"I3{label}_cbrt_inverse", I3 ** sp.Rational(-1, 3))
+    I1 = m.define(f"I1{label}", b[0] + b[1] + bt)
+    trace_B2 = b[0] ** 2 + b[1] ** 2 + 2 * b[2] ** 2 + bt**2
+    I2 = (I1**2 - trace_B2) / 2
+    return scale * I1, scale**2 * I2, I3
+
+
+def mooney_rivlin_isochoric(mu: tuple[Any, Any], I1bar: Any, I2bar: Any) -> Any:
+    """First two terms of the energy (3)."""
+    return mu[0] * (I1bar - 3) / 2 + mu[1] * (I2bar - 3) / 2
+
+
+def volumetric(kappa: Any, I3: Any) -> Any:
+    """Volumetric energy (6)."""
+    return kappa * ((I3 - 1) / 2 - sp.log(I3) / 2) / 2
+
+
+def cauchy_mooney_rivlin(mu: tuple[Any, Any], kappa: Any, F: Gradient) -> tuple[Any, ...]:
+    """Cauchy stress of (3)-(6): J, then sigma_zz, sigma_rr, sigma_tt, sigma_zr."""
+    J = F.J
+    B = F.plane * F.plane.T
+    s = J ** sp.Rational(-2, 3)
+    b = [s * B[0, 0], s * B[1, 1], s * F.hoop**2, s * B[0, 1]]
+    I1 = b[0] + b[1] + b[2]
+    square = [b[0] ** 2 + b[3] ** 2, b[1] ** 2 + b[3] ** 2, b[2] ** 2, b[3] * (b[0] + b[1])]
+    mean_b, I2 = I1 / 3, (I1**2 - square[0] - square[1] - square[2]) / 2
+    pressure = kappa * (J**2 - 1) / (2 * J)
+    normal = [
+        (mu[0] * (b[k] - mean_b) + mu[1] * (I1 * b[k] - square[k] - 2 * I2 / 3)) / J + pressure
+        for k in range(3)
+    ]
+    return (J, *normal, (mu[0] * b[3] + mu[1] * (I1 * b[3] - square[3])) / J)

@@ -1,0 +1,212 @@
+"""SymPy expressions to graph nodes: exact numbers, no expansion, one node per value."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import sympy as sp
+
+from softehl.codegen.graph.graph import Graph, Node, Op
+
+
+class ModelError(ValueError):
+    """The model says something a kernel cannot hold; the message names it and the page's line.
+
+    `where` is the file and line; left out, it is found among the callers: the first one that is
+    not the generator itself (a model that ships is a page like any other).
+    """
+
+    def __init__(self, message: str, where: str | None = None) -> None:
+        place = where or page_line()
+        super().__init__(f"{place}: {message}" if place else message)
+
+
+_CODEGEN = Path(__file__).resolve().parents[1]
+
+
+def page_line() -> str:
+    """File and line of the model page that is being read, e.g. `my_model.py:12`."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        path = Path(frame.f_code.co_filename).resolve()
+        ours = path.is_relative_to(_CODEGEN) and not path.is_relative_to(_CODEGEN / "models")
+        if not ours and "sympy" not in path.parts and not path.name.startswith("<"):
+            return f"{path}:{frame.f_lineno}"
+        frame = frame.f_back
+    return ""
+
+
+_FUNCTIONS: dict[type, Op] = {
+    sp.log: Op.LOG,
+    sp.exp: Op.EXP,
+    sp.sin: Op.SIN,
+    sp.cos: Op.COS,
+    sp.tan: Op.TAN,
+    sp.asin: Op.ASIN,
+    sp.acos: Op.ACOS,
+    sp.atan: Op.ATAN,
+    sp.sinh: Op.SINH,
+    sp.cosh: Op.COSH,
+    sp.tanh: Op.TANH,
+}
+SUPPORTED = (
+    "+ - * / **, sqrt, cbrt, log, exp, sin, cos, tan, asin, acos, atan, atan2, sinh, cosh, tanh, "
+    "Abs, sign, Heaviside, Min, Max, Piecewise"
+)
+
+
+class Lowering:
+    """Converts SymPy expressions whose symbols are bound to nodes in `bound`."""
+
+    def __init__(self, graph: Graph, bound: Mapping[sp.Symbol, Node]) -> None:
+        self.g = graph
+        self.bound = bound
+        self._memo: dict[Any, Node] = {}
+        self._rules: list[tuple[Any, Callable[[Any], Node]]] = [
+            (sp.Symbol, self._symbol),
+            (sp.Rational, lambda e: self.g.const(Fraction(int(e.p), int(e.q)))),
+            (sp.Add, self._add),
+            (sp.Mul, self._mul),
+            (sp.exp, lambda e: self.g.call(Op.EXP, self(e.args[0]))),
+            (sp.Pow, self._pow),
+            (sp.Piecewise, lambda e: self._piecewise(list(e.args), e)),
+            ((sp.Max, sp.Min), self._extremum),
+            (sp.Abs, lambda e: self._absolute(self(e.args[0]))),
+            (sp.sign, lambda e: self._step(self(e.args[0]), (-1, 0, 1))),
+            (sp.Heaviside, lambda e: self._step(self(e.args[0]), (0, e.args[1], 1))),
+            (sp.atan2, lambda e: self.g.node(Op.ATAN2, (self(e.args[0]), self(e.args[1])))),
+            (sp.core.relational.Relational, self._relation),
+            ((sp.And, sp.Or, sp.Not), self._logic),
+            (sp.ITE, self._choice),
+        ]
+
+    def __call__(self, expression: Any) -> Node:
+        try:
+            e = sp.sympify(expression)
+        except (sp.SympifyError, TypeError, ValueError):
+            raise ModelError(f"{expression!r} is no mathematical expression") from None
+        found = self._memo.get(e)
+        if found is None:
+            found = self._memo[e] = self._convert(e)
+        return found
+
+    def _convert(self, e: Any) -> Node:
+        if e is sp.pi:
+            return self.g.pi()
+        if e is sp.E:
+            return self.g.call(Op.EXP, self.g.one)
+        if isinstance(e, sp.Float):
+            raise ModelError(f"{e} is a rounded number; write an exact one, e.g. Rational(1, 3)")
+        for kind, rule in self._rules:
+            if isinstance(e, kind):
+                return rule(e)
+        operation = _FUNCTIONS.get(type(e))
+        if operation is not None:
+            return self.g.call(operation, self(e.args[0]))
+        if isinstance(e, sp.MatrixBase):
+            raise ModelError(f"a matrix of shape {e.shape} where a scalar is needed")
+        if e is sp.I or isinstance(e, (sp.re, sp.im, sp.conjugate)):
+            raise ModelError(f"{e} has no kernel operation: kernels compute with real numbers")
+        raise ModelError(
+            f"{type(e).__name__} in {e} has no kernel operation; there are {SUPPORTED}"
+        )
+
+    def _symbol(self, e: Any) -> Node:
+        if e not in self.bound:
+            raise ModelError(f"symbol {e} is not declared in the model")
+        return self.bound[e]
+
+    def _add(self, e: Any) -> Node:
+        result = self.g.zero
+        for term in e.args:
+            result = self.g.add(result, self(term))
+        return result
+
+    def _mul(self, e: Any) -> Node:
+        top, bottom = self.g.one, self.g.one
+        for factor in e.args:
+            if isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp < 0:
+                bottom = self.g.mul(bottom, self(factor.base**-factor.exp))
+            else:
+                top = self.g.mul(top, self(factor))
+        return self.g.div(top, self._divisor(bottom, e))
+
+    def _divisor(self, n: Node, e: Any) -> Node:
+        value = n
+        while value.op is Op.NAME:
+            value = value.args[0]
+        if value is self.g.zero:
+            raise ModelError(f"{e} divides by zero")
+        return n
+
+    def _pow(self, e: Any) -> Node:
+        base, exponent = e.base, e.exp
+        if isinstance(base, sp.Abs) and isinstance(exponent, sp.Rational):
+            # SymPy makes |x|^(2/3) of (x^2)^(1/3); the square needs no branch
+            base, exponent = base.args[0] ** 2, exponent / 2
+        base = self(base)
+        if exponent.is_negative:
+            self._divisor(base, e)
+        if isinstance(exponent, sp.Rational):
+            return self.g.power(base, Fraction(int(exponent.p), int(exponent.q)))
+        return self.g.call(Op.EXP, self.g.mul(self(exponent), self.g.call(Op.LOG, base)))
+
+    def _piecewise(self, pairs: list[Any], whole: Any) -> Node:
+        value, condition = pairs[0].args
+        if condition is sp.true:
+            return self(value)
+        if len(pairs) == 1:
+            raise ModelError(f"a branch without a last condition: {whole}; end it with (.., True)")
+        return self.g.branch(self(condition), self(value), self._piecewise(pairs[1:], whole))
+
+    def _extremum(self, e: Any) -> Node:
+        result = self(e.args[0])
+        for other in (self(a) for a in e.args[1:]):
+            less = self.g.compare(Op.LT, result, other)
+            pair = (other, result) if isinstance(e, sp.Max) else (result, other)
+            result = self.g.branch(less, *pair)
+        return result
+
+    def _absolute(self, a: Node) -> Node:
+        return self.g.branch(self.g.compare(Op.LT, a, self.g.zero), self.g.neg(a), a)
+
+    def _step(self, a: Node, values: tuple[Any, Any, Any]) -> Node:
+        """One value below zero, one at zero, one above."""
+        below, at, above = (self(v) for v in values)
+        zero = self.g.zero
+        upper = self.g.branch(self.g.compare(Op.LT, zero, a), above, at)
+        return self.g.branch(self.g.compare(Op.LT, a, zero), below, upper)
+
+    def _relation(self, e: Any) -> Node:
+        a, b = self(e.lhs), self(e.rhs)
+        match e.rel_op:
+            case "<":
+                return self.g.compare(Op.LT, a, b)
+            case "<=":
+                return self.g.compare(Op.LE, a, b)
+            case ">":
+                return self.g.compare(Op.LT, b, a)
+            case ">=":
+                return self.g.compare(Op.LE, b, a)
+            case "==":
+                return self.g.compare(Op.EQ, a, b)
+        return self.g.node(Op.NOT, (self.g.compare(Op.EQ, a, b),))
+
+    def _logic(self, e: Any) -> Node:
+        if isinstance(e, sp.Not):
+            return self.g.node(Op.NOT, (self(e.args[0]),))
+        op = Op.AND if isinstance(e, sp.And) else Op.OR
+        result, *rest = (self(a) for a in e.args)
+        for other in rest:
+            result = self.g.node(op, (result, other))
+        return result
+
+    def _choice(self, e: Any) -> Node:
+        """What SymPy makes of a condition on a branch: (c and a) or (not c and b)."""
+        c, a, b = e.args
+        return self(sp.Or(sp.And(c, a), sp.And(sp.Not(c), b)))

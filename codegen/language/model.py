@@ -1,0 +1,420 @@
+"""How a model is written: declared symbols, named intermediates, one potential or weak form.
+
+A model page declares its arguments, writes its mathematics in SymPy, and ends with `potential` or
+`weak_form`.  Nothing is differentiated here; `codegen.pipeline` does that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
+
+from softehl.codegen.abi import Task
+from softehl.codegen.derive.differentiate import gradient
+from softehl.codegen.graph.graph import Graph, Input, Node, Op, reachable
+from softehl.codegen.graph.routines import (
+    SYMMETRIC,
+    Control,
+    isotropic,
+    localise,
+    newton,
+    symmetric,
+)
+from softehl.codegen.language.definition import Argument, Condition, Definition
+from softehl.codegen.language.entries import Entries, fraction
+from softehl.codegen.language.lower import Lowering, ModelError, page_line
+from softehl.codegen.language.quadrature import QuadratureRule
+
+__all__ = ["Argument", "Definition", "Model"]
+
+
+class Model:
+    """Builder of a `Definition`; every method declares or names something.
+
+    With `unroll` the loop over the points of `rule` is written out: faster, and the rule is then
+    part of the kernel.  Otherwise `rule` is the default of a kernel that takes any.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        nodes: int,
+        rule: QuadratureRule,
+        unroll: bool = False,
+        doc: str | None = "",
+    ) -> None:
+        self.name, self.nodes, self.rule, self.unroll = name, nodes, rule, unroll
+        self.doc = " ".join((doc or "").split())
+        self.graph = Graph()
+        self._bound: dict[sp.Symbol, Node] = {}
+        self._lower = Lowering(self.graph, self._bound)
+        self._coordinates: tuple[str, ...] = ()
+        self._unknowns: list[str] = []
+        self._interpolated: str | None = None
+        self._components = 2
+        self._directions: list[Node] = []
+        self._nodal: list[tuple[int, int]] = []
+        self._arguments: dict[str, list[Argument]] = {
+            "parameters": [],
+            "data": [],
+            "point data": [],
+        }
+        self._waist: list[Node] = []
+        self._given: dict[Node, dict[Node, Node]] = {}
+        self._constant: list[Node] = []
+        self._fields: list[tuple[str, Node]] = []
+        self._potential: Node | None = None
+        self._product = False
+        self._derivatives: list[tuple[str, Node]] = []
+        self._example: dict[str, float] = {}
+        self._conditions: list[Condition] = []
+        self._tasks: tuple[str, ...] | None = None
+        self._declared: dict[str, tuple[Node, str]] = {}
+
+    # declarations -------------------------------------------------------------------------------
+
+    def coordinates(self, *names: str) -> list[list[sp.Symbol]]:
+        """Reference coordinates, any number of components: a list over the nodes for each."""
+        if self._coordinates not in ((), names):
+            raise ModelError(f"the coordinates are {', '.join(self._coordinates)} already")
+        self._coordinates, width = names, len(names)
+        return [
+            [self._input(f"{name}{a + 1}", "coordinates", a * width + c) for a in range(self.nodes)]
+            for c, name in enumerate(names)
+        ]
+
+    def nodal_unknowns(self, *names: str, idle: Sequence[str] = ()) -> list[list[sp.Symbol]]:
+        """Unknowns at the nodes, numbered node by node; one list for each component.
+
+        The `idle` ones of `names` belong to the node but need not enter the mathematics.
+        """
+        columns: list[list[sp.Symbol]] = [[] for _ in names]
+        self._nodal.append((len(self._unknowns), len(names)))
+        for a in range(self.nodes):
+            for c, name in enumerate(names):
+                columns[c].append(self.unknown(f"{name}{a + 1}"))
+                if name in idle:
+                    self._declared.pop(f"{name}{a + 1}", None)
+        return columns
+
+    def unknown(self, name: str) -> sp.Symbol:
+        """One more scalar unknown of the element."""
+        if self._interpolated:
+            raise ModelError(f"declare {name} before the interpolated {self._interpolated}")
+        symbol = self._input(name, "dofs", len(self._unknowns))
+        self._unknowns.append(name)
+        self._directions.append(self._bound[symbol])
+        return symbol
+
+    def interpolated(self, name: str) -> tuple[sp.Symbol, sp.Symbol]:
+        """Value and xi-derivative of a field with any number of element unknowns (`modes`)."""
+        return self.interpolated_sides(name)[0]
+
+    def interpolated_sides(self, *names: str) -> list[tuple[sp.Symbol, sp.Symbol]]:
+        """Value and xi-derivative of several fields that share the `modes` unknowns.
+
+        An interior facet has two: the traces from its sides.  The basis holds both components
+        of each field for every mode, zero where a mode belongs to another field.
+        """
+        if self._interpolated:
+            raise ModelError(f"{names[0]}: the element interpolates {self._interpolated} already")
+        self._interpolated, self._components = ", ".join(names), 2 * len(names)
+        labels = [label for name in names for label in (name, f"{name}_xi")]
+        symbols = [
+            self._input(label, "interpolated", k, varying=True) for k, label in enumerate(labels)
+        ]
+        self._directions.extend(self._bound[s] for s in symbols)
+        return list(zip(symbols[::2], symbols[1::2], strict=True))
+
+    def parameters(self, **meanings: str) -> list[sp.Symbol]:
+        """Arguments that are the same for all elements of a call."""
+        return self._declare("parameters", meanings)
+
+    def data(self, **meanings: str) -> list[sp.Symbol]:
+        """Arguments that differ from element to element."""
+        return self._declare("data", meanings)
+
+    def point_data(self, **meanings: str) -> list[sp.Symbol]:
+        """Arguments that differ from quadrature point to point, e.g. history variables."""
+        return self._declare("point data", meanings, varying=True)
+
+    def require(self, *conditions: Any) -> None:
+        """What parameters and data must satisfy, e.g. `mu > 0`; checked at every call.
+
+        Each condition compares one parameter or datum with a number by <, <=, > or >=.
+        """
+        for c in conditions:
+            known = [a.name for k in ("parameters", "data") for a in self._arguments[k]]
+            if isinstance(c, sp.core.relational.Relational) and c.lhs.is_number:
+                c = c.reversed
+            fit = isinstance(
+                c, (sp.StrictLessThan, sp.LessThan, sp.StrictGreaterThan, sp.GreaterThan)
+            )
+            if not fit or str(c.lhs) not in known or not c.rhs.is_number:
+                raise ModelError(
+                    f"require {c}: compare one parameter or datum with a number, e.g. mu > 0"
+                )
+            where = Path(page_line()).name
+            self._conditions.append(Condition(str(c.lhs), c.rel_op, float(c.rhs), where))
+
+    def point(self) -> list[sp.Symbol]:
+        """Coordinates of the quadrature point in the parent element."""
+        names = ("xi", "eta", "zeta")[: self.rule.dimension]
+        return [self._input(s, "rule", k, varying=True) for k, s in enumerate(names)]
+
+    @property
+    def weight(self) -> sp.Symbol:
+        """Weight of the quadrature point."""
+        return self._input("weight", "rule", self.rule.dimension, varying=True)
+
+    # mathematics --------------------------------------------------------------------------------
+
+    def define(
+        self,
+        name: str,
+        expression: Any,
+        *,
+        waist: bool = False,
+        derivative: Mapping[sp.Symbol, Any] | None = None,
+    ) -> Any:
+        """Name an intermediate (scalar or matrix); returns its symbol or matrix of symbols.
+
+        A `waist` intermediate is one that derivatives are taken through.  `derivative` replaces
+        the true derivative by given ones with respect to chosen symbols.
+        """
+        if isinstance(expression, sp.MatrixBase):
+            if derivative is not None:
+                raise ModelError(f"{name}: give the derivative of each entry, not of the matrix")
+            rows, columns = expression.shape
+            return sp.Matrix(
+                rows,
+                columns,
+                lambda i, j: self.define(f"{name}_{i}{j}", expression[i, j], waist=waist),
+            )
+        node = self.graph.name(name, self._lower(expression))
+        if waist:
+            self._waist.append(node)
+        if derivative is not None:
+            self._given[node] = {self._bound[s]: self._lower(e) for s, e in derivative.items()}
+        return self._bind(name, node)
+
+    def implicit(
+        self,
+        name: str,
+        equations: Callable[[Any], Any],
+        *,
+        start: Any,
+        tolerance: float = 1e-10,
+        size: float = 1.0,
+        iterations: int = 25,
+    ) -> Any:
+        """Local unknowns s with equations(s) = 0, found by Newton's method inside the kernel.
+
+        `start` is where the iteration begins: a scalar, a list, or a matrix, and s is alike; so is
+        what `equations` returns.  Derivatives of s follow from the implicit function theorem,
+        whatever the start.  The iteration ends when a step changes every s_k by no more than
+        `tolerance` (`size` + |s_k|), `size` being the magnitude that matters; the last step is
+        taken, so that the error is of the order of its square.  Without success after `iterations`
+        steps all outputs of the element are not-a-number.
+        """
+        begin, unknowns = Entries.of(start), Entries.of(start).map(lambda _: sp.Dummy(real=True))
+        local = self._placeholders(name, unknowns)
+        found = Entries.of(equations(unknowns.shaped()))
+        if len(found.values) != len(local):
+            raise ModelError(
+                f"{name}: {len(found.values)} equations for {len(local)} unknowns; one for each"
+            )
+        system = localise(self.graph, [self._lower(e) for e in found.values], local)
+        control = Control(fraction(tolerance), fraction(size), iterations)
+        routine = newton(self.graph, name, system, control)
+        for k in range(len(local)):
+            if all(row[k] is self.graph.zero for row in routine.by_local):
+                raise ModelError(f"{name}: unknown {k} does not occur in the equations")
+        args = [*system.external, *(self._lower(e) for e in begin.values)]
+        return self._named(name, begin, self.graph.run(routine, args))
+
+    def principal(self, name: str, C: Any, energy: Callable[[Any, Any, Any], Any]) -> sp.Symbol:
+        """An isotropic energy of the principal stretches: energy(lambda_1, lambda_2, lambda_3).
+
+        C is the symmetric right Cauchy-Green matrix, 3x3 (its upper triangle is read), the
+        stretches are the roots of its eigenvalues, and `energy` must not change when they are
+        exchanged.  First and second derivatives by C are exact also where stretches are equal.
+        """
+        if sp.Matrix(C).shape != (3, 3):
+            raise ModelError(f"{name}: C has shape {sp.Matrix(C).shape}, must be (3, 3)")
+        squares = Entries([sp.Dummy(positive=True) for _ in range(3)], ("", "", ""), list)
+        local = self._placeholders(name, squares)
+        value = self._lower(energy(*(sp.sqrt(c) for c in squares.values)))
+        if not symmetric(value, local):
+            raise ModelError(f"{name}: the energy changes when two stretches are exchanged")
+        system = localise(self.graph, [value], local)
+        routine = isotropic(name, 6 + len(system.external), system.values[0])
+        args = [*(self._lower(C[i, j]) for i, j in SYMMETRIC), *system.external]
+        return self._bind(name, self.graph.name(name, self.graph.run(routine, args)[0]))
+
+    def derivative(self, name: str, value: Any, by: Any) -> Any:
+        """Derivatives of a scalar by one named symbol, a list or a matrix of them, e.g. P = dW/dF.
+
+        The symbols are those of `define` or of arguments; all else is differentiated through.
+        """
+        symbols = Entries.of(by)
+        sources = [self._lower(s) for s in symbols.values]
+        slopes = gradient(self.graph, self._lower(value), sources, given=self._given)
+        return self._named(name, symbols, [slopes[s] for s in sources])
+
+    def integral(self, name: str, integrand: Any) -> sp.Symbol:
+        """Quadrature of `integrand` over the parent element."""
+        return self._bind(name, self.graph.sum(self._lower(integrand * self.weight)))
+
+    def potential(self, expression: Any, *, constant: Iterable[Any] = ()) -> None:
+        """The residual is the gradient of `expression` with the `constant` symbols frozen."""
+        self._constant = [self._lower(s) for s in constant]
+        self._potential = self._lower(expression)
+        if self._potential.varying:
+            raise ModelError(
+                f"the potential of {self.name} varies with the point: wrap it in integral(...)"
+            )
+
+    def weak_form(self, terms: Sequence[tuple[Any, Any]]) -> None:
+        """Residual = integral of sum(factor * variation of varied) over (factor, varied)."""
+        density = sp.Integer(0)
+        frozen = []
+        for k, (factor, varied) in enumerate(terms):
+            frozen.append(self.define(f"factor_{k}", factor, waist=True))
+            density += frozen[-1] * varied
+        self.potential(self.integral("virtual_work", density), constant=frozen)
+
+    def fields(self, **values: Any) -> None:
+        """Quantities to be evaluated at the quadrature points for post-processing."""
+        self._fields = [(name, self._lower(value)) for name, value in values.items()]
+
+    def offer(
+        self,
+        *,
+        tasks: Sequence[str] | None = None,
+        product: bool = False,
+        derivatives: Sequence[Any] = (),
+    ) -> None:
+        """What is generated: tasks by name, derivatives of the residual by argument.
+
+        `tasks` are chosen among energy, residual, tangent (residual and tangent together), fields
+        and product; left out, all but the product.  `product` adds the tangent times a vector.
+        `derivatives` lists symbols of parameters, data or coordinates.
+        """
+        known = [str(t) for t in Task]
+        for t in tasks or ():
+            if t not in known:
+                raise ModelError(f"no task {t!r}; there are {', '.join(known)}")
+        self._tasks = None if tasks is None else (*tasks, *([Task.PRODUCT] if product else []))
+        self._product = product or Task.PRODUCT in (tasks or ())
+        nodes = [(str(s), self._lower(s)) for s in derivatives]
+        for name, n in nodes:
+            source = n.payload.array if isinstance(n.payload, Input) else ""
+            if source not in ("parameters", "data", "coordinates"):
+                raise ModelError(f"{name} is no parameter, datum or coordinate to derive by")
+        self._derivatives = nodes
+
+    def example(self, **values: float) -> None:
+        """Values near which the model makes sense, by name; the check of its kernel starts there.
+
+        Names of parameters, data, unknowns (`u_x1`) and coordinates (`X1`).  What is not named is
+        about 1 (parameters, data), a few per cent (unknowns), the unit cell (coordinates).
+        """
+        unknown = set(values) - {str(s) for s, n in self._bound.items() if n.op is Op.INPUT}
+        if unknown:
+            raise ModelError(f"example: {', '.join(sorted(unknown))} is no argument of {self.name}")
+        self._example.update({name: float(v) for name, v in values.items()})
+
+    def finish(self) -> Definition:
+        """The frozen definition of the model."""
+        if self._potential is None:
+            raise ModelError(f"model {self.name} has neither a potential nor a weak form")
+        self._check_use(self._potential)
+        definition = Definition(
+            name=self.name,
+            doc=self.doc,
+            nodes=self.nodes,
+            coordinates=self._coordinates,
+            unknowns=tuple(self._unknowns),
+            interpolated=self._interpolated,
+            parameters=tuple(self._arguments["parameters"]),
+            data=tuple(self._arguments["data"]),
+            point_data=tuple(self._arguments["point data"]),
+            rule=self.rule,
+            unroll=self.unroll,
+            graph=self.graph,
+            potential=self._potential,
+            constant=tuple(self._constant),
+            given=self._given,
+            directions=tuple(self._directions),
+            waist=tuple(self._waist),
+            fields=tuple(self._fields),
+            product=self._product,
+            derivatives=tuple(self._derivatives),
+            example=tuple(self._example.items()),
+            tasks=self._tasks,
+            conditions=tuple(self._conditions),
+            nodal=tuple(self._nodal),
+            components=self._components,
+        )
+
+        chosen = definition.tasks or ()
+        if Task.ENERGY in chosen and not definition.conservative:
+            raise ModelError(f"no energy for {self.name}: its residual is not the gradient of one")
+        if Task.FIELDS in chosen and not definition.fields:
+            raise ModelError(f"no task fields for {self.name}: it declares none")
+        return definition
+
+    def _check_use(self, potential: Node) -> None:
+        """Every unknown enters the potential, every other argument it or a field."""
+        given = [n for pairs in self._given.values() for n in (*pairs, *pairs.values())]
+        equations = set(reachable([potential, *given]))
+        used = equations | set(reachable([n for _, n in self._fields]))
+        for name, (n, where) in self._declared.items():
+            unknown = isinstance(n.payload, Input) and n.payload.array == "dofs"
+            if n not in (equations if unknown else used):
+                advice = "its residual is zero; is it idle?" if unknown else "leave it out"
+                what = "unknown" if unknown else "argument"
+                raise ModelError(f"the {what} {name} is never used: {advice}", where)
+
+    # binding ------------------------------------------------------------------------------------
+
+    def _placeholders(self, name: str, symbols: Entries) -> list[Node]:
+        """Inputs that stand for local unknowns while their equations are written."""
+        nodes = [self.graph.input(f"local {name}", k) for k in range(len(symbols.values))]
+        self._bound.update(zip(symbols.values, nodes, strict=True))
+        return nodes
+
+    def _named(self, name: str, like: Entries, nodes: Sequence[Node]) -> Any:
+        """Symbols for `nodes`, arranged like other values."""
+        labels = [name + suffix for suffix in like.suffixes]
+        named = [self.graph.name(s, n) for s, n in zip(labels, nodes, strict=True)]
+        symbols = [self._bind(s, n) for s, n in zip(labels, named, strict=True)]
+        return Entries(symbols, like.suffixes, like.arrange).shaped()
+
+    def _declare(
+        self, array: str, meanings: Mapping[str, str], *, varying: bool = False
+    ) -> list[sp.Symbol]:
+        start = len(self._arguments[array])
+        self._arguments[array] += [Argument(n, " ".join(m.split())) for n, m in meanings.items()]
+        return [
+            self._input(name, array, start + k, varying=varying) for k, name in enumerate(meanings)
+        ]
+
+    def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
+        node = self.graph.input(array, index, varying=varying)
+        symbol = self._bind(name, node)
+        if array in ("dofs", "parameters", "data", "point data"):
+            self._declared.setdefault(name, (node, page_line()))
+        return symbol
+
+    def _bind(self, name: str, node: Node) -> sp.Symbol:
+        symbol = sp.Symbol(name, real=True)
+        if self._bound.get(symbol, node) is not node:
+            raise ModelError(f"the name {name} is used twice in model {self.name}")
+        self._bound[symbol] = node
+        return symbol

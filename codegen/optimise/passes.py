@@ -1,0 +1,338 @@
+"""Named rewrites of a set of root nodes, and the trace of what each one bought.
+
+Every pass maps roots to roots of the same value.  `STANDARD` is the order in which the compiler
+runs them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import mpmath
+
+from softehl.codegen.graph.arithmetic import number
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, operations, reachable
+from softehl.codegen.optimise.signatures import merge_equal
+from softehl.codegen.optimise.sums import common_sums
+
+Roots = list[Node]
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A rewrite with the name it carries in the trace."""
+
+    name: str
+    apply: Callable[[Graph, Roots], Roots]
+
+
+@dataclass(frozen=True)
+class TraceRow:
+    """State of the graph after a pass."""
+
+    name: str
+    nodes: int
+    operations: int
+
+
+def run(g: Graph, roots: Roots, passes: Sequence[Pass]) -> tuple[Roots, list[TraceRow]]:
+    """Apply `passes` in order; the first row of the trace is the input."""
+    trace = [_row("input", roots)]
+    for p in passes:
+        roots = p.apply(g, roots)
+        trace.append(_row(p.name, roots))
+    return roots, trace
+
+
+def _row(name: str, roots: Roots) -> TraceRow:
+    return TraceRow(name, len(reachable(roots)), operations(roots))
+
+
+def rewrite(g: Graph, roots: Roots, rule: Callable[[Graph, Node, tuple[Node, ...]], Node]) -> Roots:
+    """Rebuild bottom-up: `rule` gets each old node with its rebuilt operands."""
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        new[n] = rule(g, n, tuple(new[a] for a in n.args))
+    return [new[r] for r in roots]
+
+
+def fold(g: Graph, roots: Roots) -> Roots:
+    """Drop names, fold exact constants, apply the identities of the constructors again."""
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        return args[0] if n.op is Op.NAME else g.rebuild(n.op, args, n.payload)
+
+    return rewrite(g, roots, rule)
+
+
+def powers(g: Graph, roots: Roots) -> Roots:
+    """Powers as products, square roots and cube roots that share one reciprocal."""
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        if n.op is not Op.POW:
+            return g.rebuild(n.op, args, n.payload)
+        assert isinstance(n.payload, Fraction)
+        return _power(g, args[0], n.payload)
+
+    return rewrite(g, roots, rule)
+
+
+def _power(g: Graph, a: Node, e: Fraction) -> Node:
+    n = abs(e.numerator)
+    match e.denominator, e < 0:
+        case 1, negative:
+            base = g.recip(a) if negative else a
+        case 2, negative:
+            base = g.call(Op.SQRT, g.recip(a) if negative else a)
+        case 3, True:
+            base = g.call(Op.RCBRT, a)
+        case 3, False:  # a r^2 with r = a^(-1/3): one kind of root for both signs
+            r = g.call(Op.RCBRT, a)
+            base = g.mul(a, g.mul(r, r))
+        case _:
+            return g.power(a, e)
+    return _integer_power(g, base, n)
+
+
+def _integer_power(g: Graph, a: Node, n: int) -> Node:
+    if n == 1:
+        return a
+    half = _integer_power(g, a, n // 2)
+    square = g.mul(half, half)
+    return g.mul(square, a) if n % 2 else square
+
+
+def _uses(roots: Roots) -> Counter[Node]:
+    uses: Counter[Node] = Counter(roots)
+    for n in reachable(roots):
+        uses.update(n.args)
+    return uses
+
+
+def _chain(n: Node, ops: tuple[Op, ...], uses: Counter[Node]) -> list[Node]:
+    """Operands of a chain of `ops` whose inner results nobody else uses."""
+    out: list[Node] = []
+    for a in n.args:
+        out += _chain(a, ops, uses) if a.op in ops and uses[a] == 1 else [a]
+    return out
+
+
+def invariants_first(g: Graph, roots: Roots) -> Roots:
+    """Reorder products: constants, then what does not vary with the point, then the rest."""
+    uses = _uses(roots)
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        if n.op is Op.MUL:
+            factors = [new[f] for f in _chain(n, (Op.MUL,), uses)]
+            new[n] = _product(g, factors)
+        else:
+            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+    return [new[r] for r in roots]
+
+
+def _product(g: Graph, factors: list[Node]) -> Node:
+    ranked = sorted(factors, key=lambda f: (f.op is not Op.CONST, f.varying, f.id))
+    result = g.one
+    for f in ranked:
+        result = g.mul(result, f)
+    return result
+
+
+def factor(g: Graph, roots: Roots) -> Roots:
+    """Common factors: a b + a c becomes a (b + c), the most frequent factor first."""
+    uses = _uses(roots)
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        if n.op in (Op.ADD, Op.SUB):
+            terms = [(s, [new[f] for f in fs]) for s, fs in _terms(n, 1, uses)]
+            shared = _most_shared(terms)
+            new[n] = _factored(g, terms) if shared else _as_it_was(g, n, new)
+        else:
+            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+    return [new[r] for r in roots]
+
+
+Term = tuple[int, list[Node]]
+
+
+def _terms(n: Node, sign: int, uses: Counter[Node]) -> list[Term]:
+    """Signed products whose sum is `n`."""
+    out: list[Term] = []
+    for k, a in enumerate(n.args):
+        s = -sign if (n.op is Op.SUB and k == 1) else sign
+        if a.op in (Op.ADD, Op.SUB) and uses[a] == 1:
+            out += _terms(a, s, uses)
+        elif a.op is Op.MUL and uses[a] == 1:
+            out.append((s, _chain(a, (Op.MUL,), uses)))
+        else:
+            out.append((s, [a]))
+    return out
+
+
+def _as_it_was(g: Graph, n: Node, new: dict[Node, Node]) -> Node:
+    """A sum keeps its order unless there is something to gain: order is rounding."""
+    return g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+
+
+def _most_shared(terms: list[Term]) -> Node | None:
+    """The factor of most terms, None where no two terms share one."""
+    count: Counter[Node] = Counter()
+    for _, factors in terms:
+        count.update(list(dict.fromkeys(factors)))
+    best = max(count, key=lambda f: (count[f], -f.id))
+    return best if count[best] > 1 and best.payload != 1 else None
+
+
+def _factored(g: Graph, terms: list[Term]) -> Node:
+    best = _most_shared(terms)
+    if best is None:
+        return _sum(g, [(s, _product(g, fs)) for s, fs in terms])
+    inside: list[Term] = []
+    outside: list[Term] = []
+    for s, fs in terms:
+        if best in fs:
+            rest = list(fs)
+            rest.remove(best)
+            inside.append((s, rest or [g.one]))
+        else:
+            outside.append((s, fs))
+    grouped = g.mul(best, _factored(g, inside))
+    return _sum(g, [(1, grouped)], _factored(g, outside) if outside else g.zero)
+
+
+def _sum(g: Graph, terms: list[tuple[int, Node]], start: Node | None = None) -> Node:
+    result = g.zero if start is None else start
+    for s, n in sorted(terms, key=lambda t: (t[1].varying, -t[0])):
+        result = g.add(result, n) if s > 0 else g.sub(result, n)
+    return result
+
+
+def inverses(g: Graph, roots: Roots) -> Roots:
+    """1/x next to x^(-1/3) is its third power: two multiplications for a division."""
+    rooted = {n.args[0] for n in reachable(roots) if n.op is Op.RCBRT}
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        if n.op is Op.RECIP and n.args[0] in rooted:
+            y = g.call(Op.RCBRT, args[0])
+            return g.mul(y, g.mul(y, y))
+        return g.rebuild(n.op, args, n.payload)
+
+    return rewrite(g, roots, rule)
+
+
+def assume(g: Graph, roots: Roots) -> Roots:
+    """Inside one side of a branch its condition is known: drop inner branches on it."""
+    memo: dict[tuple[Node, tuple[tuple[Node, bool], ...]], Node] = {}
+
+    def visit(n: Node, known: tuple[tuple[Node, bool], ...]) -> Node:
+        key = (n, known)
+        if key not in memo:
+            memo[key] = build(n, known)
+        return memo[key]
+
+    def build(n: Node, known: tuple[tuple[Node, bool], ...]) -> Node:
+        if n.op is not Op.BRANCH:
+            return g.rebuild(n.op, tuple(visit(a, known) for a in n.args), n.payload)
+        c, a, b = n.args
+        for condition, holds in known:
+            if condition is c:
+                return visit(a if holds else b, known)
+        order = tuple(sorted((*known, (c, True)), key=lambda k: k[0].id))
+        negated = tuple(sorted((*known, (c, False)), key=lambda k: k[0].id))
+        return g.branch(visit(c, known), visit(a, order), visit(b, negated))
+
+    has_branch = any(n.op is Op.BRANCH for n in reachable(roots))
+    for n in reachable(roots) if has_branch else ():
+        visit(n, ())  # ascending order keeps the recursion shallow
+    return [visit(r, ()) for r in roots] if has_branch else roots
+
+
+def literals(g: Graph, roots: Roots) -> Roots:
+    """Values that depend on no argument become numbers, correctly rounded at the last moment."""
+    value: dict[Node, mpmath.mpf] = {}
+
+    def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
+        known = all(a.op is Op.CONST for a in args) and (bool(args) or n.op is Op.PI)
+        if not known or n.op in (Op.SUM, Op.BRANCH, Op.CALL) or n.op in BOOLEAN:
+            return g.rebuild(n.op, args, n.payload)
+        with mpmath.workdps(50):
+            result = number(n, [value.get(o, _exact(a)) for o, a in zip(n.args, args, strict=True)])
+            value[n] = result
+            return g.const(Fraction(float(result)))
+
+    return rewrite(g, roots, rule)
+
+
+def _exact(n: Node) -> mpmath.mpf:
+    return mpmath.mpf(n.value.numerator) / n.value.denominator
+
+
+def unrolled(points: Sequence[Sequence[Fraction]], data: tuple[int, int] = (0, 0)) -> Pass:
+    """Loops over the points written out; `points` holds (coordinates..., weight) of each.
+
+    The coordinates are rationals good to far more digits than a double holds.  `data` are the
+    numbers of data of the element and of one of its points.
+    """
+
+    def apply(g: Graph, roots: Roots) -> Roots:
+        new: dict[Node, Node] = {}
+        copies: list[dict[Node, Node]] = [{} for _ in points]
+
+        def at(n: Node, q: int) -> Node:
+            return copies[q][n] if n.varying else new[n]
+
+        for n in reachable(roots):
+            if n.op is Op.SUM:
+                new[n] = g.zero
+                for q in range(len(points)):
+                    new[n] = g.add(new[n], at(n.args[0], q))
+            elif not n.varying:
+                new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+            else:
+                for q, point in enumerate(points):
+                    if isinstance(n.payload, Input) and n.payload.array == "point data":
+                        index = data[0] + data[1] * q + n.payload.index
+                        copies[q][n] = g.input("data", index)
+                    elif isinstance(n.payload, Input):
+                        copies[q][n] = g.const(point[n.payload.index])
+                    else:
+                        args = tuple(at(a, q) for a in n.args)
+                        copies[q][n] = g.rebuild(n.op, args, n.payload)
+        return [new[r] for r in roots]
+
+    return Pass("unroll", apply)
+
+
+STANDARD = (
+    Pass("fold", fold),
+    Pass("assume", assume),
+    Pass("powers", powers),
+    Pass("invariants first", invariants_first),
+    Pass("common factors", factor),
+    Pass("common sums", common_sums),
+    Pass("common factors again", factor),
+    Pass("literals", literals),
+)
+
+
+def straight_line(
+    points: Sequence[Sequence[Fraction]], data: tuple[int, int] = (0, 0)
+) -> tuple[Pass, ...]:
+    """The passes of a kernel whose loop over the points is written out."""
+    return (
+        Pass("fold", fold),
+        Pass("assume", assume),
+        Pass("powers", powers),
+        Pass("common factors", factor),
+        Pass("inverses of roots", inverses),
+        unrolled(points, data),
+        Pass("equal values", merge_equal),
+        Pass("invariants first", invariants_first),
+        Pass("common sums", common_sums),
+        Pass("common factors again", factor),
+        Pass("common sums again", common_sums),
+        Pass("literals", literals),
+    )

@@ -1,0 +1,1 @@
+"""Around the compiler: cache, build, check against the oracle, command line."""

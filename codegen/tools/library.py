@@ -1,0 +1,165 @@
+"""From models to a folder with their C and the compiled kernels, by way of the user's cache.
+
+Two keys, so that nothing is derived or compiled twice: what the C was derived from (the text of
+the model file or the graph of a definition, the text of this generator, the version of SymPy), and
+what the library was compiled from (the C, the compiler, its flags, the processor, the ABI).
+A model that reads anything else than Python of its own folder (a table of constants, the time)
+is not seen to change by `folder_of`; `softehl generate` runs it in any case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from softehl.codegen import abi
+from softehl.codegen.tools import build, model_text
+from softehl.codegen.tools import cache as store
+
+if TYPE_CHECKING:
+    from softehl.codegen.graph.graph import Node
+    from softehl.codegen.language.model import Definition
+
+
+@dataclass(frozen=True)
+class Library:
+    """Files and compiled kernels of some models.
+
+    folder: in the cache; holds `files` and the shared library.  derived, compiled: seconds by
+    kernel; empty where the cache had them.
+    """
+
+    folder: Path
+    files: Mapping[str, str]
+    derived: Mapping[str, float]
+    compiled: Mapping[str, float]
+
+
+def folder_of(source: Path | Definition) -> Path:
+    """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived)."""
+    if not isinstance(source, Path):
+        return library([source]).folder
+    key = _file_key(source)
+    files = store.recall(key)
+    if files is None:
+        from softehl.codegen.tools import user
+
+        return library(user.definitions(source), key).folder
+    return _compile(files)[0]
+
+
+def of_files(paths: Sequence[Path]) -> tuple[list[Definition], Library]:
+    """The models of some files, which are run, and their library."""
+    from softehl.codegen.tools import user
+
+    keys = [_file_key(p) for p in paths]
+    found = [d for p in paths for d in user.definitions(p)]
+    user.check_names(" ".join(p.name for p in paths), found)
+    return found, library(found, keys[0] if len(keys) == 1 else None)
+
+
+def library(definitions: Sequence[Definition], key: str | None = None) -> Library:
+    """The library of some models; what was derived is remembered under `key` as well."""
+    files, derived = derive(definitions)
+    if key is not None:
+        store.remember(key, files)
+    folder, compiled = _compile(files)
+    return Library(folder, files, derived, compiled)
+
+
+def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str, float]]:
+    """Every generated file, and seconds by kernel (empty if they were remembered)."""
+    key = store.digest("models", generator(), *(fingerprint(d) for d in definitions))
+    files = store.recall(key)
+    if files is not None:
+        return files, {}
+    from softehl.codegen import pipeline
+
+    kernels, seconds = [], {}
+    for d in definitions:
+        start = perf_counter()
+        kernels.append(pipeline.compile_model(d))
+        seconds[d.name] = perf_counter() - start
+    files = pipeline.files(kernels)
+    store.remember(key, files)
+    return files, seconds
+
+
+def _compile(files: Mapping[str, str]) -> tuple[Path, dict[str, float]]:
+    """The folder of these files and their library, and seconds by kernel (empty if cached)."""
+    content = store.content(files)
+    key = store.digest(content, str(abi.VERSION), build.identification())
+    seconds: dict[str, float] = {}
+
+    def complete(folder: Path) -> bool:
+        return (folder / build.LIBRARY).is_file() and _content_of(folder, files) == content
+
+    def make(folder: Path) -> None:
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
+        seconds.update(build.build_each(folder))
+
+    return store.folder(key, complete, make), seconds
+
+
+def _content_of(folder: Path, files: Mapping[str, str]) -> str | None:
+    try:
+        return store.content({n: (folder / n).read_text(encoding="utf-8") for n in files})
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+def _file_key(path: Path) -> str:
+    return store.digest("file", generator(), model_text.digest(path))
+
+
+_CODEGEN = Path(__file__).parents[1]
+
+
+@cache
+def generator() -> str:
+    """Digest of the generator itself: its text and the versions of what it computes with."""
+    texts = [p.read_text(encoding="utf-8") for p in sorted(_CODEGEN.rglob("*.py"))]
+    return store.digest(*texts, *(version(p) for p in ("sympy", "mpmath")))
+
+
+def fingerprint(definition: Definition) -> str:
+    """Digest of everything that a definition says, its graph included."""
+    return store.digest(_told(definition))
+
+
+def _told(value: Any) -> str:
+    """A record as text: its nodes, numbered from operands to users, then its entries."""
+    from softehl.codegen.graph.graph import Routine, reachable
+
+    roots: list[Node] = []
+    _entries(value, lambda n: roots.append(n) or "")  # type: ignore[func-returns-value]
+    place = {n: f"#{k}" for k, n in enumerate(reachable(roots))}
+    lines = []
+    for n in place:
+        payload = _told(n.payload) if isinstance(n.payload, Routine) else repr(n.payload)
+        lines.append(f"{n.op} {[place[a] for a in n.args]} {payload} {n.varying}")
+    return "\n".join([*lines, _entries(value, place.__getitem__)])
+
+
+def _entries(value: Any, shown: Callable[[Node], str]) -> str:
+    """A value as text, nodes as `shown`; what a record notes for itself (_name) does not count."""
+    from softehl.codegen.graph.graph import Graph, Node
+
+    if isinstance(value, Node):
+        return shown(value)
+    if isinstance(value, Mapping):
+        inside = [f"{_entries(k, shown)}: {_entries(v, shown)}" for k, v in value.items()]
+    elif isinstance(value, (tuple, list)):
+        inside = [_entries(v, shown) for v in value]
+    elif is_dataclass(value):
+        named = {f.name: getattr(value, f.name) for f in fields(value) if f.name[0] != "_"}
+        inside = [type(value).__name__, _entries(named, shown)]
+    else:
+        return "" if isinstance(value, Graph) else repr(value)
+    return f"({', '.join(inside)})"

@@ -1,0 +1,154 @@
+"""Models of a user's own file.
+
+A model file is ordinary Python and is *run* to obtain its models: run only files you trust, as you
+would with any script.  Its models are
+
+- the functions of the file that take no argument and are annotated `-> Definition`, and
+- the names of the file that hold a `Definition`,
+
+in the order in which they are written; where the file has a mapping or list `MODELS` (of such
+functions or definitions), those alone.  Names that begin with an underscore are left out.
+"""
+
+from __future__ import annotations
+
+import inspect
+import linecache
+import re
+import sys
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.model import Definition
+from softehl.codegen.tools.model_text import ModelFileError, read
+
+_RECIPE = "write `def my_model() -> Definition:` that ends in `return m.finish()`"
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def definitions(path: Path) -> list[Definition]:
+    """The models of a file, which is run; raises `ModelFileError`."""
+    path = path.resolve()
+    text = read(path)
+    with _imports_from(path.parent), _errors_of(path):
+        found = [_made(entry) for entry in _entries(path, _run(path, text))]
+    if not found:
+        raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
+    check_names(path.name, found)
+    return found
+
+
+def check_names(where: str, found: Iterable[Definition]) -> None:
+    """Raise `ModelFileError` unless the names are different and can be names in C."""
+    seen: set[str] = set()
+    for d in found:
+        if not _IDENTIFIER.fullmatch(d.name):
+            raise ModelFileError(
+                f"{where}: a model is called {d.name!r}; use letters, digits and underscores"
+            )
+        if d.name in seen:
+            raise ModelFileError(f"{where}: two models are called {d.name}; rename one")
+        seen.add(d.name)
+
+
+# ------------------------------------------------------------------------------------- running it
+
+
+def _run(path: Path, text: str) -> ModuleType:
+    module = ModuleType(f"softehl_model_{path.stem}")
+    module.__file__ = str(path)
+    linecache.checkcache(str(path))
+    sys.modules[module.__name__] = module  # dataclasses look there; removed with the neighbours
+    exec(compile(text, str(path), "exec", dont_inherit=True), module.__dict__)
+    return module
+
+
+def _entries(path: Path, module: ModuleType) -> list[Any]:
+    chosen = getattr(module, "MODELS", None)
+    if chosen is not None:
+        return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
+    public = [(k, v) for k, v in vars(module).items() if not k.startswith("_")]
+    found = [v for _, v in public if isinstance(v, Definition) or _makes_a_model(module, v)]
+    if not found:
+        bare = [k for k, v in public if _own_function(module, v) and _annotation(v) is None]
+        if bare:
+            raise ModelFileError(
+                f"{path.name} has no model: annotate `def {bare[0]}() -> Definition:` if it is one"
+            )
+    return found
+
+
+def _own_function(module: ModuleType, value: Any) -> bool:
+    return (
+        inspect.isfunction(value)
+        and value.__module__ == module.__name__
+        and not inspect.signature(value).parameters
+    )
+
+
+def _annotation(function: Callable[..., Any]) -> Any:
+    return inspect.get_annotations(function).get("return")
+
+
+def _makes_a_model(module: ModuleType, value: Any) -> bool:
+    if not _own_function(module, value):
+        return False
+    annotation = _annotation(value)
+    if isinstance(annotation, str):
+        return annotation.strip("\"' ").rpartition(".")[2] == Definition.__name__
+    return annotation is Definition
+
+
+def _made(entry: Any) -> Definition:
+    made = entry() if callable(entry) else entry
+    if not isinstance(made, Definition):
+        label = getattr(entry, "__name__", repr(entry))
+        raise ModelFileError(f"{label} gives {type(made).__name__}, not a Definition: {_RECIPE}")
+    return made
+
+
+@contextmanager
+def _imports_from(folder: Path) -> Iterator[None]:
+    """Let a model import its neighbours, as a script may; they are read anew the next time."""
+    before, writing = set(sys.modules), sys.dont_write_bytecode
+    sys.path.insert(0, str(folder))
+    sys.dont_write_bytecode = True
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        sys.dont_write_bytecode = writing
+        for name in set(sys.modules) - before:
+            file = getattr(sys.modules[name], "__file__", None)
+            if file is not None and Path(file).is_relative_to(folder):
+                del sys.modules[name]
+
+
+@contextmanager
+def _errors_of(path: Path) -> Iterator[None]:
+    """Say in one line, with the model's own line, what went wrong while it ran."""
+    try:
+        yield
+    except ModelFileError:
+        raise
+    except SyntaxError as error:
+        where = f"{Path(error.filename or path).name}:{error.lineno}"
+        raise ModelFileError(f"{where}: {error.msg}") from error
+    except Exception as error:
+        what = str(error) or "no further words"
+        if isinstance(error, ModelError) and what.startswith(str(path.parent)):
+            raise ModelFileError(what) from error  # it has found its line itself
+        kind = "" if isinstance(error, ModelError) else f"{type(error).__name__}: "
+        raise ModelFileError(f"{_line(path, error)}: {kind}{what}") from error
+
+
+def _line(path: Path, error: BaseException) -> str:
+    """File and line of the innermost frame that stands in the model's folder."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [f for f in frames if Path(f.filename).is_relative_to(path.parent)]
+    return f"{Path(own[-1].filename).name}:{own[-1].lineno}" if own else path.name

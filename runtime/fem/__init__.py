@@ -1,0 +1,1 @@
+"""Finite elements: numbering, assembly, constraints and results, without physics."""

@@ -1,0 +1,224 @@
+"""Assembly of element kernels into a residual vector and a sparse tangent.
+
+The sparsity pattern and the position of every element entry in it are computed once; assembling
+is then a gather, a kernel call and an `add.at` for each piece of a block of like elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+
+from softehl.runtime.fem.pattern import Pattern, build_pattern
+from softehl.runtime.fem.rules import Rule
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_PIECE = 1 << 18  # entries of the tangents that are evaluated before they are added up
+_CROSSES = 4  # sets of unknowns that are remembered
+
+
+class ElementKernel(Protocol):
+    """What assembly needs of a compiled kernel; arrays are batched over n elements."""
+
+    @property
+    def name(self) -> str:
+        """Family of the kernel."""
+        ...
+
+    @property
+    def signature(self) -> str:
+        """Identity of the compiled code."""
+        ...
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of the parameter array."""
+        ...
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the fields of `fields_at`."""
+        ...
+
+    def residual(
+        self,
+        coordinates: Array,
+        dofs: Array,
+        *,
+        data: Array | None = None,
+        parameters: Array,
+        rule: Rule | None = None,
+    ) -> Array:
+        """Element residuals (n, ndof)."""
+        ...
+
+    def tangent(
+        self,
+        coordinates: Array,
+        dofs: Array,
+        *,
+        data: Array | None = None,
+        parameters: Array,
+        rule: Rule | None = None,
+    ) -> tuple[Array, Array]:
+        """Element residuals (n, ndof) and tangents (n, ndof, ndof)."""
+        ...
+
+    def fields_at(
+        self,
+        coordinates: Array,
+        dofs: Array,
+        *,
+        data: Array | None = None,
+        parameters: Array,
+        rule: Rule | None = None,
+    ) -> Array:
+        """Fields at the quadrature points (n, points, len(fields))."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ElementBlock:
+    """Like elements of one kernel.
+
+    name: by which parameters are given. coordinates: (n, 2 nodes) reference (z, r), node by node.
+    dofs: (n, ndof) numbers of the unknowns. data: (n, k) constants of each element or None.
+    rule: quadrature rule, None for the kernel's own. constant: the tangent depends on parameters
+    alone, so that it is evaluated once for each set of them.
+    """
+
+    name: str
+    kernel: ElementKernel
+    coordinates: Array
+    dofs: Integers
+    data: Array | None = None
+    rule: Rule | None = None
+    constant: bool = False
+
+    def residual(self, x: Array, parameters: Array) -> Array:
+        """Element residuals (n, ndof) at the global vector x."""
+        return self.kernel.residual(self.coordinates, x[self.dofs], **self._given(parameters))
+
+    def tangent(self, x: Array, parameters: Array) -> tuple[Array, Array]:
+        """Element residuals (n, ndof) and tangents (n, ndof, ndof) at the global vector x."""
+        return self.kernel.tangent(self.coordinates, x[self.dofs], **self._given(parameters))
+
+    def pieces(self, scatter: Integers) -> Iterator[tuple[ElementBlock, Integers]]:
+        """Parts of the block whose tangents fit into a core's cache, with theirs of `scatter`."""
+        n = len(self.dofs)
+        step = max(_PIECE // max(self.dofs.shape[1] ** 2, 1), 1)
+        if n <= step:
+            yield self, scatter
+            return
+        width = len(scatter) // n
+        for first in range(0, n, step):
+            part = slice(first, first + step)
+            data = None if self.data is None else self.data[part]
+            coordinates, dofs = self.coordinates[part], self.dofs[part]
+            piece = replace(self, coordinates=coordinates, dofs=dofs, data=data)
+            yield piece, scatter[width * first : width * (first + step)]
+
+    def _given(self, parameters: Array) -> dict[str, Any]:
+        return {"data": self.data, "parameters": parameters, "rule": self.rule}
+
+    def fields(self, x: Array, parameters: Array) -> dict[str, Array]:
+        """Fields of the kernel at its quadrature points, name -> (n, points)."""
+        values = self.kernel.fields_at(self.coordinates, x[self.dofs], **self._given(parameters))
+        return {name: values[:, :, i] for i, name in enumerate(self.kernel.fields)}
+
+
+@dataclass(frozen=True, eq=False)
+class Assembler:
+    """Blocks of elements and the pattern they share; pure functions of x and parameters.
+
+    Parameters are given block by block, in the kernel's order; a block without parameters is
+    switched off, its place in the pattern stays. known: block name -> the latest parameters of a
+    constant tangent, where it has entries and which. crosses: see `cross`.
+    """
+
+    size: int
+    blocks: tuple[ElementBlock, ...]
+    pattern: Pattern
+    known: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
+    crosses: dict[bytes, Integers] = field(default_factory=dict)
+
+    @classmethod
+    def build(cls, size: int, blocks: Sequence[ElementBlock]) -> Assembler:
+        """Assembler of blocks over `size` unknowns; ValueError if two blocks share a name."""
+        names = [block.name for block in blocks]
+        if len(set(names)) < len(names):
+            raise ValueError(f"two blocks have the same name: {', '.join(names)}")
+        return cls(size, tuple(blocks), build_pattern(size, [block.dofs for block in blocks]))
+
+    def block(self, name: str) -> ElementBlock:
+        """The block of that name; KeyError if there is none."""
+        for block in self.blocks:
+            if block.name == name:
+                return block
+        raise KeyError(f"no block {name!r}; there are {', '.join(b.name for b in self.blocks)}")
+
+    def residual(self, x: Array, parameters: Mapping[str, Array]) -> Array:
+        """Sum of the element residuals, (size,)."""
+        total = np.zeros(self.size)
+        for block in self.blocks:
+            if block.name in parameters:
+                self._add_residual(total, block, x, parameters[block.name])
+        return total
+
+    def linearise(
+        self, x: Array, parameters: Mapping[str, Array]
+    ) -> tuple[Array, csc_array[np.float64]]:
+        """Residual (size,) and tangent (size, size), csc with the fixed pattern."""
+        total, data = np.zeros(self.size), np.zeros(self.pattern.nnz)
+        for block, scatter in zip(self.blocks, self.pattern.scatter, strict=True):
+            if block.name not in parameters:
+                continue
+            given = parameters[block.name]
+            if block.constant:
+                self._add_residual(total, block, x, given)
+                places, entries = self._constant(block, scatter, given)
+                np.add.at(data, places, entries)
+                continue
+            for piece, places in block.pieces(scatter):
+                local, tangents = piece.tangent(x, given)
+                np.add.at(data, places, tangents.ravel())
+                np.add.at(total, piece.dofs.ravel(), local.ravel())
+        return total, self.pattern.matrix(data)
+
+    def cross(self, fixed: Integers) -> Integers:
+        """Positions in the data of the rows and columns of these unknowns; kept for later calls."""
+        key = fixed.tobytes()
+        places = self.crosses.get(key)
+        if places is None:
+            chosen = np.zeros(self.size, dtype=bool)
+            chosen[fixed] = True
+            columns = np.repeat(chosen, np.diff(self.pattern.indptr))
+            places = np.flatnonzero(columns | chosen[self.pattern.indices])
+            while len(self.crosses) >= _CROSSES:
+                del self.crosses[next(iter(self.crosses))]
+            self.crosses[key] = places
+        return places
+
+    def _add_residual(self, total: Array, block: ElementBlock, x: Array, given: Array) -> None:
+        """Add the residuals of a block to the sum, in place."""
+        np.add.at(total, block.dofs.ravel(), block.residual(x, given).ravel())
+
+    def _constant(
+        self, block: ElementBlock, scatter: Integers, parameters: Array
+    ) -> tuple[Integers, Array]:
+        """Places and values of the entries of a constant tangent."""
+        known = self.known.get(block.name)
+        if known is None or not np.array_equal(known[0], parameters):
+            data = np.zeros(self.pattern.nnz)
+            np.add.at(data, scatter, block.tangent(np.zeros(self.size), parameters)[1].ravel())
+            places = np.flatnonzero(data)
+            known = parameters.copy(), places, data[places]
+            self.known[block.name] = known
+        return known[1], known[2]

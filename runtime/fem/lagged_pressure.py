@@ -1,0 +1,101 @@
+"""Equations of a nearly incompressible solid whose tangent holds on to an element pressure.
+
+A small error of the displacements, as interpolation makes it, gives a volume ratio times a large
+bulk modulus: pressures that are worthless, and with them the geometric part of the tangent. Here
+that part is taken at a pressure p_e of each element that is carried along, p_e <- p(u) + kappa dJ,
+as the linearisation of p_e = p(u) as an equation of its own would do it, with p_e eliminated. The
+residual is that of the problem itself; when it has converged, so has the tangent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+
+from softehl.runtime.fem.assembly import Array, ElementBlock, ElementKernel
+from softehl.runtime.fem.problem import Problem
+
+_EDGES = np.array([[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 6, 7], [6, 7, 0, 1]])  # dofs of each edge
+_UNIT = np.ones(1)
+_MEAN_STRESS = ("sigma_zz", "sigma_rr", "sigma_tt")
+
+
+def element_pressures(problem: Problem, solid: str, x: Array) -> Array:
+    """Mean stress (Q,) of the elements of the block `solid`, positive in tension."""
+    fields = problem.fields(solid, x)
+    return np.asarray(sum(fields[name] for name in _MEAN_STRESS).mean(axis=1) / 3.0)  # type: ignore[union-attr]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldPressure:
+    """A problem with element pressures; satisfies the solvers' EvolvingProblem.
+
+    solid: name of the block of 4-node elements. pressures: (Q,) p_e, tension positive. stiffness:
+    bulk modulus. surface: a follower pressure on each edge of each element, whose virtual work at
+    unit pressure is the variation of the element's volume. volumes: (Q,) in the reference state.
+    """
+
+    problem: Problem
+    solid: str
+    pressures: Array
+    stiffness: float
+    surface: ElementBlock
+    volumes: Array
+    places: NDArray[np.int64]
+
+    @classmethod
+    def of(
+        cls, problem: Problem, solid: str, follower: ElementKernel, pressures: Array, kappa: float
+    ) -> HeldPressure:
+        """The problem with these pressures; `follower` is the kernel of a pressure on an edge."""
+        block = problem.assembler.block(solid)
+        number = problem.assembler.blocks.index(block)
+        scatter = problem.assembler.pattern.scatter[number].reshape(-1, 8, 8)
+        surface = ElementBlock(
+            "surface",
+            follower,
+            block.coordinates[:, _EDGES].reshape(-1, 4),
+            block.dofs[:, _EDGES].reshape(-1, 4),
+        )
+        places = scatter[:, _EDGES[:, :, None], _EDGES[:, None, :]]
+        return cls(problem, solid, pressures, kappa, surface, _volumes(block), places)
+
+    def residual(self, x: Array) -> Array:
+        """See `Problem`."""
+        return self.problem.residual(x)
+
+    def norm(self, r: Array) -> float:
+        """See `Problem`."""
+        return self.problem.norm(r)
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """See `Problem`."""
+        return self.problem.step_limit(x, dx)
+
+    def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
+        """R(x), (n,), and the tangent with p_e in its geometric part, (n, n)."""
+        excess = self.pressures - element_pressures(self.problem, self.solid, x)
+        _, second = self.surface.tangent(x, _UNIT)
+        weighted = np.repeat(excess, len(_EDGES))[:, None, None] * second
+        nnz = self.problem.assembler.pattern.nnz
+        addition = np.bincount(self.places.ravel(), weighted.ravel(), nnz)
+        return self.problem.linearise_with(x, np.asarray(addition, dtype=np.float64))
+
+    def after(self, before: Array, x: Array) -> HeldPressure:
+        """The problem with the pressures that a step from `before` to x asks for."""
+        first = self.surface.residual(before, _UNIT)
+        change = (first * (x - before)[self.surface.dofs]).sum(axis=1)
+        ratio = change.reshape(-1, len(_EDGES)).sum(axis=1) / self.volumes
+        pressures = element_pressures(self.problem, self.solid, before) + self.stiffness * ratio
+        return replace(self, pressures=pressures)
+
+
+def _volumes(block: ElementBlock) -> Array:
+    """Volumes (Q,) of the rings of 4-node elements, 2 pi R times the area, mm^3."""
+    corners = block.coordinates.reshape(-1, 4, 2)
+    d1, d2 = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    area = 0.5 * (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
+    return np.asarray(2.0 * np.pi * corners[:, :, 1].mean(axis=1) * area)

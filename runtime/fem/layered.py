@@ -1,0 +1,126 @@
+"""An assembled problem as a body and a layer on its boundary, for `solve.modified_newton`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from softehl.runtime.fem.assembly import Array, Assembler, ElementBlock, Integers
+from softehl.runtime.fem.problem import Guard, Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """The blocks of a layer and a small assembler for them alone.
+
+    shared: (m,) unknowns of the layer that belong to the body too, rising. own: (k,) those that
+    only the layer has. numbers: shared, own, and what is always prescribed, as the assembler
+    counts them.
+    """
+
+    names: tuple[str, ...]
+    shared: Integers
+    own: Integers
+    numbers: Integers
+    assembler: Assembler
+
+    @classmethod
+    def of(
+        cls, assembler: Assembler, names: Sequence[str], shared: Integers, own: Integers
+    ) -> Layer:
+        """The layer of these blocks; every unknown of them that is not given is prescribed."""
+        blocks = [assembler.block(name) for name in names]
+        all_of_them = np.unique(np.concatenate([block.dofs.ravel() for block in blocks]))
+        held = np.setdiff1d(all_of_them, np.concatenate([shared, own]))
+        numbers = np.concatenate([np.sort(shared), own, held])
+        compact = np.full(assembler.size, -1)
+        compact[numbers] = np.arange(len(numbers))
+        small = [_renumbered(block, compact) for block in blocks]
+        build = Assembler.build(len(numbers), small)
+        return cls(tuple(names), np.sort(shared), own, numbers, build)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns m + k."""
+        return len(self.shared) + len(self.own)
+
+
+def _renumbered(block: ElementBlock, compact: Integers) -> ElementBlock:
+    return replace(block, dofs=compact[block.dofs])
+
+
+@dataclass(frozen=True, eq=False)
+class Layered:
+    """A problem with its layer; satisfies `LayeredProblem`.
+
+    guards: those of the problem that concern the layer.
+    """
+
+    problem: Problem
+    layer: Layer
+    guards: tuple[Guard, ...] = ()
+
+    @property
+    def shared(self) -> Integers:
+        """See `LayeredProblem`."""
+        return self.layer.shared
+
+    @property
+    def own(self) -> Integers:
+        """See `LayeredProblem`."""
+        return self.layer.own
+
+    def residual(self, x: Array) -> Array:
+        """See `Problem`."""
+        return self.problem.residual(x)
+
+    def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
+        """See `Problem`."""
+        return self.problem.linearise(x)
+
+    def norm(self, r: Array) -> float:
+        """See `Problem`."""
+        return self.problem.norm(r)
+
+    def scaled(self, r: Array) -> Array:
+        """See `Problem`."""
+        return self.problem.scaled(r)
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """See `Problem`."""
+        return self.problem.step_limit(x, dx)
+
+    def admissible(self, x: Array) -> Array:
+        """x with the prescribed values."""
+        y = x.copy()
+        y[self.problem.fixed] = self.problem.values
+        return y
+
+    def body(self, x: Array) -> csc_array[np.float64]:
+        """Tangent (n, n) of the body; rows and columns of the layer's own unknowns are unity."""
+        return self._body.linearise(x)[1]
+
+    def layer_residual(self, x: Array) -> Array:
+        """Residual (m + k,) of the layer, shared unknowns first."""
+        layer = self.layer
+        r = layer.assembler.residual(x[layer.numbers], self.problem.parameters)
+        return np.asarray(r[: layer.size])
+
+    def layer_linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
+        """Residual (m + k,) and tangent (m + k, m + k) of the layer, shared unknowns first."""
+        layer = self.layer
+        r, K = layer.assembler.linearise(x[layer.numbers], self.problem.parameters)
+        return r[: layer.size], csc_array(K[: layer.size, : layer.size])
+
+    def layer_limit(self, x: Array, dx: Array) -> float:
+        """Largest fraction of the step that the guards of the layer admit."""
+        return min((guard.limit(x, dx) for guard in self.guards), default=1.0)
+
+    @cached_property
+    def _body(self) -> Problem:
+        off = self.problem.with_parameters(**dict.fromkeys(self.layer.names))
+        return off.with_fixed([np.union1d(self.problem.fixed, self.layer.own)], [0.0])

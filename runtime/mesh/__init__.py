@@ -1,0 +1,1 @@
+"""Meshes: points, cells and boundaries, and values carried between them."""

@@ -1,0 +1,55 @@
+"""From one mesh of a section to another: nodal values, element values, values along the boundary.
+
+For meshes of the same circle whose nodes lie anywhere; `runtime.mesh.prolongation` is sharper where
+one mesh holds the nodes of the other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator, RBFInterpolator
+
+from softehl.runtime.mesh.sections import SectionMesh
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_NEIGHBOURS = 32  # of a local spline: about three rings of a structured mesh
+
+
+def transfer_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
+    """Nodal values (V', k) on the new mesh from those, (V, k), on the old: local splines.
+
+    All nan, a start that no solver takes, where elements are so long that neighbours lie in a row.
+    """
+    spline = RBFInterpolator(old.points, values, neighbors=_NEIGHBOURS, kernel="cubic", degree=2)
+    try:
+        return np.asarray(spline(new.points))
+    except np.linalg.LinAlgError:
+        return np.full((len(new.points), values.shape[1]), np.nan)
+
+
+def transfer_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
+    """Element values (Q',) on the new mesh from those, (Q,), on the old, by their centres."""
+    spline = RBFInterpolator(
+        old.points[old.quads].mean(axis=1), values, neighbors=8, kernel="linear"
+    )
+    return np.asarray(spline(new.points[new.quads].mean(axis=1)))
+
+
+def transfer_chain(
+    old: SectionMesh, new: SectionMesh, nodes: Integers, new_nodes: Integers, values: Array
+) -> Array:
+    """Values (n',) at new_nodes of the boundary from those, (n,), at nodes, by the angle.
+
+    Both go around the same part of the boundary. Shape preserving: no value beyond its neighbours.
+    """
+    return np.asarray(PchipInterpolator(_angles(old, nodes), values)(_angles(new, new_nodes)))
+
+
+def _angles(mesh: SectionMesh, nodes: Integers) -> Array:
+    """Angles of boundary nodes about the middle of the boundary, rising, rad."""
+    whole = mesh.points[mesh.boundary]
+    away = mesh.points[nodes] - 0.5 * (whole.min(axis=0) + whole.max(axis=0))
+    return np.unwrap(np.arctan2(away[:, 1], away[:, 0]))

@@ -1,0 +1,1 @@
+"""Solvers: linear systems, Newton's method, continuation; they know no mesh."""

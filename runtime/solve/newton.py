@@ -1,0 +1,199 @@
+"""Newton's method for R(x) = 0, as a frozen record of settings over explicit state.
+
+The problem is pure: a residual never changes anything. Failure is a `Status` in the returned
+`Solution`, never an exception.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix, SuperLU
+from softehl.runtime.solve.solution import Solution, Status, Vector
+
+_SUFFICIENT_DECREASE = 1e-4  # Armijo's constant on the norm, the customary value
+
+
+class NonlinearProblem(Protocol):
+    """All that the solvers know of a problem: n equations R(x) = 0 in n unknowns."""
+
+    def residual(self, x: Vector) -> Vector:
+        """R(x), shape (n,)."""
+        ...
+
+    def linearise(self, x: Vector) -> tuple[Vector, SparseMatrix]:
+        """R(x), shape (n,), and K = dR/dx, shape (n, n), csc."""
+        ...
+
+    def norm(self, r: Vector) -> float:
+        """Dimensionless size of a residual; 1 is about the reference load."""
+        ...
+
+    def step_limit(self, x: Vector, dx: Vector) -> float:
+        """Largest admissible fraction of the step dx from x, in (0, 1]."""
+        ...
+
+
+class Corrector(Protocol):
+    """Anything that solves R(x) = 0 from a guess: Newton's method, or a cheaper relative."""
+
+    def solve(self, problem: Any, x0: Vector) -> Solution:
+        """The solution from x0, shape (n,); failure is its status."""
+        ...
+
+
+@runtime_checkable
+class EvolvingProblem(NonlinearProblem, Protocol):
+    """A problem whose tangent depends on the iterates so far (its residual must not)."""
+
+    def after(self, before: Vector, x: Vector) -> Self:
+        """The problem as it is after a step from `before` to x, shapes (n,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class NewtonState:
+    """Everything an iteration needs and changes; `status` is None while it may go on.
+
+    x: (n,) the last accepted iterate; norms: of the residuals at x0 and every accepted iterate.
+    """
+
+    x: Vector
+    norms: tuple[float, ...]
+    factorisations: int = 0
+    status: Status | None = None
+    message: str = ""
+
+    @property
+    def iterations(self) -> int:
+        """Completed iterations."""
+        return len(self.norms) - 1
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Settings of Newton's method; `solve` is init, then step until terminate decides.
+
+    tolerance: converged when problem.norm(R) <= tolerance.
+    max_iterations: of one solve.
+    stagnation: rounding may hold the norm just above the tolerance. The solve also counts as
+        converged when a norm fails to decrease while it and its predecessor are below
+        stagnation * tolerance. Far from rounding Newton squares such norms, so not decreasing
+        there means that no digits are left; two decades are what cancellation in a stiff,
+        nearly incompressible solid costs. 1 switches it off.
+    divergence: diverged when the norm exceeds divergence * max(1, first norm). Large, because a
+        good step of a finite-deformation problem may raise the norm a thousandfold for once.
+    halvings: how often a step is halved while the residual is not finite (or, with line search,
+        does not decrease) before giving up.
+    line_search: off by default; semismooth problems (contact, cavitation) must take the full step
+        through a kink although the norm rises.
+    linear: solver of the linear systems.
+    """
+
+    tolerance: float = 1e-9
+    max_iterations: int = 25
+    stagnation: float = 100.0
+    divergence: float = 1e6
+    halvings: int = 6
+    line_search: bool = False
+    linear: LinearSolver = field(default_factory=SuperLU)
+
+    def solve(self, problem: NonlinearProblem, x0: Vector) -> Solution:
+        """Solve R(x) = 0 from x0, shape (n,), which is left unchanged."""
+        # An inadmissible trial is a handled value here, so numpy need not warn of it.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            state = self.terminate(self.init(problem, x0))
+            while state.status is None:
+                before = state.x
+                state = self.terminate(self.step(problem, state))
+                if isinstance(problem, EvolvingProblem):
+                    problem = problem.after(before, state.x)
+        return Solution(
+            x=state.x,
+            status=state.status,
+            message=state.message,
+            residual_norms=state.norms,
+            factorisations=state.factorisations,
+            iterations=state.iterations,
+        )
+
+    def init(self, problem: NonlinearProblem, x0: Vector) -> NewtonState:
+        """The state before the first iteration."""
+        x = np.array(x0, dtype=np.float64)
+        return NewtonState(x, (_norm_at(problem, x),))
+
+    def step(self, problem: NonlinearProblem, state: NewtonState) -> NewtonState:
+        """One iteration: factorise, solve, advance; a failure is written into the state."""
+        r, K = problem.linearise(state.x)
+        state = replace(state, factorisations=state.factorisations + 1)
+        try:
+            dx = -self.linear.factorise(K).solve(r)
+        except SingularMatrix as error:
+            return _end(state, Status.SINGULAR, str(error))
+        return self._advance(problem, state, dx)
+
+    def terminate(self, state: NewtonState) -> NewtonState:
+        """The state with `status` set if the solve is over."""
+        norm = state.norms[-1]
+        if state.status is not None:
+            return state
+        if not math.isfinite(norm):
+            return _end(state, Status.NOT_FINITE, "the residual at the start is not finite")
+        if norm <= self.tolerance:
+            return _end(state, Status.CONVERGED, f"norm {norm:.1e}")
+        if self._stagnates(state.norms):
+            return _end(state, Status.CONVERGED, f"norm {norm:.1e}, held up by rounding")
+        if norm > self.divergence * max(1.0, state.norms[0]):
+            return _end(state, Status.DIVERGED, f"norm {norm:.1e} from {state.norms[0]:.1e}")
+        if state.iterations >= self.max_iterations:
+            return _end(state, Status.MAX_ITERATIONS, f"last norms {_tail(state.norms)}")
+        return state
+
+    def _stagnates(self, norms: tuple[float, ...]) -> bool:
+        if len(norms) < 2:
+            return False
+        before, now = norms[-2:]
+        return before <= now <= self.stagnation * self.tolerance
+
+    def _advance(self, problem: NonlinearProblem, state: NewtonState, dx: Vector) -> NewtonState:
+        """Go along dx as far as the problem admits; shorter while the residual is refused."""
+        fraction = min(problem.step_limit(state.x, dx), 1.0)  # in this order nan stays nan
+        if not fraction > 0.0:
+            return _end(state, Status.DIVERGED, "no part of the Newton step is admissible")
+        best, best_norm = state.x, math.inf
+        for _ in range(self.halvings + 1):
+            x = state.x + fraction * dx
+            norm = _norm_at(problem, x)
+            if norm < best_norm:
+                best, best_norm = x, norm
+            if self._acceptable(norm, state.norms[-1], fraction):
+                break
+            fraction *= 0.5
+        if not math.isfinite(best_norm):
+            message = f"the residual along the Newton step is not finite, down to {fraction:.1e}"
+            return _end(state, Status.NOT_FINITE, message)
+        return replace(state, x=best, norms=(*state.norms, best_norm))
+
+    def _acceptable(self, norm: float, before: float, fraction: float) -> bool:
+        if not math.isfinite(norm):
+            return False
+        return not self.line_search or norm <= (1.0 - _SUFFICIENT_DECREASE * fraction) * before
+
+
+def _norm_at(problem: NonlinearProblem, x: Vector) -> float:
+    """Norm of the residual at x, inf if either is not finite."""
+    r = problem.residual(x)
+    norm = float(problem.norm(r)) if np.isfinite(r).all() else math.inf
+    return norm if math.isfinite(norm) else math.inf
+
+
+def _end(state: NewtonState, status: Status, message: str) -> NewtonState:
+    return replace(state, status=status, message=message)
+
+
+def _tail(norms: tuple[float, ...]) -> str:
+    return ", ".join(f"{norm:.1e}" for norm in norms[-4:])

@@ -1,0 +1,125 @@
+"""softehl: soft elastohydrodynamic lubrication from SymPy models compiled to lean C.
+
+The public names are listed here once and imported when they are first used, so that a script which
+solves a case loads no SymPy and `softehl --help` loads nothing at all.
+"""
+
+import importlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from softehl.__main__ import main
+    from softehl.cases.harness.observer import FilmState, Observer, Outcome, Silent
+    from softehl.cases.harness.sweep import Curve, solve_cases
+    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.run import run as run_oring
+    from softehl.codegen.language import kinematics, quadrature, shapes
+    from softehl.codegen.language.definition import Definition
+    from softehl.codegen.language.model import Model
+    from softehl.runtime.fem.assembly import Assembler, ElementBlock
+    from softehl.runtime.fem.dofs import DofLayout
+    from softehl.runtime.fem.problem import Problem
+    from softehl.runtime.kernels import Kernel
+    from softehl.runtime.solve.continuation import Continuation
+    from softehl.runtime.solve.newton import Newton
+    from softehl.runtime.solve.solution import Branch, Solution, Status
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "Assembler": "softehl.runtime.fem.assembly",
+    "Branch": "softehl.runtime.solve.solution",
+    "Continuation": "softehl.runtime.solve.continuation",
+    "Curve": "softehl.cases.harness.sweep",
+    "DofLayout": "softehl.runtime.fem.dofs",
+    "ElementBlock": "softehl.runtime.fem.assembly",
+    "FilmState": "softehl.cases.harness.observer",
+    "Kernel": "softehl.runtime.kernels",
+    "Newton": "softehl.runtime.solve.newton",
+    "ORing": "softehl.cases.seal.parameters",
+    "Observer": "softehl.cases.harness.observer",
+    "Outcome": "softehl.cases.harness.observer",
+    "Problem": "softehl.runtime.fem.problem",
+    "Silent": "softehl.cases.harness.observer",
+    "Solution": "softehl.runtime.solve.solution",
+    "Status": "softehl.runtime.solve.solution",
+    "main": "softehl.__main__",
+    "run_oring": "softehl.cases.seal.run:run",
+    "solve_cases": "softehl.cases.harness.sweep",
+}
+_MODELLING = {
+    "Definition": "softehl.codegen.language.definition",
+    "Model": "softehl.codegen.language.model",
+    "kinematics": "softehl.codegen.language.kinematics:",
+    "quadrature": "softehl.codegen.language.quadrature:",
+    "shapes": "softehl.codegen.language.shapes:",
+}
+"""What a model page needs; these import SymPy."""
+
+__all__ = [
+    "Assembler",
+    "Branch",
+    "Continuation",
+    "Curve",
+    "Definition",
+    "DofLayout",
+    "ElementBlock",
+    "FilmState",
+    "Kernel",
+    "Model",
+    "Newton",
+    "ORing",
+    "Observer",
+    "Outcome",
+    "Problem",
+    "Silent",
+    "Solution",
+    "Status",
+    "kinematics",
+    "load_kernel",
+    "main",
+    "quadrature",
+    "run_oring",
+    "shapes",
+    "solve_cases",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used."""
+    place = _PUBLIC.get(name) or _MODELLING.get(name)
+    if place is None:
+        raise AttributeError(f"module 'softehl' has no attribute {name!r}")
+    module, colon, attribute = place.partition(":")
+    imported = importlib.import_module(module)
+    value = imported if colon and not attribute else getattr(imported, attribute or name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *_PUBLIC, *_MODELLING]
+
+
+def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "Kernel":
+    """A compiled kernel, by any of
+
+    - the name of one that ships: `load_kernel("solid_q4")`;
+    - a model file: `load_kernel("my_model.py")`, with `name` where it has several models.  It is
+      derived and compiled if the cache does not have it; the file is run then;
+    - a folder that `softehl generate` wrote: `load_kernel("generated/my_model")`;
+    - a `Definition`, for notebooks.
+
+    Raises `runtime.kernels.KernelError`, or what is wrong with the model or the compiler.
+    """
+    from softehl.runtime import kernels
+
+    if isinstance(source, str) and not source.endswith(".py") and not Path(source).is_dir():
+        return kernels.load_kernel(source)
+    if isinstance(source, (str, Path)) and Path(source).is_dir():
+        return kernels.kernel_in(Path(source).resolve(), name)
+    from softehl.codegen.tools import library
+
+    place = Path(source) if isinstance(source, str) else source
+    return kernels.kernel_in(library.folder_of(place), name)

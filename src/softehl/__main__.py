@@ -1,0 +1,88 @@
+"""The command line, `softehl` or `python -m softehl`; what is heavy is imported late."""
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from softehl import __version__
+
+if TYPE_CHECKING:
+    import click
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code.  What is wrong is said in one line on stderr."""
+    import click
+
+    # One thread a process, before NumPy is loaded: the systems are small, the runs are parallel.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    try:
+        code = _commands().main(
+            None if arguments is None else list(arguments),
+            prog_name="softehl",
+            standalone_mode=False,
+        )
+    except click.ClickException as error:
+        click.echo(f"softehl: {' '.join(error.format_message().split())}", err=True)
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("softehl: interrupted; what was reached is saved", err=True)
+        return 130
+    return code if isinstance(code, int) else 0
+
+
+def _commands() -> "click.Group":
+    import click
+
+    from softehl.cases.cli import reproduce, run
+
+    @click.group(no_args_is_help=False)
+    @click.version_option(__version__, prog_name="softehl")
+    def commands() -> None:
+        """Soft elastohydrodynamic lubrication: generate kernels, run cases."""
+
+    @commands.command()
+    @click.argument("models", metavar="[MODEL.py]...", nargs=-1, type=click.Path(path_type=Path))
+    @click.option("--check", is_flag=True, help="Write nothing; exit 1 if anything is stale.")
+    @click.option("--trace", metavar="KERNEL", help="Show what each pass did to a kernel.")
+    @click.option(
+        "--target",
+        type=click.Choice(["simd", "scalar", "ufcx"]),
+        default="simd",
+        show_default=True,
+        help="Four elements at once, one at a time, or cells for DOLFINx.",
+    )
+    @click.option(
+        "--out",
+        metavar="DIR",
+        type=click.Path(path_type=Path, file_okay=False),
+        help="Folder for MODEL.py or --target  [default: generated/MODEL beside MODEL.py]",
+    )
+    def generate(
+        models: tuple[Path, ...], check: bool, trace: str | None, target: str, out: Path | None
+    ) -> int:
+        """Derive, compile and check the kernels of your own models, in MODEL.py.
+
+        The file is run; a model is a function without arguments annotated `-> Definition`.
+        Without a file the kernels that ship, in generated/, are regenerated.
+        """
+        from softehl.codegen.tools.cli import generate
+
+        return generate(models, check, trace, target, out)
+
+    @commands.command()
+    def kernels() -> int:
+        """Show what the kernels cost: the table of manifest.json."""
+        from softehl.codegen.tools.cli import kernels
+
+        return kernels()
+
+    commands.add_command(run)
+    commands.add_command(reproduce)
+    return commands
+
+
+if __name__ == "__main__":
+    sys.exit(main())
