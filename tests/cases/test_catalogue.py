@@ -1,0 +1,166 @@
+"""The catalogue of rings and glands, against published dimensions and its own order."""
+
+from itertools import pairwise
+
+import pytest
+
+from softehl.cases.seal import catalogue
+from softehl.cases.seal.catalogue import (
+    INCH,
+    Range,
+    UnknownGlandError,
+    UnknownRingError,
+    as568,
+    gland,
+    ring,
+)
+
+SERIES = {0: (1, 50), 1: (102, 178), 2: (201, 284), 3: (309, 395), 4: (425, 475)}
+SECTIONS = {0: 0.070, 1: 0.103, 2: 0.139, 3: 0.210, 4: 0.275}
+# inside diameter and tolerance, inch, as makers' charts print them
+PRINTED = {
+    1: (0.029, 0.004),
+    12: (0.364, 0.005),
+    50: (5.239, 0.037),
+    113: (0.549, 0.007),
+    152: (3.237, 0.024),
+    178: (9.737, 0.055),
+    201: (0.171, 0.005),
+    210: (0.734, 0.010),
+    222: (1.484, 0.015),
+    226: (1.984, 0.018),
+    230: (2.484, 0.020),
+    259: (6.234, 0.040),
+    284: (17.955, 0.085),
+    325: (1.475, 0.015),
+    395: (25.940, 0.120),
+    425: (4.475, 0.033),
+    451: (10.975, 0.060),
+    475: (25.940, 0.120),
+}
+
+
+def test_all_general_sizes_are_there() -> None:
+    numbers = [n for first, last in SERIES.values() for n in range(first, last + 1)]
+    assert list(as568()) == numbers
+    assert len(numbers) == 349
+
+
+@pytest.mark.parametrize(("number", "printed"), PRINTED.items())
+def test_printed_sizes(number: int, printed: tuple[float, float]) -> None:
+    found = as568()[number]
+    assert found.inner_diameter == pytest.approx(printed[0] * INCH, abs=1e-4)
+    assert found.inner_tolerance == pytest.approx(printed[1] * INCH, abs=1e-4)
+
+
+def test_sections_of_the_series() -> None:
+    special = {1: 0.040, 2: 0.050, 3: 0.060}
+    for number, found in as568().items():
+        section = special.get(number, SECTIONS[number // 100])
+        assert found.section_diameter == pytest.approx(section * INCH, abs=1e-4)
+        assert found.outer_diameter == found.inner_diameter + 2 * found.section_diameter
+
+
+@pytest.mark.parametrize("series", SERIES)
+def test_sizes_and_tolerances_rise_in_a_series(series: int) -> None:
+    first, last = SERIES[series]
+    rings = [as568()[n] for n in range(first, last + 1)]
+    for a, b in pairwise(rings):
+        assert b.inner_diameter > a.inner_diameter
+        assert a.inner_tolerance is not None
+        assert b.inner_tolerance is not None
+        assert b.inner_tolerance >= a.inner_tolerance
+
+
+def test_sizes_rise_in_the_steps_of_the_standard() -> None:
+    """Sixteenths, eighths, quarters, halves and whole inches, but for two breaks near 16 and 23 in;
+    the smallest rings of a series, which begin in 32nds, aside.
+    """
+    steps = {31, 32, 62, 63, 125, 250, 500, 1000} | {971, 980, 480, 985}
+    for first, last in SERIES.values():
+        inner = [as568()[n].inner_diameter / INCH for n in range(first, last + 1)]
+        for a, b in pairwise(inner):
+            if a > 0.17:
+                assert round(1000 * (b - a)) in steps
+
+
+@pytest.mark.parametrize("name", ["AS568-226", "as568-226", "-226", "226", "AS 568A-226", "2-226"])
+def test_names_of_one_ring(name: str) -> None:
+    found = ring(name)
+    assert found.name == "AS568-226"
+    assert (found.inner_diameter, found.section_diameter) == pytest.approx((50.3936, 3.5306))
+
+
+@pytest.mark.parametrize(
+    "name", ["ISO 3601 50.4x3.55", "ISO 3601-1 50,4 x 3,55", "50.4x3.55", "50.4 mm x 3.55 mm"]
+)
+def test_metric_rings(name: str) -> None:
+    found = ring(name)
+    assert found.name == "ISO 3601 50.4x3.55"
+    assert (found.inner_diameter, found.section_diameter) == (50.4, 3.55)
+    assert (found.inner_tolerance, found.section_tolerance) == (0.48, 0.10)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("AS568-100", 'no general size -100; nearest: "AS568-050" and "AS568-102"'),
+        ("-999", 'nearest: "AS568-475"'),
+        ("000", 'nearest: "AS568-001"'),
+        ("quad ring", 'give a number, "AS568-226"'),
+        ("", 'or the diameters in mm, "ISO 3601 50.4x3.55"'),
+        ("ISO 3601 3.55x50.4", "inside diameter x section is meant"),
+    ],
+)
+def test_unknown_rings_name_the_nearest(name: str, says: str) -> None:
+    with pytest.raises(UnknownRingError) as caught:
+        ring(name)
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_glands_of_the_sections() -> None:
+    found = gland(3.53)
+    assert found.depth == pytest.approx((0.119 * INCH, 0.123 * INCH), abs=1e-4)
+    assert found.width.middle == pytest.approx(0.185 * INCH, abs=1e-4)
+    assert found.radius == pytest.approx((0.005 * INCH, 0.030 * INCH), abs=1e-4)
+    assert gland(3.55) == found
+    assert gland(6.99).depth == pytest.approx((0.234 * INCH, 0.240 * INCH), abs=1e-4)
+    with pytest.raises(UnknownGlandError, match=r"2\.2 mm .* give squeeze and groove_width"):
+        gland(2.2)
+    with pytest.raises(UnknownGlandError, match='there is "dynamic"'):
+        gland(3.53, "rotary")
+
+
+def test_fill_of_a_square_gland_is_that_of_a_circle_in_a_square() -> None:
+    free = catalogue.Ring("", inner_diameter=50.0, section_diameter=4.0)
+    assert catalogue.fill(free, 50.0, 58.0, 4.0) == pytest.approx(100 * 0.7853981634)
+
+
+def test_stretch_and_squeeze() -> None:
+    assert catalogue.stretch(50.0, 51.0) == pytest.approx(2.0)
+    assert catalogue.stretch(50.39, 50.0) == 0.0
+    assert catalogue.squeeze(3.53, 3.15) == pytest.approx(10.765, abs=1e-3)
+
+
+def test_the_standard_gland_of_every_ring_is_sound() -> None:
+    """No ring on a rod 2 % wider than its inside, in its gland, is warned about."""
+    for found in as568().values():
+        if found.section_diameter < 1.6 or found.inner_diameter < 3.0:
+            continue
+        groove, rod = gland(found.section_diameter), 1.02 * found.inner_diameter
+        housing = rod + 2.0 * groove.depth.middle
+        assert not catalogue.warnings(found, rod, housing, groove.width.middle)
+
+
+def test_warnings() -> None:
+    found = ring("-226")
+    fits = {"housing_diameter": 56.15, "width": 4.7}
+    assert catalogue.warnings(found, 50.0, **fits) == ()
+    (over,) = catalogue.warnings(found, 50.0, 56.15, 3.3)
+    assert over == "the ring fills 98 % of its gland; handbooks advise 60 to 95 %"
+    (wide,) = catalogue.warnings(found, 50.0, 56.15, 9.0)
+    assert wide.startswith("the ring fills 36 %")
+    (tight,) = catalogue.warnings(found, 53.5, 59.65, 4.7)
+    assert "stretched by 6.2 %" in tight
+    assert Range(1.0, 2.0).middle == 1.5
