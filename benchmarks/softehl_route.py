@@ -18,8 +18,9 @@ from benchmarks.candidate import ENTRY, Candidate, Stopwatch
 from benchmarks.problem import Case
 from softehl.codegen import abi, pipeline
 from softehl.codegen.emit import c as emit_c
-from softehl.codegen.language import quadrature, shapes
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.model import Model
 from softehl.codegen.models import solid
 from softehl.codegen.tools import build
 
@@ -56,7 +57,7 @@ def _entry(name: str, task: abi.Task) -> str:
     return f'#include "{emit_c.HEADER}"\n\n{ENTRY}\n{{\n{call}\n}}\n'
 
 
-# The formula as the paper prints it: no named intermediate, no waist, nothing rearranged.
+# The formula as the paper prints it: no named intermediate, no interface, nothing rearranged.
 
 
 def printed() -> Definition:

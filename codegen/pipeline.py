@@ -12,7 +12,8 @@ from typing import Any
 
 from softehl.codegen import abi
 from softehl.codegen.abi import Target
-from softehl.codegen.derive import linearise
+from softehl.codegen.derive import variants
+from softehl.codegen.derive.outputs import Entry, placed
 from softehl.codegen.emit import c as emit_c
 from softehl.codegen.emit import routines as emit_routines
 from softehl.codegen.emit import simd as emit_simd
@@ -20,8 +21,8 @@ from softehl.codegen.emit import ufcx as emit_ufcx
 from softehl.codegen.emit.liveness import peak_live
 from softehl.codegen.emit.order import arranged
 from softehl.codegen.emit.schedule import Schedule, schedule, straight_line
-from softehl.codegen.graph.graph import Node, Routine
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.graph import Routine
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
 
 
@@ -47,7 +48,7 @@ class KernelSource:
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
     """All kernels of one model; `codegen.abi` says what each target is."""
-    tasks = linearise.tasks(definition)
+    tasks = variants.tasks(definition)
     if target is Target.UFCX:
         tasks = emit_ufcx.tasks(definition, tasks)
     functions = {t: compile_task(definition, t, target) for t in tasks}
@@ -66,7 +67,7 @@ def compile_task(definition: Definition, task: str, target: Target = Target.SIMD
     straight = passes.straight_line(_points(definition), data)
     chosen = straight if written_out else passes.STANDARD
     tried = []
-    for entries in linearise.variants(definition, task):
+    for entries in variants.variants(definition, task):
         wanted = emit_ufcx.chosen(entries, task) if target is Target.UFCX else entries
         tried.append(_rewritten(definition, wanted, chosen))
     entries, plan, trace = min(tried, key=lambda t: _work(definition, t[1]))
@@ -79,22 +80,15 @@ def compile_task(definition: Definition, task: str, target: Target = Target.SIMD
 
 
 def _rewritten(
-    definition: Definition, entries: list[emit_c.Entry], chosen: Sequence[passes.Pass]
-) -> tuple[list[emit_c.Entry], Schedule, list[passes.TraceRow]]:
+    definition: Definition, entries: list[Entry], chosen: Sequence[passes.Pass]
+) -> tuple[list[Entry], Schedule, list[passes.TraceRow]]:
     roots, trace = passes.run(definition.graph, [x.node for x in entries], chosen)
-    return _placed(entries, roots), schedule(roots), trace
+    return placed(entries, roots), schedule(roots), trace
 
 
-def _arranged(
-    definition: Definition, entries: Sequence[emit_c.Entry]
-) -> tuple[list[emit_c.Entry], Schedule]:
+def _arranged(definition: Definition, entries: Sequence[Entry]) -> tuple[list[Entry], Schedule]:
     roots, order = arranged(definition.graph, [x.node for x in entries])
-    return _placed(entries, roots), straight_line(order)
-
-
-def _placed(entries: Sequence[emit_c.Entry], roots: Sequence[Node]) -> list[emit_c.Entry]:
-    """The same rows and columns with new values."""
-    return [emit_c.Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]
+    return placed(entries, roots), straight_line(order)
 
 
 def _work(definition: Definition, plan: Schedule) -> int:

@@ -1,4 +1,4 @@
-"""Automatic narrow waists: the few intermediates through which a potential sees its unknowns.
+"""Interfaces found by themselves: the few values through which a potential sees its unknowns.
 
 Element unknowns enter an energy through linear forms (displacement gradients).  A form is
 expanded, exactly, into
@@ -18,7 +18,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from softehl.codegen.graph.graph import Graph, Input, Node, Op, reachable
+from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.traverse import reachable
 
 Monomial = tuple[int, ...]
 Polynomial = dict[Monomial, Fraction]
@@ -49,7 +50,7 @@ def degrees(roots: Iterable[Node], sources: Collection[Node]) -> dict[Node, int]
 
 
 def forms(roots: Sequence[Node], degree: Mapping[Node, int]) -> list[Node]:
-    """Affine values that something not affine uses: the linear waist, ids ascending."""
+    """Affine values that something not affine uses: the linear interface, ids ascending."""
     out: dict[Node, None] = {}
     for n in reachable(roots):
         if degree[n] == 2:
@@ -162,10 +163,10 @@ def _common_factors(n: Node, degree: Mapping[Node, int]) -> set[Node]:
 
 
 @dataclass(frozen=True)
-class Waist:
+class Interface:
     """Result of the search.
 
-    `rewritten` maps each linear form to its expanded self, in terms of the `point` waist (y_g,
+    `rewritten` maps each linear form to its expanded self, in terms of the `point` interface (y_g,
     varying or not); `modes` are the modal coordinates and `matrix` their exact coefficients.
     """
 
@@ -175,7 +176,7 @@ class Waist:
     matrix: tuple[Vector, ...]
 
 
-def linear_waist(g: Graph, roots: Sequence[Node], sources: Sequence[Node]) -> Waist | None:
+def linear_interface(g: Graph, roots: Sequence[Node], sources: Sequence[Node]) -> Interface | None:
     """Expand every linear form below `roots`; None where nothing is gained."""
     degree = degrees(roots, sources)
     found = _Forms(g, degree)
@@ -186,8 +187,8 @@ def linear_waist(g: Graph, roots: Sequence[Node], sources: Sequence[Node]) -> Wa
     if sum(y.varying for y in found.point.values()) > sum(z.varying for z in linear):
         wide = _Forms(g, degree, by_mode=True)
         rewritten = {z: wide.rewrite(z) for z in linear}
-        return Waist(rewritten, (), tuple(wide.modes.values()), tuple(wide.modes))
-    return Waist(
+        return Interface(rewritten, (), tuple(wide.modes.values()), tuple(wide.modes))
+    return Interface(
         rewritten, tuple(found.point.values()), tuple(found.modes.values()), tuple(found.modes)
     )
 
@@ -243,7 +244,7 @@ class _Forms:
         return out
 
     def _point_value(self, columns: dict[Monomial, dict[int, Fraction]]) -> tuple[Node, Fraction]:
-        """The waist value of one geometry group and the factor in front of it."""
+        """The interface value of one geometry group and the factor in front of it."""
         terms = []
         for parent in sorted(columns, key=lambda p: (len(p), p)):
             mode, factor = self._mode(columns[parent])
@@ -281,28 +282,3 @@ class _Forms:
                 term = g.mul(term, self.nodes[i])
             result = g.add(result, g.mul(g.const(c), term))
         return result
-
-
-def strip(
-    g: Graph, roots: Sequence[Node], keep: Collection[Node]
-) -> tuple[list[Node], dict[Node, Node]]:
-    """Roots without names, but for those of `keep`; also where each kept one went."""
-    new: dict[Node, Node] = {}
-    for n in reachable(roots):
-        args = tuple(new[a] for a in n.args)
-        named = n.op is Op.NAME and n not in keep
-        new[n] = args[0] if named else g.rebuild(n.op, args, n.payload)
-    return [new[r] for r in roots], {n: new[n] for n in keep if n in new}
-
-
-def substitute(
-    g: Graph, roots: Sequence[Node], replacement: Mapping[Node, Node]
-) -> tuple[list[Node], dict[Node, Node]]:
-    """Roots with the keys of `replacement` replaced; also what every old node became."""
-    new: dict[Node, Node] = {}
-    for n in reachable(roots, stop=replacement.__contains__):
-        if n in replacement:
-            new[n] = replacement[n]
-        else:
-            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
-    return [new[r] for r in roots], new

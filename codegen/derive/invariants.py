@@ -1,8 +1,8 @@
 """Fewer arguments for an energy: quadratic values, and invariants among them that suffice.
 
 Between the linear forms (displacement gradients) and the energy stand polynomials: strain
-measures, traces, minors, determinants.  `narrow` finds a small set of quadratic values of which
-all these polynomials are polynomials again.  The axisymmetric second invariant, written as
+measures, traces, minors, determinants.  `through_invariants` finds a small set of quadratic values
+of which all these polynomials are polynomials again.  The axisymmetric second invariant, written as
 (I1^2 - tr B^2)/2 with four entries of B, is found to be d^2 + t^2 s, where s is the sum of the
 squares in the plane, d the minor there and t the hoop stretch.
 """
@@ -21,7 +21,8 @@ from sympy import QQ
 from sympy.polys.matrices import DomainMatrix
 
 from softehl.codegen.derive.interfaces import Monomial, Polynomial, added, product
-from softehl.codegen.graph.graph import Graph, Node, Op, reachable
+from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.traverse import reachable
 
 _Shape = tuple[tuple[Monomial, Fraction], ...]
 """A polynomial with 1 as its first coefficient: hashable, and equal for multiples."""
@@ -61,7 +62,7 @@ def _whole(power: Node) -> int:
     return int(e) if isinstance(e, Fraction) and e.denominator == 1 and e > 0 else 0
 
 
-def quadratic_waist(
+def quadratic_interface(
     roots: Sequence[Node], linear: Collection[Node], constant: Collection[Node]
 ) -> list[Node]:
     """Quadratic values of the forms `linear` that something of higher degree uses.
@@ -83,7 +84,7 @@ def quadratic_waist(
 
 
 @dataclass(frozen=True)
-class Narrowed:
+class Reduced:
     """Rewritten roots and the named quadratic values through which they see the forms."""
 
     roots: list[Node]
@@ -91,9 +92,9 @@ class Narrowed:
     squares: tuple[Node, ...]
 
 
-def narrow(
+def through_invariants(
     g: Graph, roots: Sequence[Node], linear: Collection[Node], constant: Collection[Node]
-) -> Narrowed | None:
+) -> Reduced | None:
     """`roots` through as few quadratic values as suffice; None where none can be saved."""
     search = _Search(g, degrees(roots, linear, constant), frozenset(linear))
     found = search.run(search.targets(roots))
@@ -108,7 +109,7 @@ def narrow(
         else:
             new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
         known[n.id] = new[n]
-    return Narrowed([new[r] for r in roots], new, squares)
+    return Reduced([new[r] for r in roots], new, squares)
 
 
 @dataclass(frozen=True)

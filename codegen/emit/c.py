@@ -3,41 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
 
 from softehl.codegen import abi
+from softehl.codegen.derive.outputs import Entry, Slot
 from softehl.codegen.emit import support as support_c
 from softehl.codegen.emit.schedule import If, Loop, Schedule, Statement
-from softehl.codegen.graph.graph import (
-    BOOLEAN,
-    ELEMENTARY,
-    Input,
-    Node,
-    Op,
-    Place,
-    Routine,
-    reachable,
-)
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.definition import Definition
 
 HEADER = "softehl_kernels.h"
-
-
-class Slot(NamedTuple):
-    """A row or column: a direct unknown, or a component (value, xi-derivative) of the basis."""
-
-    basis: bool
-    position: int
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One output value and where it goes."""
-
-    row: Slot
-    column: Slot | None
-    node: Node
 
 
 _FORMATS: dict[Op, str] = {

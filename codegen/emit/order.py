@@ -16,7 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from softehl.codegen.graph.graph import FREE, Graph, Node, Op, reachable
+from softehl.codegen.graph.graph import FREE, Graph, Node, Op
+from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.optimise.sums import first_difference
 
 REGISTERS = 16

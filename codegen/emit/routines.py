@@ -10,9 +10,10 @@ from collections.abc import Iterable, Sequence
 
 from softehl.codegen.emit.c import Printer, number
 from softehl.codegen.emit.schedule import schedule
-from softehl.codegen.graph.graph import Graph, Node, Op, Routine, reachable
+from softehl.codegen.graph.graph import Graph, Node, Op, Routine
 from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, derivatives_of_energy
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
 
 

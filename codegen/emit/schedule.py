@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from softehl.codegen.graph.graph import Node, Op, reachable
+from softehl.codegen.graph.graph import Node, Op
+from softehl.codegen.graph.traverse import reachable
 
 
 @dataclass

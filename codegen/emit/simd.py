@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softehl.codegen import abi
-from softehl.codegen.emit.c import Entry, Printer, number
+from softehl.codegen.derive.outputs import Entry
+from softehl.codegen.emit.c import Printer, number
 from softehl.codegen.emit.schedule import If, Schedule, Statement
 from softehl.codegen.graph.graph import ELEMENTARY, FREE, Input, Node, Op
-from softehl.codegen.language.model import Definition
+from softehl.codegen.language.definition import Definition
 
 _LETTERS = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
 FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS}) | ELEMENTARY

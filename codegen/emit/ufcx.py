@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
+from softehl.codegen.derive.outputs import Entry
 from softehl.codegen.emit import support as support_c
-from softehl.codegen.emit.c import Entry, Printer, number
+from softehl.codegen.emit.c import Printer, number
 from softehl.codegen.emit.schedule import Loop, Schedule
-from softehl.codegen.graph.graph import Input, Node, Op, reachable
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.graph import Input, Node, Op
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.definition import Definition
 
 
 class TargetError(ValueError):

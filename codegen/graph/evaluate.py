@@ -1,26 +1,19 @@
-"""The slow oracle: walks the *unoptimised* graph of a model in arbitrary precision.
-
-It shares nothing with differentiation, passes, schedule or emission.  Derivatives are central
-differences in so many digits that their error is far below double precision: the residual is
-the derivative of the potential with the frozen quantities held at their values in the base state,
-the tangent is the derivative of that residual.
-"""
+"""Values of an unoptimised graph in arbitrary precision: the walk of the oracle."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import mpmath
 
 from softehl.codegen.graph.evaluate_routines import results
-from softehl.codegen.graph.graph import Input, Node, Op, Place, Routine, reachable
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.graph import Input, Node, Op, Place, Routine
+from softehl.codegen.graph.traverse import reachable
 
 Number = Any
 Vector = list[Number]
-Rows = Sequence[Sequence[Number]] | None
 
 _UNARY: dict[Op, Callable[[Number], Number]] = {
     Op.NAME: lambda a: a,
@@ -72,98 +65,6 @@ class State:
     point_data: Sequence[Sequence[Number]] = ()
 
 
-@dataclass(frozen=True)
-class Oracle:
-    """Values and derivatives of one model, with `digits` digits of working precision."""
-
-    definition: Definition
-    digits: int = 90
-    step: int = 20
-
-    def potential(self, state: State) -> Number:
-        """Value of the (pseudo-)potential."""
-        with mpmath.workdps(self.digits):
-            return Walk(state, {}).value(self.definition.potential)
-
-    def fields(self, state: State) -> list[Vector]:
-        """Field values, [point][field]."""
-        with mpmath.workdps(self.digits):
-            walk = Walk(state, {})
-            nodes = [n for _, n in self.definition.fields]
-            return [[walk.at(n, q) for n in nodes] for q in range(len(state.rule))]
-
-    def residual(self, state: State, along: Rows = None) -> Vector:
-        """Derivative of the potential with the constants frozen at `state`.
-
-        Every component; with `along` the products of these vectors with it, which are cheaper
-        where they are fewer (so in `product` and `derivative`).
-        """
-        with mpmath.workdps(self.digits):
-            return self._residual(state, _mpf(state.dofs), along)
-
-    def tangent(self, state: State) -> list[Vector]:
-        """Rows dR_i/du_j, derivative of `residual` (constants follow the state here)."""
-        with mpmath.workdps(self.digits):
-            h = mpmath.mpf(10) ** -self.step
-            base = _mpf(state.dofs)
-            columns = []
-            for j in range(len(base)):
-                plus, minus = (self._residual(state, _moved(base, j, s * h)) for s in (1, -1))
-                columns.append([(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)])
-            return [list(row) for row in zip(*columns, strict=True)]
-
-    def product(self, state: State, direction: Sequence[Number], along: Rows = None) -> Vector:
-        """Tangent times `direction`: one difference of the residual, where `tangent` takes ndof."""
-        with mpmath.workdps(self.digits):
-            return self._rate(state, "dofs", _mpf(direction), along)
-
-    def derivative(self, state: State, array: str, index: int, along: Rows = None) -> Vector:
-        """Derivative of the residual by one entry of `coordinates`, `data` or `parameters`."""
-        with mpmath.workdps(self.digits):
-            size = len(getattr(state, array))
-            unit = [mpmath.mpf(k == index) for k in range(size)]
-            return self._rate(state, array, unit, along)
-
-    def _rate(self, state: State, array: str, direction: Vector, along: Rows) -> Vector:
-        h = mpmath.mpf(10) ** -self.step
-        base = _mpf(getattr(state, array))
-        moved = (replace(state, **{array: _along(base, s * h, direction)}) for s in (1, -1))
-        plus, minus = (self._residual(at, _mpf(at.dofs), along) for at in moved)
-        return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
-
-    def _residual(self, state: State, dofs: Vector, along: Rows = None) -> Vector:
-        h = mpmath.mpf(10) ** -self.step
-        frozen = self._frozen(state, dofs)
-        size = range(len(dofs))
-        vectors = [[int(i == j) for i in size] for j in size] if along is None else along
-        out = []
-        for v in vectors:
-            plus, minus = (
-                Walk(state, frozen, _along(dofs, s * h, v)).value(self.definition.potential)
-                for s in (1, -1)
-            )
-            out.append((plus - minus) / (2 * h))
-        return out
-
-    def _frozen(self, state: State, dofs: Vector) -> dict[tuple[Node, int], Number]:
-        walk = Walk(state, {}, dofs)
-        return {
-            (n, q): walk.at(n, q) for n in self.definition.constant for q in range(len(state.rule))
-        }
-
-
-def _mpf(values: Sequence[Number]) -> Vector:
-    return [mpmath.mpf(v) for v in values]
-
-
-def _along(values: Vector, step: Number, direction: Sequence[Number]) -> Vector:
-    return [v + step * d for v, d in zip(values, direction, strict=True)]
-
-
-def _moved(values: Vector, j: int, by: Number) -> Vector:
-    return [v + by if i == j else v for i, v in enumerate(values)]
-
-
 class Walk:
     """One evaluation; values are remembered per node and point."""
 
@@ -176,10 +77,10 @@ class Walk:
         self.state = state
         self.frozen = frozen
         self.arrays: dict[str, Vector] = {
-            "coordinates": _mpf(state.coordinates),
-            "dofs": _mpf(state.dofs) if dofs is None else dofs,
-            "data": _mpf(state.data),
-            "parameters": _mpf(state.parameters),
+            "coordinates": exact(state.coordinates),
+            "dofs": exact(state.dofs) if dofs is None else dofs,
+            "data": exact(state.data),
+            "parameters": exact(state.parameters),
         }
         self.known: dict[tuple[Node, int], Number] = {}
 
@@ -236,6 +137,11 @@ class Walk:
         return self.arrays[source.array][source.index]
 
 
+def exact(values: Sequence[Number]) -> Vector:
+    """Numbers of the working precision."""
+    return [mpmath.mpf(v) for v in values]
+
+
 def _local(values: Sequence[Node], local: Vector, external: Vector) -> Vector:
     """Localised values of a routine."""
     walk = Walk(State((), ()), {})
@@ -253,5 +159,5 @@ def evaluate(root: Node, inputs: Mapping[tuple[str, int], Number], digits: int =
             column[n.payload.index] = inputs[n.payload.array, n.payload.index]
     with mpmath.workdps(digits):
         walk = Walk(State((), ()), {})
-        walk.arrays = {k: _mpf(v) for k, v in arrays.items()}
+        walk.arrays = {k: exact(v) for k, v in arrays.items()}
         return walk.value(root)

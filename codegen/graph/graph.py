@@ -14,7 +14,7 @@ is one of the results.  How a routine is differentiated is the routine's affair.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
@@ -336,23 +336,3 @@ class Graph:
 
 def _ordered(a: Node, b: Node) -> tuple[Node, Node]:
     return (a, b) if a.id <= b.id else (b, a)
-
-
-def reachable(roots: Iterable[Node], stop: Callable[[Node], bool] | None = None) -> list[Node]:
-    """All nodes below `roots` (operands of nodes that satisfy `stop` excluded), ids ascending."""
-    seen: dict[int, Node] = {}
-    stack = list(roots)
-    while stack:
-        n = stack.pop()
-        if n.id in seen:
-            continue
-        seen[n.id] = n
-        if stop is None or not stop(n):
-            stack.extend(n.args)
-    return [seen[i] for i in sorted(seen)]
-
-
-def operations(roots: Iterable[Node]) -> int:
-    """Number of run-time operations below `roots` (each shared value counted once)."""
-    free = (Op.SUM, Op.ITEM)
-    return sum(1 for n in reachable(roots) if n.op not in FREE and n.op not in free)

@@ -14,10 +14,11 @@ from typing import Any
 
 import mpmath
 
-from softehl.codegen.derive.differentiate import DifferentiationError, gradient
-from softehl.codegen.derive.interfaces import substitute
 from softehl.codegen.graph.arithmetic import number
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine, reachable
+from softehl.codegen.graph.differentiate import gradient
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine
+from softehl.codegen.graph.partials import DifferentiationError
+from softehl.codegen.graph.traverse import reachable, substitute
 
 Matrix = list[list[Node]]
 Pairs = list[tuple[Node, Node]]

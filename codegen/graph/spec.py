@@ -5,16 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from softehl.codegen.graph.graph import (
-    BOOLEAN,
-    ELEMENTARY,
-    Input,
-    Node,
-    Op,
-    Place,
-    Routine,
-    reachable,
-)
+from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine
+from softehl.codegen.graph.traverse import reachable
 
 ARITY: dict[Op, int] = {
     **dict.fromkeys((Op.CONST, Op.PI, Op.INPUT), 0),

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from softehl.codegen.graph.graph import Graph, Node
-from softehl.codegen.language.quadrature import QuadratureRule
+from softehl.codegen.language.elements.quadrature import QuadratureRule
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Definition:
     constant: tuple[Node, ...]
     given: Mapping[Node, Mapping[Node, Node]]
     directions: tuple[Node, ...]
-    waist: tuple[Node, ...]
+    interface: tuple[Node, ...]
     fields: tuple[tuple[str, Node], ...]
     product: bool = False
     derivatives: tuple[tuple[str, Node], ...] = ()

@@ -11,7 +11,7 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language import shapes
+from softehl.codegen.language.elements import shapes
 from softehl.codegen.language.model import Model
 
 
@@ -45,7 +45,7 @@ def deformation_gradient(m: Model, dN: Any, u: Any) -> Any:
     F = sp.Matrix(
         size, size, lambda i, k: (1 if i == k else 0) + shapes.interpolate([g[k] for g in dN], u[i])
     )
-    return m.define("F", F, waist=True)
+    return m.define("F", F, interface=True)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def quad4(m: Model, label: str, X: Any, xi: Any, eta: Any) -> Quad4:
 
 
 def gradient(
-    m: Model, label: str, dN: Any, hoop_shape: Any, u: Any, *, waist: bool = True
+    m: Model, label: str, dN: Any, hoop_shape: Any, u: Any, *, interface: bool = True
 ) -> Gradient:
     """F = 1 + Grad u, hoop stretch 1 + u_r / R with `hoop_shape` = N_a / R."""
     F = sp.Matrix(
@@ -104,7 +104,8 @@ def gradient(
     )
     hoop = 1 + shapes.interpolate(hoop_shape, u[1])
     return Gradient(
-        m.define(f"F{label}", F, waist=waist), m.define(f"F{label}_t", hoop, waist=waist)
+        m.define(f"F{label}", F, interface=interface),
+        m.define(f"F{label}_t", hoop, interface=interface),
     )
 
 

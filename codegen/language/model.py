@@ -13,8 +13,8 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.abi import Task
-from softehl.codegen.derive.differentiate import gradient
-from softehl.codegen.graph.graph import Graph, Input, Node, Op, reachable
+from softehl.codegen.graph.differentiate import gradient
+from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.routines import (
     SYMMETRIC,
     Control,
@@ -23,10 +23,11 @@ from softehl.codegen.graph.routines import (
     newton,
     symmetric,
 )
+from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Argument, Condition, Definition
+from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import Entries, fraction
 from softehl.codegen.language.lower import Lowering, ModelError, page_line
-from softehl.codegen.language.quadrature import QuadratureRule
 
 __all__ = ["Argument", "Definition", "Model"]
 
@@ -63,7 +64,7 @@ class Model:
             "data": [],
             "point data": [],
         }
-        self._waist: list[Node] = []
+        self._interface: list[Node] = []
         self._given: dict[Node, dict[Node, Node]] = {}
         self._constant: list[Node] = []
         self._fields: list[tuple[str, Node]] = []
@@ -178,12 +179,12 @@ class Model:
         name: str,
         expression: Any,
         *,
-        waist: bool = False,
+        interface: bool = False,
         derivative: Mapping[sp.Symbol, Any] | None = None,
     ) -> Any:
         """Name an intermediate (scalar or matrix); returns its symbol or matrix of symbols.
 
-        A `waist` intermediate is one that derivatives are taken through.  `derivative` replaces
+        A `interface` intermediate is one that derivatives are taken through.  `derivative` replaces
         the true derivative by given ones with respect to chosen symbols.
         """
         if isinstance(expression, sp.MatrixBase):
@@ -193,11 +194,11 @@ class Model:
             return sp.Matrix(
                 rows,
                 columns,
-                lambda i, j: self.define(f"{name}_{i}{j}", expression[i, j], waist=waist),
+                lambda i, j: self.define(f"{name}_{i}{j}", expression[i, j], interface=interface),
             )
         node = self.graph.name(name, self._lower(expression))
-        if waist:
-            self._waist.append(node)
+        if interface:
+            self._interface.append(node)
         if derivative is not None:
             self._given[node] = {self._bound[s]: self._lower(e) for s, e in derivative.items()}
         return self._bind(name, node)
@@ -284,7 +285,7 @@ class Model:
         density = sp.Integer(0)
         frozen = []
         for k, (factor, varied) in enumerate(terms):
-            frozen.append(self.define(f"factor_{k}", factor, waist=True))
+            frozen.append(self.define(f"factor_{k}", factor, interface=True))
             density += frozen[-1] * varied
         self.potential(self.integral("virtual_work", density), constant=frozen)
 
@@ -351,7 +352,7 @@ class Model:
             constant=tuple(self._constant),
             given=self._given,
             directions=tuple(self._directions),
-            waist=tuple(self._waist),
+            interface=tuple(self._interface),
             fields=tuple(self._fields),
             product=self._product,
             derivatives=tuple(self._derivatives),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from softehl.codegen.language.model import Definition
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import boundary, contact, film, solid, support
 
 ALL: dict[str, Callable[[], Definition]] = {

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sympy as sp
 
-from softehl.codegen.language import quadrature, shapes
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.model import Model
 
 
 def follower_pressure() -> Definition:

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import sympy as sp
 
-from softehl.codegen.language import quadrature, shapes
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.model import Model
 
 Vectors = list[list[sp.Symbol]]
 """Components, and for each its values at the nodes."""
@@ -42,7 +43,7 @@ def reynolds_segment() -> Definition:
     z_xi, r_xi = (m.define(f"{n}_xi", (c[1] - c[0]) / 2) for n, c in zip("zr", x, strict=True))
     ds = m.define("ds", sp.sqrt(z_xi**2 + r_xi**2))
     nodal_h = _nodal_thickness(m, X, u, R_rod)
-    h = m.define("h", shapes.interpolate(N, nodal_h), waist=True)
+    h = m.define("h", shapes.interpolate(N, nodal_h), interface=True)
     r = m.define("r", R_rod + h)
     slope = m.define("slope", p_xi / z_xi)
     eta = m.define("eta", eta_0 * sp.exp(alpha * p))

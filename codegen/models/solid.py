@@ -10,8 +10,9 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.language import kinematics as kin
-from softehl.codegen.language import quadrature, shapes
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.model import Model
 
 
 def _element(name: str, doc: str) -> tuple[Model, Any, Any, Any]:

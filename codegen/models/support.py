@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from softehl.codegen.language import kinematics as kin
-from softehl.codegen.language import quadrature, shapes
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.model import Model
 
 
 def mean_rotation() -> Definition:
@@ -53,6 +54,6 @@ def axial_spring() -> Definition:
     (stiffness,) = m.parameters(stiffness="bedding stiffness [N/mm^3]")
     xi, eta = m.point()
     e = kin.quad4(m, "", X, xi, eta)
-    u_z = m.define("u_z", shapes.interpolate(e.N, u[0]), waist=True)
+    u_z = m.define("u_z", shapes.interpolate(e.N, u[0]), interface=True)
     m.potential(m.integral("bedding", stiffness / 2 * e.detJ * u_z**2))
     return m.finish()

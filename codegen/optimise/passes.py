@@ -14,7 +14,8 @@ from fractions import Fraction
 import mpmath
 
 from softehl.codegen.graph.arithmetic import number
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, operations, reachable
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
+from softehl.codegen.graph.traverse import operations, reachable, rewrite
 from softehl.codegen.optimise.signatures import merge_equal
 from softehl.codegen.optimise.sums import common_sums
 
@@ -49,14 +50,6 @@ def run(g: Graph, roots: Roots, passes: Sequence[Pass]) -> tuple[Roots, list[Tra
 
 def _row(name: str, roots: Roots) -> TraceRow:
     return TraceRow(name, len(reachable(roots)), operations(roots))
-
-
-def rewrite(g: Graph, roots: Roots, rule: Callable[[Graph, Node, tuple[Node, ...]], Node]) -> Roots:
-    """Rebuild bottom-up: `rule` gets each old node with its rebuilt operands."""
-    new: dict[Node, Node] = {}
-    for n in reachable(roots):
-        new[n] = rule(g, n, tuple(new[a] for a in n.args))
-    return [new[r] for r in roots]
 
 
 def fold(g: Graph, roots: Roots) -> Roots:

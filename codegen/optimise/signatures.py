@@ -16,7 +16,8 @@ from typing import Any
 import mpmath
 
 from softehl.codegen.graph.arithmetic import number
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, reachable
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
+from softehl.codegen.graph.traverse import reachable
 
 DIGITS = 50
 AGREE = 30

@@ -15,7 +15,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import combinations
 
-from softehl.codegen.graph.graph import Graph, Input, Node, Op, reachable
+from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.traverse import reachable
 
 Row = dict[Node, int]
 """A signed sum: term -> +1 or -1."""

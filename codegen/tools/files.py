@@ -20,7 +20,7 @@ from rich.table import Column, Table
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, Task
-from softehl.codegen.language.model import Definition
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build, cache, library, targets, user, verify
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.codegen.tools.samples import NoStateError

@@ -23,7 +23,7 @@ from softehl.codegen.tools import cache as store
 
 if TYPE_CHECKING:
     from softehl.codegen.graph.graph import Node
-    from softehl.codegen.language.model import Definition
+    from softehl.codegen.language.definition import Definition
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,8 @@ def fingerprint(definition: Definition) -> str:
 
 def _told(value: Any) -> str:
     """A record as text: its nodes, numbered from operands to users, then its entries."""
-    from softehl.codegen.graph.graph import Routine, reachable
+    from softehl.codegen.graph.graph import Routine
+    from softehl.codegen.graph.traverse import reachable
 
     roots: list[Node] = []
     _entries(value, lambda n: roots.append(n) or "")  # type: ignore[func-returns-value]

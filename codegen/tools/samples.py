@@ -17,9 +17,10 @@ import mpmath
 from mpmath.libmp import NoConvergence
 
 from softehl.codegen.graph.evaluate import State, Walk
-from softehl.codegen.graph.graph import Node, Op, Routine, reachable
-from softehl.codegen.language import shapes
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.graph import Node, Op, Routine
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import shapes
 
 ATTEMPTS = 40
 DIGITS = 30

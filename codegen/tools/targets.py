@@ -12,7 +12,7 @@ from pathlib import Path
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.emit.ufcx import TargetError
-from softehl.codegen.language.model import Definition
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import cache
 
 

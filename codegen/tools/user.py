@@ -23,8 +23,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.lower import ModelError
-from softehl.codegen.language.model import Definition
 from softehl.codegen.tools.model_text import ModelFileError, read
 
 _RECIPE = "write `def my_model() -> Definition:` that ends in `return m.finish()`"

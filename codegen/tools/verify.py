@@ -23,10 +23,12 @@ from pathlib import Path
 from typing import Any
 
 from softehl.codegen import abi
-from softehl.codegen.graph.evaluate import Oracle, State
-from softehl.codegen.graph.graph import Input, Op, reachable
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.graph.graph import Input, Op
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import samples
+from softehl.codegen.tools.oracle import Oracle
 
 BOUND = 1e-10
 """Largest relative error that is rounding; a wrong derivative is off by far more."""

@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from softehl.cases.harness.sweep import Curve, solve_cases
     from softehl.cases.seal.parameters import ORing
     from softehl.cases.seal.run import run as run_oring
-    from softehl.codegen.language import kinematics, quadrature, shapes
+    from softehl.codegen.language import kinematics
     from softehl.codegen.language.definition import Definition
+    from softehl.codegen.language.elements import quadrature, shapes
     from softehl.codegen.language.model import Model
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
     from softehl.runtime.fem.dofs import DofLayout
@@ -52,8 +53,8 @@ _MODELLING = {
     "Definition": "softehl.codegen.language.definition",
     "Model": "softehl.codegen.language.model",
     "kinematics": "softehl.codegen.language.kinematics:",
-    "quadrature": "softehl.codegen.language.quadrature:",
-    "shapes": "softehl.codegen.language.shapes:",
+    "quadrature": "softehl.codegen.language.elements.quadrature:",
+    "shapes": "softehl.codegen.language.elements.shapes:",
 }
 """What a model page needs; these import SymPy."""
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, function_name
-from softehl.codegen.language.model import Definition
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build
 
 Array = npt.NDArray[np.float64]

@@ -15,8 +15,9 @@ import mpmath
 import sympy as sp
 from hypothesis import strategies as st
 
-from softehl.codegen.language import quadrature
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.model import Model
 
 DIGITS = 50
 UNKNOWNS = tuple(sp.symbols("x y z", real=True))
@@ -81,7 +82,7 @@ def expressions(symbols: tuple[Any, ...], leaves: int = 6) -> st.SearchStrategy[
 class Recipe:
     """A model in writing: named values, an integral, a potential, an exception to its derivative.
 
-    `named` holds (symbol, expression, waist) in order, `inside` such ones that vary with xi.
+    `named` holds (symbol, expression, interface) in order, `inside` such ones that vary with xi.
     """
 
     named: tuple[tuple[Any, Any, bool], ...]
@@ -99,9 +100,9 @@ class Recipe:
             m.unknown(str(u))
         m.parameters(k="a parameter")
         m.point()
-        for s, e, waist in (*self.named, *self.inside):
+        for s, e, interface in (*self.named, *self.inside):
             slope = {UNKNOWNS[0]: self.given} if (s, "given") == (A, self.exception) else None
-            m.define(str(s), e, waist=waist, derivative=slope)
+            m.define(str(s), e, interface=interface, derivative=slope)
         m.integral(str(TOTAL), self.integrand)
         frozen = {"constant": [A], "constant inside": [B]}.get(self.exception, [])
         m.potential(self.potential, constant=frozen)

@@ -14,18 +14,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softehl.codegen.abi import Task
-from softehl.codegen.derive import linearise
-from softehl.codegen.derive.differentiate import (
-    DifferentiationError,
-    Linearisation,
-    gradient,
-    partials,
-)
-from softehl.codegen.graph.evaluate import Oracle, State, evaluate
-from softehl.codegen.graph.graph import Graph, Node, Op, operations
-from softehl.codegen.language import quadrature
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.derive import variants
+from softehl.codegen.derive.linearise import Linearisation
+from softehl.codegen.graph.differentiate import gradient
+from softehl.codegen.graph.evaluate import State, evaluate
+from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.partials import DifferentiationError, partials
+from softehl.codegen.graph.traverse import operations
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
+from softehl.codegen.tools.oracle import Oracle
 from tests.codegen.workshop import (
     close,
     difference,
@@ -337,19 +337,19 @@ def test_conditions_have_no_derivative_and_sums_no_local_one() -> None:
         partials(g, g.sum(g.mul(x, g.input("rule", 0, varying=True))))
 
 
-# ------------------------------------------------------------------------- models: sums and waists
+# --------------------------------------------------------------------- models: sums and interfaces
 
 RULE = [(mpmath.mpf(t), mpmath.mpf(w)) for t, w in (("-0.7", "0.6"), ("0.1", "0.9"), ("0.8", "1"))]
 
 
-def bar(*, waist: bool, summed: bool = False) -> Definition:
+def bar(*, interface: bool, summed: bool = False) -> Definition:
     """Three unknowns, energy of two strains at points; `summed` puts a sum into a sum."""
     m = Model("bar", nodes=1, rule=quadrature.gauss(2, 1))
     u = [m.unknown(f"u{k}") for k in range(3)]
     (mu,) = m.parameters(mu="stiffness")
     (xi,) = m.point()
-    a = m.define("a", 1 + u[0] * xi + u[1] * u[2], waist=waist)
-    b = m.define("b", sp.exp(u[1] * xi / 3) + u[2] ** 2, waist=waist)
+    a = m.define("a", 1 + u[0] * xi + u[1] * u[2], interface=interface)
+    b = m.define("b", sp.exp(u[1] * xi / 3) + u[2] ** 2, interface=interface)
     energy = mu * (a**2 * b + sp.log(a * b) + sp.Piecewise((a**3, a > b), (sp.sqrt(b), True)))
     if summed:
         mean = m.integral("mean", a * xi**2 + b)
@@ -373,19 +373,19 @@ def exact(d: Definition, state: State) -> tuple[Any, Any]:
     return oracle.residual(state), oracle.tangent(state)
 
 
-@pytest.mark.parametrize("waist", [False, True], ids=["direct", "waist"])
+@pytest.mark.parametrize("interface", [False, True], ids=["direct", "interface"])
 @pytest.mark.parametrize("summed", [False, True], ids=["one sum", "sum in a sum"])
-def test_sums_over_points(waist: bool, summed: bool) -> None:
-    d, state = bar(waist=waist, summed=summed), bar_state()
+def test_sums_over_points(interface: bool, summed: bool) -> None:
+    d, state = bar(interface=interface, summed=summed), bar_state()
     assert matrices_agree(linearised(d, state), exact(d, state))
 
 
-def test_waist_and_direct_differentiation_agree() -> None:
-    """Forward mode through the waist, against forward mode straight to the unknowns."""
-    d, state = bar(waist=True, summed=True), bar_state()
+def test_interface_and_direct_differentiation_agree() -> None:
+    """Forward mode through the interface, against forward mode straight to the unknowns."""
+    d, state = bar(interface=True, summed=True), bar_state()
     g = d.graph
     adjoint = gradient(g, d.potential, d.directions)
-    through = Linearisation(g, d.directions, [z for z in d.waist if z.varying])
+    through = Linearisation(g, d.directions, [z for z in d.interface if z.varying])
     direct = Linearisation(g, d.directions)
     for u in d.directions:
         for j in range(3):
@@ -395,12 +395,12 @@ def test_waist_and_direct_differentiation_agree() -> None:
 
 
 def test_the_mirrored_tangent_equals_the_unmirrored_one() -> None:
-    d, state = bar(waist=True), bar_state()
+    d, state = bar(interface=True), bar_state()
     g = d.graph
     adjoint = gradient(g, d.potential, d.directions)
-    mirror = {adjoint[z]: z for z in d.waist}
-    once = Linearisation(g, d.directions, d.waist, symmetric=mirror)
-    twice = Linearisation(g, d.directions, d.waist)
+    mirror = {adjoint[z]: z for z in d.interface}
+    once = Linearisation(g, d.directions, d.interface, symmetric=mirror)
+    twice = Linearisation(g, d.directions, d.interface)
     entries: dict[bool, list[Node]] = {True: [], False: []}
     for u in d.directions:
         for j in range(3):
@@ -444,7 +444,7 @@ def test_weak_forms_vary_only_what_is_varied() -> None:
     (xi,) = m.point()
     m.weak_form([(sp.sin(v) * xi**2, u), (u * v, v + xi * u)])
     d = m.finish()
-    assert Task.ENERGY not in linearise.tasks(d)
+    assert Task.ENERGY not in variants.tasks(d)
     state = State((0, 0), ("0.4", "-0.3"), (), (), RULE)
     R, K = linearised(d, state)
     assert matrices_agree((R, K), exact(d, state))
@@ -489,9 +489,9 @@ def _lagrange(nodes: list[Any], k: int, t: Any) -> tuple[Any, Any]:
 def test_a_mean_of_an_interpolated_field_may_not_enter_a_sum_again() -> None:
     """It would couple every mode at one point with every mode at another: no kernel for that."""
     d = line_model("again")
-    linearise.outputs(d, Task.RESIDUAL)
+    variants.outputs(d, Task.RESIDUAL)
     with pytest.raises(DifferentiationError, match="may not enter a sum again"):
-        linearise.outputs(d, Task.TANGENT)
+        variants.outputs(d, Task.TANGENT)
 
 
 def test_a_wrong_tangent_graph_is_detected() -> None:

@@ -15,11 +15,13 @@ import sympy as sp
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Task
 from softehl.codegen.emit import c as emit_c
-from softehl.codegen.graph.evaluate import Oracle, State
-from softehl.codegen.language import quadrature
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import build
+from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.fem.rules import film_rule, gauss
 from softehl.runtime.kernels import Kernel, MissingKernelsError, StaleKernelsError, load_kernel
 from tests.codegen.workshop import compiled, write
@@ -45,7 +47,7 @@ def nested_sums() -> Definition:
     (c,) = m.data(c="constant of the element")
     (k,) = m.parameters(k="stiffness")
     (xi,) = m.point()
-    a = m.define("a", u[0] + xi * u[1] * X[0][1] + sp.exp(xi * u[2]) * c, waist=True)
+    a = m.define("a", u[0] + xi * u[1] * X[0][1] + sp.exp(xi * u[2]) * c, interface=True)
     mean = m.integral("mean", a**2 + X[1][0])
     m.potential(m.integral("Pi", k * (a - sp.sqrt(mean)) ** 2 + sp.sin(a)) + c * mean)
     m.fields(a=a, double=2 * a, xi=xi)
@@ -240,14 +242,14 @@ def test_a_mean_of_the_interpolated_field_in_a_direct_row(tmp_path: Path) -> Non
     np.testing.assert_allclose(K[0], expected, atol=1e-14)
 
 
-@pytest.mark.parametrize("waist", [False, True])
+@pytest.mark.parametrize("interface", [False, True])
 def test_a_named_value_of_one_side_leaves_no_trace_in_the_other(
-    waist: bool, tmp_path: Path
+    interface: bool, tmp_path: Path
 ) -> None:
     m = Model("named", nodes=1, rule=quadrature.gauss(2, 1))
     x = m.unknown("x")
     (xi,) = m.point()
-    root = m.define("root", sp.sqrt(x + xi / 10), waist=waist)
+    root = m.define("root", sp.sqrt(x + xi / 10), interface=interface)
     m.potential(m.integral("Pi", sp.Piecewise((root**3, x > 1), (x**2, True))))
     d = m.finish()
     kernel = compiled(d, tmp_path)

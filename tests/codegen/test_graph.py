@@ -6,7 +6,8 @@ from fractions import Fraction
 
 import pytest
 
-from softehl.codegen.graph.graph import FREE, Graph, Node, Op, operations, reachable
+from softehl.codegen.graph.graph import FREE, Graph, Node, Op
+from softehl.codegen.graph.traverse import operations, reachable
 from tests.codegen.workshop import unknowns
 
 

@@ -12,15 +12,18 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.derive.differentiate import gradient
-from softehl.codegen.graph.evaluate import Oracle, State, evaluate
-from softehl.codegen.graph.graph import Graph, Node, Op, reachable
+from softehl.codegen.graph.differentiate import gradient
+from softehl.codegen.graph.evaluate import State, evaluate
+from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.routines import Newton, inverse
 from softehl.codegen.graph.spec import IllegalGraphError, check
-from softehl.codegen.language import quadrature
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.lower import ModelError
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build
+from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.kernels import ArgumentError, Kernel, load_kernel
 from tests.codegen.workshop import compiled, difference, element_state, off, tangent_errors
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.lower import SUPPORTED
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.model import Model
 from softehl.runtime.kernels import Kernel
 from tests.codegen.workshop import compiled, tangent_errors
 

@@ -17,10 +17,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from softehl.codegen.graph.evaluate import Oracle
-from softehl.codegen.graph.graph import Node, Op, reachable
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.graph import Node, Op
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
+from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases
 from tests.codegen.workshop import compiled

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from softehl.codegen.emit.order import arranged
-from softehl.codegen.graph.graph import FREE, Graph, Node, Op, operations, reachable
+from softehl.codegen.graph.graph import FREE, Graph, Node, Op
+from softehl.codegen.graph.traverse import operations, reachable
 from tests.codegen.workshop import inputs, same_value, unknowns
 
 

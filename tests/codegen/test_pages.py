@@ -9,9 +9,9 @@ import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
 
-from softehl.codegen.graph.evaluate import Oracle
-from softehl.codegen.language import shapes
-from softehl.codegen.language.model import Definition
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import shapes
+from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.fem.rules import Rule
 from softehl.runtime.kernels import Kernel
 from tests.codegen.pages.gent import gent

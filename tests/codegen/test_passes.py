@@ -8,11 +8,12 @@ import mpmath
 import pytest
 
 from softehl.codegen.abi import Task
-from softehl.codegen.derive import linearise
+from softehl.codegen.derive import variants
 from softehl.codegen.emit.schedule import schedule
 from softehl.codegen.graph.evaluate import evaluate
-from softehl.codegen.graph.graph import Graph, Node, Op, operations, reachable
+from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.spec import check
+from softehl.codegen.graph.traverse import operations, reachable
 from softehl.codegen.models import ALL
 from softehl.codegen.optimise import passes
 from softehl.codegen.optimise.passes import STANDARD, Pass
@@ -350,8 +351,8 @@ def test_a_wrong_pass_is_seen() -> None:
 @pytest.mark.parametrize("name", ALL)
 def test_graphs_of_shipped_models_stay_legal_and_get_cheaper(name: str) -> None:
     d = ALL[name]()
-    for task in linearise.tasks(d):
-        roots = [x.node for x in linearise.outputs(d, task)]
+    for task in variants.tasks(d):
+        roots = [x.node for x in variants.outputs(d, task)]
         check(roots)
         first = operations(roots)
         for p in STANDARD:

@@ -20,13 +20,14 @@ from hypothesis import HealthCheck, Phase, given, settings
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, Task
-from softehl.codegen.derive import linearise
+from softehl.codegen.derive import variants
 from softehl.codegen.emit.schedule import If, Schedule, Statement, schedule
 from softehl.codegen.graph.arithmetic import number
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.spec import check
-from softehl.codegen.language.model import Definition
+from softehl.codegen.graph.traverse import rewrite
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
 from softehl.codegen.tools import build
 from softehl.runtime.kernels import Kernel, load_kernel
@@ -225,7 +226,7 @@ def test_every_pass_keeps_every_value() -> None:
     for name, d, state in cases():
         points = [[rounded(x) for x in row] for row in state.rule]
         for chosen in (passes.STANDARD, passes.straight_line(points)):
-            roots = [x.node for x in linearise.outputs(d, Task.TANGENT)]
+            roots = [x.node for x in variants.outputs(d, Task.TANGENT)]
             check(roots)
             before = values(d, roots, state)
             for p in chosen:
@@ -245,14 +246,14 @@ def test_a_wrong_pass_is_refused() -> None:
     """Branches swapped in one model; a factor lost in all."""
     refused = 0
     for _, d, state in cases():
-        roots = [x.node for x in linearise.outputs(d, Task.TANGENT)]
+        roots = [x.node for x in variants.outputs(d, Task.TANGENT)]
 
         def wrong(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
             if n.op is Op.MUL and args[0].op is Op.CONST:
                 return args[1]
             return g.rebuild(n.op, args, n.payload)
 
-        lost = passes.rewrite(d.graph, roots, wrong)
+        lost = rewrite(d.graph, roots, wrong)
         refused += not same(values(d, lost, state), values(d, roots, state))
     assert refused > 3
 
@@ -310,7 +311,7 @@ def executed(plan: Schedule, roots: Sequence[Node], state: State) -> list[list[A
 def test_a_schedule_stores_before_it_loads() -> None:
     for name, d, state in cases():
         for task in (Task.RESIDUAL, Task.TANGENT):
-            roots = [x.node for x in linearise.outputs(d, task)]
+            roots = [x.node for x in variants.outputs(d, task)]
             roots, _ = passes.run(d.graph, roots, passes.STANDARD)
             found = executed(schedule(roots), roots, state)
             assert same(found, values(d, roots, state)), name

@@ -12,8 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from softehl.codegen.graph.evaluate import evaluate
-from softehl.codegen.graph.graph import Graph, Node, Op, operations, reachable
+from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.spec import check
+from softehl.codegen.graph.traverse import operations, reachable
 from softehl.codegen.language.lower import Lowering
 from softehl.codegen.optimise.signatures import merge_equal
 from tests.codegen.random_models import UNKNOWNS, Digits, K, Meaning, OutsideError, Recipe

@@ -11,14 +11,17 @@ import numpy.typing as npt
 import pytest
 import sympy as sp
 
-from softehl.codegen.derive.differentiate import gradient
-from softehl.codegen.graph.evaluate import Oracle, State
-from softehl.codegen.graph.graph import Op, reachable
+from softehl.codegen.graph.differentiate import gradient
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.graph.graph import Op
 from softehl.codegen.graph.routines import Isotropic, upper
-from softehl.codegen.language import quadrature
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.lower import ModelError
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build
+from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors, write
 

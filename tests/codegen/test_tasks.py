@@ -11,11 +11,12 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import abi, pipeline
-from softehl.codegen.graph.evaluate import Oracle
 from softehl.codegen.language import kinematics as kin
-from softehl.codegen.language import quadrature, shapes
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.lower import ModelError
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.model import Model
+from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.fem.rules import film_rule
 from softehl.runtime.kernels import ArgumentError, Kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors

@@ -16,8 +16,9 @@ import pytest
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.emit import ufcx as emit_ufcx
-from softehl.codegen.language import quadrature
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.kernels import load_kernel
@@ -152,7 +153,7 @@ def looped() -> Definition:
     (c,) = m.data(c="constant of the element")
     (k,) = m.parameters(k="stiffness")
     (xi,) = m.point()
-    a = m.define("a", u[0] * (1 - xi) + u[1] * (1 + xi) + c * X[1][0], waist=True)
+    a = m.define("a", u[0] * (1 - xi) + u[1] * (1 + xi) + c * X[1][0], interface=True)
     mean = m.integral("mean", a**2 + X[0][1])
     m.potential(m.integral("Pi", k * (a - mean) ** 4) + lam * mean)
     m.offer(derivatives=[k])

@@ -12,12 +12,13 @@ import numpy as np
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Task
-from softehl.codegen.derive import linearise
-from softehl.codegen.emit.c import Slot
-from softehl.codegen.graph.evaluate import Oracle, State, evaluate
+from softehl.codegen.derive import variants
+from softehl.codegen.derive.outputs import Slot
+from softehl.codegen.graph.evaluate import State, evaluate
 from softehl.codegen.graph.graph import Graph, Node
-from softehl.codegen.language.model import Definition
+from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build
+from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.kernels import Kernel, load_kernel
 
 Number = Any
@@ -76,7 +77,7 @@ def linearised(d: Definition, state: State) -> tuple[list[Number], list[list[Num
     with mpmath.workdps(90):
         R = [mpmath.mpf(0)] * ndof
         K = [[mpmath.mpf(0)] * ndof for _ in range(ndof)]
-        for x in linearise.outputs(d, Task.TANGENT):
+        for x in variants.outputs(d, Task.TANGENT):
             for i, row in _shapes(d, x.row, state):
                 if x.column is None:
                     R[i] += _contracted(d, x.node, state, [row])

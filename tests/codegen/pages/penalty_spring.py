@@ -2,8 +2,9 @@
 
 import sympy as sp
 
-from softehl.codegen.language import quadrature
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.model import Model
 
 
 def penalty_spring() -> Definition:

@@ -1,4 +1,4 @@
-"""Automatic waists: what is found, what it saves to the operation, and that no value changes."""
+"""Automatic interfaces: what is found, what it saves, and that no value changes."""
 
 from __future__ import annotations
 
@@ -13,27 +13,30 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.derive import linearise
-from softehl.codegen.derive.interfaces import Waist, linear_waist, strip
-from softehl.codegen.graph.evaluate import Oracle, State
-from softehl.codegen.language import quadrature
-from softehl.codegen.language.model import Definition, Model
+from softehl.codegen.derive import modal, variants
+from softehl.codegen.derive.interfaces import Interface, linear_interface
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.graph.traverse import strip
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
+from softehl.codegen.tools.oracle import Oracle
 from tests.codegen.workshop import compiled, linearised
 
 QUAD = ((1, 1, 1, 1), (-1, 1, 1, -1), (-1, -1, 1, 1), (1, -1, 1, -1))
 """Constant, xi, eta and hourglass mode of a quadrilateral, counterclockwise."""
 
 
-def waist_of(d: Definition) -> Waist:
+def interface_of(d: Definition) -> Interface:
     (root,), _ = strip(d.graph, [d.potential], d.constant)
-    found = linear_waist(d.graph, [root], d.directions)
+    found = linear_interface(d.graph, [root], d.directions)
     assert found is not None
     return found
 
 
-def without_waist(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(linearise, "_modal", lambda d: iter(()))
+def without_interface(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(variants, "through_interfaces", lambda d: iter(()))
 
 
 # ----------------------------------------------------------------------------------- what is found
@@ -42,10 +45,10 @@ def without_waist(patch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("name", ["solid_q4", "solid_fbar", "solid_taylor"])
 def test_modes_of_a_quadrilateral_are_those_of_walsh_and_hadamard(name: str) -> None:
     d = ALL[name]()
-    waist = waist_of(d)
+    interface = interface_of(d)
     at = {u.id: k for k, u in enumerate(d.directions)}
     found = set()
-    for vector in waist.matrix:
+    for vector in interface.matrix:
         row = [Fraction(0)] * 8
         for source, c in vector:
             row[at[source]] = c
@@ -63,7 +66,7 @@ def test_modes_of_a_quadrilateral_are_those_of_walsh_and_hadamard(name: str) -> 
 SAVED = {
     "solid_q4": {"residual": (831, 570), "tangent": (3074, 1572)},
 }
-"""Operations without and with the waist."""
+"""Operations without and with the interface."""
 
 
 def counts(name: str) -> list[int]:
@@ -72,9 +75,9 @@ def counts(name: str) -> list[int]:
 
 
 @pytest.mark.parametrize("name", SAVED)
-def test_the_waist_saves_operations(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_interface_saves_operations(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     through = counts(name)
-    without_waist(monkeypatch)
+    without_interface(monkeypatch)
     direct = counts(name)
     assert list(zip(direct, through, strict=True)) == list(SAVED[name].values())
 
@@ -113,27 +116,27 @@ def close(a: Any, b: Any) -> bool:
 def test_values_are_those_of_direct_differentiation(monkeypatch: pytest.MonkeyPatch) -> None:
     state = at_rule(STATE)
     R, K = linearised(bar(), state)
-    assert list(linearise._modal(bar()))
+    assert list(modal.through_interfaces(bar()))
     assert close(R, Oracle(bar()).residual(state))
     assert close(K, Oracle(bar()).tangent(state))
-    without_waist(monkeypatch)
+    without_interface(monkeypatch)
     direct_R, direct_K = linearised(bar(), state)
     assert close(R, direct_R)
     assert close(K, direct_K)
     assert not close(K, np.array(K, dtype=object).T), "the constant makes it unsymmetric"
 
 
-def test_a_wrong_waist_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_interface_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A matrix that is off by 1e-9 in one coefficient."""
 
-    def off(g: Any, roots: Any, sources: Any) -> Waist | None:
-        found = linear_waist(g, roots, sources)
+    def off(g: Any, roots: Any, sources: Any) -> Interface | None:
+        found = linear_interface(g, roots, sources)
         assert found is not None
         (source, c), *rest = found.matrix[0]
         first = ((source, c * (1 + Fraction(1, 10**9))), *rest)
         return replace(found, matrix=(first, *found.matrix[1:]))
 
-    monkeypatch.setattr(linearise, "linear_waist", off)
+    monkeypatch.setattr(modal, "linear_interface", off)
     state = at_rule(STATE)
     R, K = linearised(bar(), state)
     assert not close(R, Oracle(bar()).residual(state))
@@ -153,9 +156,9 @@ def guarded() -> Definition:
 
 
 @pytest.mark.parametrize("k", [0.7, -0.7])
-def test_a_waist_takes_nothing_out_of_its_branch(k: float, tmp_path: Path) -> None:
+def test_an_interface_takes_nothing_out_of_its_branch(k: float, tmp_path: Path) -> None:
     d = guarded()
-    assert not list(linearise._modal(d))
+    assert not list(modal.through_interfaces(d))
     kernel = compiled(d, tmp_path)
     u = [0.4, -1.3]
     R, K = kernel.tangent(np.zeros((1, 2)), np.array([u]), parameters=[k])
@@ -164,8 +167,8 @@ def test_a_waist_takes_nothing_out_of_its_branch(k: float, tmp_path: Path) -> No
     np.testing.assert_allclose(K[0], np.array(Oracle(d).tangent(state), dtype=float), atol=1e-14)
 
 
-def test_branches_without_such_values_keep_their_waist() -> None:
+def test_branches_without_such_values_keep_their_interface() -> None:
     m = Model("harmless", nodes=1, rule=quadrature.point_rule())
     x, y = m.unknown("x"), m.unknown("y")
     m.potential(sp.Max(x + y, 0) ** 3 + (x - y) ** 4)
-    assert list(linearise._modal(m.finish()))
+    assert list(modal.through_interfaces(m.finish()))

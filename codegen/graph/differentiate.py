@@ -1,0 +1,179 @@
+"""Differentiation on the graph: reverse for gradients, forward along one direction.
+
+Both know AceGen's exceptions (Korelc 2002): an intermediate may be held `constant`, or have a
+`given` derivative with respect to chosen nodes, for one differentiation.
+
+A branch is differentiated side by side and stays a branch, so that nothing of the side that is
+not taken is ever evaluated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.partials import Partials, partials
+from softehl.codegen.graph.traverse import reachable
+
+Given = Mapping[Node, Mapping[Node, Node]]
+"""Derivatives that a page gives: of a node with respect to others."""
+
+
+@dataclass
+class Dependence:
+    """Which nodes depend on chosen ones, given the exceptions of one differentiation."""
+
+    sources: Collection[Node]
+    constant: Collection[Node] = ()
+    given: Given = field(default_factory=dict)
+    _known: dict[Node, bool] = field(default_factory=dict)
+
+    def __call__(self, n: Node) -> bool:
+        for m in reachable([n], stop=self._known.__contains__):
+            if m not in self._known:
+                self._known[m] = self._decide(m)
+        return self._known[n]
+
+    def _decide(self, m: Node) -> bool:
+        if m in self.sources:
+            return True
+        if m in self.constant:
+            return False
+        operands: Iterable[Node] = self.given.get(m, m.args)
+        return any(self(a) for a in operands)
+
+
+def gradient(
+    g: Graph,
+    root: Node,
+    wrt: Sequence[Node],
+    *,
+    constant: Collection[Node] = (),
+    given: Given | None = None,
+    named: Collection[Node] = (),
+) -> dict[Node, Node]:
+    """Adjoints of every node on the way from `wrt` to the scalar `root` (reverse mode).
+
+    The adjoints of `named` nodes get a name of their own, so that a second differentiation
+    meets them as they are and not merged into other expressions.
+
+    For a node that varies with the quadrature point the adjoint is that of the summand: it is
+    to be contracted with the node's own dependence and summed by the caller.
+    """
+    sweep = _Reverse(g, Dependence(tuple(wrt), constant, given or {}), named=named)
+    adjoint = sweep.run(root)
+    return {**dict.fromkeys(wrt, g.zero), **adjoint}
+
+
+@dataclass
+class _Reverse:
+    g: Graph
+    depends: Dependence
+    flat: bool = False
+    stop: Collection[Node] = ()
+    named: Collection[Node] = ()
+    adjoint: dict[Node, Node] = field(default_factory=dict)
+    summands: dict[Node, Node] = field(default_factory=dict)
+
+    def run(self, root: Node) -> dict[Node, Node]:
+        self.adjoint[root] = self.g.one
+        for n in reversed(reachable([root, *self._hidden()])):
+            if not self.depends(n):
+                continue
+            if n in self.summands:
+                self._accumulate(self.adjoint, n, self.g.sum(self.summands.pop(n)))
+            seed = self.adjoint.get(n)
+            if seed is not None and n in self.named and seed.op is not Op.NAME:
+                seed = self.adjoint[n] = self.g.name(f"d_{n.payload}", seed)
+            if seed is not None and n not in self.stop and n not in self.depends.sources:
+                self._propagate(n, seed)
+        return self.adjoint
+
+    def _hidden(self) -> list[Node]:
+        """Nodes that only a given derivative refers to."""
+        return [k for pairs in self.depends.given.values() for k in pairs]
+
+    def _propagate(self, n: Node, seed: Node) -> None:
+        if n.op is Op.SUM:
+            self._accumulate(self.adjoint, n.args[0], seed)
+            return
+        for a, p in self._local(n):
+            if self.depends(a):
+                into = self.summands if n.varying > a.varying and not self.flat else self.adjoint
+                self._accumulate(into, a, guarded(self.g, seed, p))
+
+    def _local(self, n: Node) -> Partials:
+        if n in self.depends.given:
+            return list(self.depends.given[n].items())
+        if n.op is Op.BRANCH:
+            return self._branch(n)
+        return partials(self.g, n)
+
+    def _branch(self, n: Node) -> Partials:
+        """Both sides differentiated with respect to the nearest named values and inputs."""
+        condition, then, otherwise = n.args
+
+        def leaf(m: Node) -> bool:
+            named = m.op in (Op.NAME, Op.INPUT, Op.SUM) or m in self.depends.sources
+            return m is not n and (named or m in self.stop)
+
+        frontier = [m for m in reachable([then, otherwise], stop=leaf) if leaf(m)]
+        frontier = [m for m in frontier if self.depends(m)]
+        sides = [
+            _Reverse(self.g, self.depends, flat=True, stop=frontier).run(side)
+            for side in (then, otherwise)
+        ]
+        zero = self.g.zero
+        return [
+            (f, self.g.branch(condition, sides[0].get(f, zero), sides[1].get(f, zero)))
+            for f in frontier
+        ]
+
+    def _accumulate(self, into: dict[Node, Node], n: Node, value: Node) -> None:
+        into[n] = plus(self.g, into[n], value) if n in into else value
+
+
+def directional(
+    g: Graph, roots: Sequence[Node], seeds: Mapping[Node, Node], given: Given | None = None
+) -> list[Node]:
+    """Derivatives of `roots` when each key of `seeds` moves at the rate of its value (forward)."""
+    depends = Dependence(tuple(seeds), (), given or {})
+    rate: dict[Node, Node] = {}
+    for n in reachable([*roots, *(k for pairs in depends.given.values() for k in pairs)]):
+        if n in seeds:
+            rate[n] = seeds[n]
+        elif not depends(n):
+            rate[n] = g.zero
+        elif n.op is Op.SUM:
+            rate[n] = g.sum(rate[n.args[0]])
+        elif n.op is Op.BRANCH:
+            rate[n] = g.branch(n.args[0], rate[n.args[1]], rate[n.args[2]])
+        else:
+            rate[n] = g.zero
+            pairs = list(depends.given[n].items()) if n in depends.given else partials(g, n)
+            for a, p in pairs:
+                rate[n] = plus(g, rate[n], guarded(g, p, rate[a]))
+    return [rate[r] for r in roots]
+
+
+def guarded(g: Graph, a: Node, b: Node) -> Node:
+    """Product that goes inside a branch with a zero side: what is not taken is never evaluated."""
+    for x, y in ((a, b), (b, a)):
+        if x.op is Op.NEG and x.args[0].op is Op.BRANCH:
+            return g.neg(guarded(g, x.args[0], y))
+        if x.op is Op.BRANCH and g.zero in x.args[1:]:
+            c, then, otherwise = x.args
+            return g.branch(c, guarded(g, then, y), guarded(g, otherwise, y))
+    return g.mul(a, b)
+
+
+def plus(g: Graph, a: Node, b: Node) -> Node:
+    """Sum that joins two branches with a zero on the same side of the same condition."""
+    if a.op is Op.BRANCH and b.op is Op.BRANCH and a.args[0] is b.args[0]:
+        for k in (1, 2):
+            if a.args[k] is g.zero and b.args[k] is g.zero:
+                return g.branch(
+                    a.args[0], plus(g, a.args[1], b.args[1]), plus(g, a.args[2], b.args[2])
+                )
+    return g.add(a, b)

@@ -1,0 +1,86 @@
+"""Local derivatives of a node with respect to its operands."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Routine
+
+Partials = list[tuple[Node, Node]]
+
+
+class DifferentiationError(ValueError):
+    """The model asks for a derivative that has no meaning in a kernel."""
+
+
+def partials(g: Graph, n: Node) -> Partials:
+    """Local derivatives of `n` with respect to its operands (not for BRANCH and SUM)."""
+    if not n.args or n.op in BOOLEAN or n.op is Op.CALL:
+        return []
+    if n.op is Op.ITEM:
+        routine = n.args[0].payload
+        assert isinstance(routine, Routine)
+        return routine.partials(g, n)
+    a = n.args[0]
+    match n.op:
+        case Op.NAME:
+            return [(a, g.one)]
+        case Op.ADD:
+            return [(a, g.one), (n.args[1], g.one)]
+        case Op.SUB:
+            return [(a, g.one), (n.args[1], g.neg(g.one))]
+        case Op.MUL:
+            b = n.args[1]
+            return [(a, g.mul(g.const(2), a))] if a is b else [(a, b), (b, a)]
+        case Op.NEG:
+            return [(a, g.neg(g.one))]
+        case Op.ATAN2:
+            x = n.args[1]
+            scale = g.recip(g.add(g.mul(a, a), g.mul(x, x)))
+            return [(a, g.mul(x, scale)), (x, g.neg(g.mul(a, scale)))]
+        case _:
+            return [(a, _derivative_of_call(g, n, a))]
+
+
+def _derivative_of_call(g: Graph, n: Node, a: Node) -> Node:
+    match n.op:
+        case Op.RECIP:
+            return g.neg(g.mul(n, n))
+        case Op.POW:
+            assert isinstance(n.payload, Fraction)
+            return g.mul(g.const(n.payload), g.power(a, n.payload - 1))
+        case Op.SQRT:
+            return g.mul(g.const(Fraction(1, 2)), g.recip(n))
+        case Op.CBRT:
+            return g.mul(g.const(Fraction(1, 3)), g.recip(g.mul(n, n)))
+        case Op.RCBRT:
+            return g.neg(g.mul(g.const(Fraction(1, 3)), g.mul(n, g.recip(a))))
+        case Op.LOG:
+            return g.recip(a)
+        case Op.EXP:
+            return n
+        case Op.SIN:
+            return g.call(Op.COS, a)
+        case Op.COS:
+            return g.neg(g.call(Op.SIN, a))
+        case Op.TAN:
+            return g.add(g.one, g.mul(n, n))
+        case Op.ASIN:
+            return g.recip(g.call(Op.SQRT, _one_minus_square(g, a)))
+        case Op.ACOS:
+            return g.neg(g.recip(g.call(Op.SQRT, _one_minus_square(g, a))))
+        case Op.ATAN:
+            return g.recip(g.add(g.one, g.mul(a, a)))
+        case Op.SINH:
+            return g.call(Op.COSH, a)
+        case Op.COSH:
+            return g.call(Op.SINH, a)
+        case Op.TANH:
+            return g.sub(g.one, g.mul(n, n))
+        case _:
+            raise DifferentiationError(f"no derivative rule for {n.op}")
+
+
+def _one_minus_square(g: Graph, a: Node) -> Node:
+    """(1 - a)(1 + a), which keeps its digits near a = 1."""
+    return g.mul(g.sub(g.one, a), g.add(g.one, a))

@@ -1,0 +1,63 @@
+"""Walking a graph and building it anew: what lies below some roots, and roots of changed nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+
+from softehl.codegen.graph.graph import FREE, Graph, Node, Op
+
+
+def reachable(roots: Iterable[Node], stop: Callable[[Node], bool] | None = None) -> list[Node]:
+    """All nodes below `roots` (operands of nodes that satisfy `stop` excluded), ids ascending."""
+    seen: dict[int, Node] = {}
+    stack = list(roots)
+    while stack:
+        n = stack.pop()
+        if n.id in seen:
+            continue
+        seen[n.id] = n
+        if stop is None or not stop(n):
+            stack.extend(n.args)
+    return [seen[i] for i in sorted(seen)]
+
+
+def operations(roots: Iterable[Node]) -> int:
+    """Number of run-time operations below `roots` (each shared value counted once)."""
+    free = (Op.SUM, Op.ITEM)
+    return sum(1 for n in reachable(roots) if n.op not in FREE and n.op not in free)
+
+
+Rule = Callable[[Graph, Node, tuple[Node, ...]], Node]
+
+
+def rewrite(g: Graph, roots: Sequence[Node], rule: Rule) -> list[Node]:
+    """Rebuild bottom-up: `rule` gets each old node with its rebuilt operands."""
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        new[n] = rule(g, n, tuple(new[a] for a in n.args))
+    return [new[r] for r in roots]
+
+
+def strip(
+    g: Graph, roots: Sequence[Node], keep: Collection[Node]
+) -> tuple[list[Node], dict[Node, Node]]:
+    """Roots without names, but for those of `keep`; also where each kept one went."""
+    new: dict[Node, Node] = {}
+    for n in reachable(roots):
+        args = tuple(new[a] for a in n.args)
+        named = n.op is Op.NAME and n not in keep
+        new[n] = args[0] if named else g.rebuild(n.op, args, n.payload)
+    return [new[r] for r in roots], {n: new[n] for n in keep if n in new}
+
+
+def substitute(
+    g: Graph, roots: Sequence[Node], replacement: Mapping[Node, Node]
+) -> tuple[list[Node], dict[Node, Node]]:
+    """Roots with the keys of `replacement` replaced; also what every old node became."""
+    new: dict[Node, Node] = {}
+    for n in reachable(roots, stop=replacement.__contains__):
+        if n in replacement:
+            new[n] = replacement[n]
+        else:
+            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+    return [new[r] for r in roots], new

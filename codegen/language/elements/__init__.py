@@ -1,0 +1,1 @@
+"""Elements: shape functions, quadrature rules and unit cells."""
