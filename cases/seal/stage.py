@@ -85,29 +85,15 @@ class Walker:
 
     def _follow(self, stage: Stage, x0: Array, report: Callable[[Point], None]) -> Branch:
         patient = replace(self.newton, max_iterations=self.patience)
-        first = (stage.corrector or patient).solve(stage.problem_at(stage.start), x0)
-        spent = (first.factorisations, first.iterations)
-        if not first.converged:
-            message = f"{stage.name}: no solution at the start ({first.message})"
-            return Branch((), first.status, message, *spent)
-        report(Point(stage.start, first))
-        if stage.start == stage.stop:
-            point = Point(stage.start, first)
-            return Branch((point,), first.status, f"reached {stage.start:.9g}", *spent)
-        known = iter([_nothing])  # the first point is reported above, with its own history
-        corrector, predictor = stage.corrector or self.newton, stage.predictor
-        branch = Continuation(corrector, stage.steps, predictor, name=stage.name).follow(
-            stage.problem_at,
-            stage.start,
-            stage.stop,
-            first.x,
-            waypoints=stage.waypoints,
-            on_point=lambda point: next(known, report)(point),
+        continuation = Continuation(
+            stage.corrector or self.newton,
+            stage.steps,
+            stage.predictor,
+            name=stage.name,
+            starter=stage.corrector or patient,
         )
-        return replace(
-            branch,
-            factorisations=branch.factorisations + spent[0],
-            iterations=branch.iterations + spent[1],
+        return continuation.follow(
+            stage.problem_at, stage.start, stage.stop, x0, waypoints=stage.waypoints, on_point=report
         )
 
 

@@ -141,7 +141,8 @@ class Continuation:
     caller may have transformed, for instance to log U); predictor: "secant" through the last two
     points, "parabola" through the last three (the secant until there are three), or "previous"
     point; keep_all: keep x at every point, not just the last two;
-    name: what messages call the parameter.
+    name: what messages call the parameter; starter: the corrector of the start, which has no
+    predictor and may deserve more iterations than a step that is better cut (None: the same).
     """
 
     newton: Corrector
@@ -149,6 +150,7 @@ class Continuation:
     predictor: Predictor = "secant"
     keep_all: bool = False
     name: str = "parameter"
+    starter: Corrector | None = None
 
     def follow(
         self,
@@ -170,7 +172,7 @@ class Continuation:
         """
         goals = _goals(start, stop, waypoints)
         log = _Log(self.name, self.keep_all, on_point)
-        solution = log.count(self.newton.solve(problem_at(start), x0))
+        solution = log.count((self.starter or self.newton).solve(problem_at(start), x0))
         if not solution.converged:
             return log.no_start(start, solution)
         here, step = log.accept(start, solution), self.steps.first

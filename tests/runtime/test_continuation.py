@@ -127,6 +127,17 @@ def test_waypoints_and_stop_are_hit_exactly_in_either_direction(start: float, st
     assert [point.solution.x[0] for point in met] == pytest.approx(branch.parameters, rel=1e-9)
 
 
+def test_the_start_may_have_a_corrector_of_its_own() -> None:
+    """Five iterations are too few for a start that is far away, and enough for every step."""
+    short, far = Newton(max_iterations=5), np.array([50.0])
+    failed = Continuation(short, STEPS).follow(line, 1.0, 2.0, far)
+    assert (failed.status, failed.points) == (Status.MAX_ITERATIONS, ())
+    branch = Continuation(short, STEPS, starter=Newton()).follow(line, 1.0, 2.0, far)
+    assert branch.converged
+    assert branch.points[0].solution.iterations > 5
+    assert max(point.solution.iterations for point in branch.points[1:]) <= 5
+
+
 def test_the_last_two_steps_before_a_waypoint_are_equal() -> None:
     branch = natural(StepRule(0.3, 0.3, 0.3)).follow(line, 1.0, 2.0, np.ones(1))
     assert branch.parameters == pytest.approx((1.0, 1.3, 1.6, 1.8, 2.0))
