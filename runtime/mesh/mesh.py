@@ -1,0 +1,249 @@
+"""Meshes: points, cells by kind, named groups of cells, named sides.
+
+    mesh = Mesh.rectangle(48, 44, cells=(16, 16))      # sides "left" "right" "bottom" "top"
+    mesh = mesh.map(lambda x: x * [1, 1.5])            # moved nodes
+    mesh = mesh.with_side("loaded", lambda x: x[:, 0] > 40)
+
+Node orders are those of VTK and meshio, as in `runtime.mesh.cells`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+Faces: TypeAlias = Mapping[str, Integers]
+"""Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
+Shape = Literal["quad", "serendipity", "triangle", "hex", "tetrahedron"]
+Predicate = Callable[[Array], NDArray[np.bool_]]
+"""Of places (n, dim): which of them are meant, (n,)."""
+
+
+class MeshError(ValueError):
+    """A mesh, or a name in it, cannot be used; the message says what is there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Points and cells, with names.
+
+    points: (n, dim) places of the nodes. cells: kind -> node numbers (m, k). groups: name -> kind
+    -> numbers of cells of that kind. sides: name -> faces, from outside counterclockwise.
+    """
+
+    points: Array
+    cells: Mapping[str, Integers]
+    groups: Mapping[str, Mapping[str, Integers]] = field(default_factory=dict)
+    sides: Mapping[str, Faces] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Raises MeshError for an unknown kind of cell or a wrong number of nodes."""
+        if self.points.ndim != 2 or not np.isfinite(self.points).all():
+            raise MeshError(f"points have shape {self.points.shape}, must be (n, dim) and finite")
+        faces = [faces for side in self.sides.values() for faces in side.items()]
+        for name, nodes in (*self.cells.items(), *faces):
+            if name not in CELLS:
+                raise MeshError(f"no cells {name!r}{meant(name, CELLS)}")
+            count = len(CELLS[name].nodes)
+            if nodes.ndim != 2 or nodes.shape[1] != count:
+                raise MeshError(f"{name} has nodes of shape {nodes.shape}, must be (m, {count})")
+            if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(self.points):
+                raise MeshError(f"{name}: node numbers go beyond the {len(self.points)} points")
+
+    # making one ---------------------------------------------------------------------------------
+
+    @classmethod
+    def line(cls, length: float, *, cells: int, order: int = 1) -> Mesh:
+        """A line from 0 to `length`; sides "left" and "right"."""
+        from softehl.runtime.mesh.structured import grid
+
+        return grid((length,), (cells,), order, "quad")
+
+    @classmethod
+    def rectangle(
+        cls,
+        width: float,
+        height: float,
+        *,
+        cells: tuple[int, int],
+        order: int = 1,
+        shape: Shape = "quad",
+    ) -> Mesh:
+        """[0, width] x [0, height]; sides "left" "right" (x), "bottom" "top" (y).
+
+        shape: "quad" (quad4, quad9), "serendipity" (quad8) or "triangle" (tri3, tri6).
+        """
+        from softehl.runtime.mesh.structured import grid
+
+        return grid((width, height), cells, order, shape)
+
+    @classmethod
+    def box(
+        cls,
+        size: Sequence[float],
+        *,
+        cells: tuple[int, int, int],
+        order: int = 1,
+        shape: Shape = "hex",
+    ) -> Mesh:
+        """[0, a] x [0, b] x [0, c]; "left" "right" (x), "front" "back" (y), "bottom" "top" (z).
+
+        shape: "hex" (hex8, hex27), "serendipity" (hex20) or "tetrahedron" (tet4, tet10).
+        """
+        from softehl.runtime.mesh.structured import grid
+
+        return grid(tuple(size), cells, order, shape)
+
+    @classmethod
+    def read(cls, path: str | Path) -> Mesh:
+        """A mesh file of any format that meshio reads; its groups become names.
+
+        Raises MeshError where the file cannot be read or holds other cells than ours.
+        """
+        from softehl.runtime.mesh.files import read
+
+        return read(Path(path))
+
+    def write(self, path: str | Path) -> None:
+        """Write the mesh in the format of the file name; Gmsh's .msh keeps the names.
+
+        Raises MeshError.
+        """
+        from softehl.runtime.mesh.files import write
+
+        write(self, Path(path))
+
+    # another one from it ------------------------------------------------------------------------
+
+    def map(self, move: Callable[[Array], Array]) -> Mesh:
+        """The mesh with nodes at `move(points)`, (n, dim) -> (n, dim)."""
+        moved = np.asarray(move(self.points), dtype=np.float64)
+        if moved.ndim != 2 or len(moved) != len(self.points):
+            raise MeshError(f"map: shape {moved.shape} from {self.points.shape}")
+        return replace(self, points=moved)
+
+    def with_side(self, name: str, where: Predicate) -> Mesh:
+        """The mesh with one more named side: faces of the boundary all of whose nodes are meant."""
+        return replace(self, sides={**self.sides, name: self._meant_faces(where, name)})
+
+    def with_group(self, name: str, where: Predicate) -> Mesh:
+        """The mesh with one more named group: the cells whose centre is meant."""
+        chosen = {}
+        for kind, nodes in self.cells.items():
+            inside = _told(where, self.points[nodes].mean(axis=1), name)
+            chosen[kind] = np.flatnonzero(inside)
+        if not any(map(len, chosen.values())):
+            raise MeshError(f"group {name!r}: no cell is meant")
+        return replace(self, groups={**self.groups, name: chosen})
+
+    # looking at it ------------------------------------------------------------------------------
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates."""
+        return int(self.points.shape[1])
+
+    @cached_property
+    def boundary(self) -> Faces:
+        """Every face that belongs to one cell only."""
+        found: dict[str, list[Integers]] = {}
+        for kind, nodes in self.cells.items():
+            for face, local in CELLS[kind].side_nodes:
+                found.setdefault(face.name, []).append(nodes[:, list(local)])
+        return {name: _once(np.concatenate(parts), CELLS[name]) for name, parts in found.items()}
+
+    def faces(self, where: str | Predicate) -> Faces:
+        """Faces of a named side, or those of the boundary all of whose nodes are meant."""
+        if callable(where):
+            return self._meant_faces(where, "the predicate")
+        if where == "boundary" and where not in self.sides:
+            return self.boundary
+        if where not in self.sides:
+            known = ", ".join([*self.sides, "boundary"])
+            raise MeshError(f"no side {where!r}{meant(where, self.sides)}; there are {known}")
+        return self.sides[where]
+
+    def nodes(self, where: str | Predicate) -> Integers:
+        """Numbers of the nodes of a side or group, or of those that are meant; sorted."""
+        if callable(where):
+            chosen = np.flatnonzero(_told(where, self.points, "the predicate"))
+            if not len(chosen):
+                raise MeshError("no node is meant by the predicate")
+            return chosen
+        if where in self.groups and where not in self.sides:
+            parts = [self.cells[kind][chosen] for kind, chosen in self.groups[where].items()]
+        else:
+            parts = list(self.faces(where).values())
+        return np.unique(np.concatenate([part.ravel() for part in parts]))
+
+    def cells_of(self, group: str | None) -> Mapping[str, Integers]:
+        """Kind -> node numbers (m, k) of the cells of a group, of all cells for None."""
+        if group is None:
+            return self.cells
+        if group not in self.groups:
+            known = ", ".join(self.groups) or "none"
+            raise MeshError(f"no group {group!r}{meant(group, self.groups)}; there are {known}")
+        return {kind: self.cells[kind][chosen] for kind, chosen in self.groups[group].items()}
+
+    def check(self) -> None:
+        """Raise MeshError for a cell that is turned inside out: its number and place."""
+        for kind, nodes in self.cells.items():
+            cell = CELLS[kind]
+            if cell.dimension != self.dimension or not len(nodes):
+                continue
+            places = self.points[nodes]
+            smallest = jacobians(cell, places, cell.rule(2)[0]).min(axis=1)
+            worst = int(smallest.argmin())
+            if smallest[worst] <= 0.0:
+                count = int((smallest <= 0.0).sum())
+                raise MeshError(
+                    f"{count} of {len(nodes)} {kind} are turned inside out or flat, such as number "
+                    f"{worst} at {_place(places[worst].mean(axis=0))}: number its nodes in the "
+                    "order of VTK (in the plane counterclockwise)"
+                )
+
+    def _meant_faces(self, where: Predicate, name: str) -> Faces:
+        inside = _told(where, self.points, name)
+        found = {kind: faces[inside[faces].all(axis=1)] for kind, faces in self.boundary.items()}
+        if not any(map(len, found.values())):
+            raise MeshError(f"side {name!r}: no face of the boundary has all its nodes there")
+        return {kind: faces for kind, faces in found.items() if len(faces)}
+
+
+def meant(given: object, known: Iterable[str]) -> str:
+    """A hint at the name that was probably meant, or nothing."""
+    close = difflib.get_close_matches(str(given), list(known), n=1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def _told(where: Predicate, places: Array, name: str) -> NDArray[np.bool_]:
+    chosen = np.asarray(where(places))
+    if chosen.shape != (len(places),) or chosen.dtype != np.bool_:
+        raise MeshError(
+            f"{name}: a predicate takes places of shape {places.shape} and gives booleans of shape "
+            f"({len(places)},); this one gave {chosen.dtype} of shape {chosen.shape}"
+        )
+    return chosen
+
+
+def _once(faces: Integers, kind: Cell) -> Integers:
+    """The rows whose corners occur only once."""
+    corners = np.sort(faces[:, : kind.corners], axis=1)
+    _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
+    return np.ascontiguousarray(faces[np.sort(first[count == 1])])
+
+
+def _place(x: Array) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in x) + ")"

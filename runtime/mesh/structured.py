@@ -1,0 +1,102 @@
+"""Structured meshes of lines, rectangles and boxes, of every kind of cell, with named sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.mesh import Integers, Mesh, MeshError
+
+KINDS = {
+    (1, "quad"): ("line2", "line3"),
+    (2, "quad"): ("quad4", "quad9"),
+    (2, "serendipity"): ("", "quad8"),
+    (2, "triangle"): ("tri3", "tri6"),
+    (3, "hex"): ("hex8", "hex27"),
+    (3, "serendipity"): ("", "hex20"),
+    (3, "tetrahedron"): ("tet4", "tet10"),
+}
+"""(dimension, shape) -> kinds of order 1 and 2."""
+
+SIDES = {1: ("left", "right"), 2: ("left", "right", "bottom", "top")}
+SIDES[3] = ("left", "right", "front", "back", "bottom", "top")
+"""Names of the sides at the smallest and largest x, y and z."""
+
+
+def grid(size: Sequence[float], cells: int | Sequence[int], order: int, shape: str) -> Mesh:
+    """A line, rectangle or box from the origin.  Raises MeshError."""
+    dimension = len(size)
+    kind = _kind(dimension, order, shape)
+    counts = tuple(cells) if isinstance(cells, Sequence) else (cells,)
+    if len(counts) != dimension or not all(isinstance(n, int) and n > 0 for n in counts):
+        raise MeshError(f"cells = {cells}: {dimension} numbers of at least 1 are needed")
+    if not all(np.isfinite(length) and length > 0 for length in size):
+        raise MeshError(f"size = {tuple(size)}: lengths must be positive")
+    axes = [np.linspace(0.0, a, order * n + 1) for a, n in zip(size, counts, strict=True)]
+    points = np.stack([x.ravel(order="F") for x in np.meshgrid(*axes, indexing="ij")], axis=1)
+    nodes = _numbers(kind, counts, order)
+    used, renumbered = np.unique(nodes, return_inverse=True)
+    mesh = Mesh(points[used], {kind: renumbered.reshape(nodes.shape).astype(np.int64)})
+    return Mesh(mesh.points, mesh.cells, sides=_sides(mesh, size))
+
+
+def _kind(dimension: int, order: int, shape: str) -> str:
+    allowed = [name for d, name in KINDS if d == dimension]
+    if (dimension, shape) not in KINDS:
+        raise MeshError(f"shape = {shape!r}: allowed are {', '.join(allowed)}")
+    kind = KINDS[dimension, shape][order - 1] if order in (1, 2) else ""
+    if not kind:
+        orders = "2" if shape == "serendipity" else "1 or 2"
+        raise MeshError(f"order = {order}: {shape} cells have order {orders}")
+    return kind
+
+
+def _numbers(kind: str, counts: Sequence[int], order: int) -> Integers:
+    """Node numbers (m, k) of the cells in the grid of all nodes, x running first."""
+    strides = np.cumprod([1, *(order * n + 1 for n in counts[:-1])])
+    steps = np.meshgrid(*(order * np.arange(n) for n in counts), indexing="ij")
+    origins = sum(s.ravel(order="F") * stride for s, stride in zip(steps, strides, strict=True))
+    if kind[:3] in ("tri", "tet"):
+        parts = [_simplex(kind, corners) for corners in _simplices(len(counts))]
+    else:
+        parts = [0.5 * (CELLS[kind].nodes + 1.0)]
+    local = [np.rint(order * part).astype(np.int64) @ strides for part in parts]
+    rows = np.asarray(origins)[:, None, None] + np.array(local)[None]
+    return np.asarray(rows.reshape(-1, rows.shape[-1]))
+
+
+def _simplices(dimension: int) -> list[NDArray[np.float64]]:
+    """Corners of the simplices that share the main diagonal of the unit cube, positive all."""
+    found = []
+    for order in permutations(range(dimension)):
+        corners = np.zeros((dimension + 1, dimension))
+        for k, axis in enumerate(order):
+            corners[k + 1] = corners[k]
+            corners[k + 1, axis] = 1.0
+        if np.linalg.det(corners[1:] - corners[0]) < 0.0:
+            corners[[-1, -2]] = corners[[-2, -1]]
+        found.append(corners)
+    return found
+
+
+def _simplex(kind: str, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    flat = CELLS["tri3" if kind.startswith("tri") else "tet4"]
+    return np.asarray(flat.shape(CELLS[kind].nodes) @ corners)
+
+
+def _sides(mesh: Mesh, size: Sequence[float]) -> dict[str, dict[str, Integers]]:
+    """Faces at the smallest and largest coordinate of each axis."""
+    if mesh.dimension == 1:
+        ends = (mesh.points[:, 0].argmin(), mesh.points[:, 0].argmax())
+        return {n: {"point1": np.array([[e]])} for n, e in zip(SIDES[1], ends, strict=True)}
+    named = {}
+    for k, name in enumerate(SIDES[mesh.dimension]):
+        axis, bound = k // 2, (0.0, size[k // 2])[k % 2]
+        there = np.abs(mesh.points[:, axis] - bound) <= 1e-12 * size[axis]
+        faces = {kind: f[there[f].all(axis=1)] for kind, f in mesh.boundary.items()}
+        named[name] = {kind: f for kind, f in faces.items() if len(f)}
+    return named

@@ -1,0 +1,189 @@
+"""Meshes of every kind of cell: shapes, rules, sides, names, files, and what is refused."""
+
+from __future__ import annotations
+
+from itertools import product
+from math import factorial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softehl.runtime.mesh.cells import CELLS, Cell, measures
+from softehl.runtime.mesh.mesh import Mesh, MeshError
+
+PLANE = [("quad", 1), ("quad", 2), ("serendipity", 2), ("triangle", 1), ("triangle", 2)]
+SPACE = [("hex", 1), ("hex", 2), ("serendipity", 2), ("tetrahedron", 1), ("tetrahedron", 2)]
+
+
+def made(shape: str, order: int) -> Mesh:
+    """A mesh of [0, 3] x [0, 2] (x [0, 1])."""
+    if (shape, order) in PLANE and shape != "serendipity":
+        return Mesh.rectangle(3.0, 2.0, cells=(3, 2), order=order, shape=shape)  # type: ignore[arg-type]
+    return Mesh.box((3.0, 2.0, 1.0), cells=(3, 2, 2), order=order, shape=shape)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("cell", CELLS.values(), ids=CELLS)
+def test_shapes_are_a_partition_of_unity_and_nodal(cell: Cell, rng: np.random.Generator) -> None:
+    at = rng.uniform(0.1, 0.3, (5, cell.dimension))
+    np.testing.assert_allclose(cell.shape(cell.nodes), np.eye(len(cell.nodes)), atol=1e-14)
+    np.testing.assert_allclose(cell.shape(at).sum(axis=1), 1.0, rtol=1e-13)
+    for d in range(cell.dimension):
+        step = 1e-6 * np.eye(cell.dimension)[d]
+        slope = (cell.shape(at + step) - cell.shape(at - step)) / 2e-6
+        np.testing.assert_allclose(cell.gradient(at)[:, :, d], slope, atol=1e-9)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 5, 8])
+@pytest.mark.parametrize("name", ["line2", "tri3", "quad4", "tet4", "hex8", "wedge6"])
+def test_rules_are_exact_to_their_degree(name: str, degree: int) -> None:
+    cell = CELLS[name]
+    points, weights = cell.rule(degree)
+    for powers in product(range(degree + 1), repeat=cell.dimension):
+        if sum(powers) <= degree:
+            found = float(weights @ np.prod(points ** np.array(powers), axis=1))
+            assert found == pytest.approx(exact(name, powers), abs=1e-13)
+
+
+def exact(name: str, powers: tuple[int, ...]) -> float:
+    """Integral of a monomial over the parent element."""
+
+    def on_line(power: int) -> float:
+        return 2.0 / (power + 1) if power % 2 == 0 else 0.0
+
+    def on_simplex(*p: int) -> float:
+        return float(np.prod([factorial(k) for k in p])) / factorial(sum(p) + len(p))
+
+    if name in ("tri3", "tet4"):
+        return on_simplex(*powers)
+    if name == "wedge6":
+        return on_simplex(*powers[:2]) * on_line(powers[2])
+    return float(np.prod([on_line(p) for p in powers]))
+
+
+def outflow(mesh: Mesh) -> float:
+    """Integral of x . n over the boundary: dim times the volume, if faces look outwards."""
+    total = 0.0
+    for kind, faces in mesh.boundary.items():
+        cell = CELLS[kind]
+        points, weights = cell.rule(4)
+        places = mesh.points[faces]
+        slope = np.einsum("qkd,nkc->nqcd", cell.gradient(points), places)
+        if mesh.dimension == 2:
+            normal = np.stack([slope[:, :, 1, 0], -slope[:, :, 0, 0]], axis=2)
+        else:
+            normal = np.cross(slope[..., 0], slope[..., 1])
+        x = np.einsum("qk,nkc->nqc", cell.shape(points), places)
+        total += float(np.einsum("nqc,nqc,q->", x, normal, weights))
+    return total
+
+
+@pytest.mark.parametrize(("shape", "order"), [*PLANE, *SPACE])
+def test_structured_meshes_and_their_sides(shape: str, order: int) -> None:
+    mesh = made(shape, order)
+    mesh.check()
+    volume = 6.0
+    assert outflow(mesh) == pytest.approx(mesh.dimension * volume, rel=1e-12)
+    lengths = {"left": 2.0, "right": 2.0, "bottom": 3.0, "top": 3.0}
+    if mesh.dimension == 3:
+        lengths |= {"front": 3.0, "back": 3.0, "bottom": 6.0, "top": 6.0}
+    for name, length in lengths.items():
+        total = 0.0
+        for kind, faces in mesh.faces(name).items():
+            points, weights = CELLS[kind].rule(2)
+            total += float((measures(CELLS[kind], mesh.points[faces], points) @ weights).sum())
+        assert total == pytest.approx(length, rel=1e-12)
+
+
+def test_a_face_that_looks_inwards_is_seen() -> None:
+    mesh = made("hex", 1)
+    kind, faces = next(iter(mesh.boundary.items()))
+    turned = faces.copy()
+    turned[faces.max(axis=1).argmax()] = turned[faces.max(axis=1).argmax(), ::-1]
+    object.__setattr__(mesh, "boundary", {kind: turned})
+    assert outflow(mesh) != pytest.approx(18.0, rel=1e-3)
+
+
+def test_line() -> None:
+    mesh = Mesh.line(2.0, cells=4, order=2)
+    assert mesh.cells["line3"].shape == (4, 3)
+    assert mesh.points[mesh.nodes("right"), 0] == pytest.approx([2.0])
+
+
+def test_map_and_names() -> None:
+    mesh = made("quad", 1).map(lambda x: x * [2.0, 1.0])
+    mesh = mesh.with_side("corner", lambda x: (x[:, 0] > 3.9) & (x[:, 1] < 0.1))
+    mesh = mesh.with_group("upper", lambda x: x[:, 1] > 1.0)
+    assert {kind: len(faces) for kind, faces in mesh.faces("corner").items()} == {"line2": 1}
+    assert len(mesh.cells_of("upper")["quad4"]) == 3
+    assert set(mesh.points[mesh.nodes("upper"), 1]) == {1.0, 2.0}
+    assert mesh.points[mesh.nodes(lambda x: x[:, 0] == 0.0), 0].max() == 0.0
+
+
+@pytest.mark.parametrize(("shape", "order"), [*PLANE, *SPACE])
+def test_gmsh_files_keep_everything(shape: str, order: int, tmp_path: Path) -> None:
+    mesh = made(shape, order)
+    mesh = mesh.with_group("half", lambda x: x[:, 0] < 1.5)
+    path = tmp_path / "part.msh"
+    mesh.write(path)
+    again = Mesh.read(path)
+    np.testing.assert_allclose(again.points, mesh.points, atol=1e-15)
+    assert again.cells.keys() == mesh.cells.keys()
+    for kind, nodes in mesh.cells.items():
+        np.testing.assert_array_equal(again.cells[kind], nodes)
+        np.testing.assert_array_equal(again.groups["half"][kind], mesh.groups["half"][kind])
+    assert again.sides.keys() == mesh.sides.keys()
+    for name, side in mesh.sides.items():
+        for kind, faces in side.items():
+            np.testing.assert_array_equal(np.sort(again.sides[name][kind]), np.sort(faces))
+    assert outflow(again) == pytest.approx(outflow(mesh))
+
+
+def test_other_formats_keep_points_and_cells(tmp_path: Path) -> None:
+    mesh = made("triangle", 2)
+    mesh.write(tmp_path / "part.vtu")
+    again = Mesh.read(tmp_path / "part.vtu")
+    np.testing.assert_array_equal(again.cells["tri6"], mesh.cells["tri6"])
+
+
+def test_unused_points_of_a_file_are_dropped(tmp_path: Path) -> None:
+    mesh = made("quad", 1)
+    more = Mesh(np.vstack([[[9.0, 9.0]], mesh.points]), {"quad4": mesh.cells["quad4"] + 1})
+    more.write(tmp_path / "part.msh")
+    again = Mesh.read(tmp_path / "part.msh")
+    assert len(again.points) == len(mesh.points)
+    assert outflow(again) == pytest.approx(12.0)
+
+
+def test_what_is_refused(tmp_path: Path) -> None:
+    mesh = made("quad", 1)
+    turned = Mesh(mesh.points, {"quad4": mesh.cells["quad4"][:, ::-1]})
+    with pytest.raises(MeshError, match=r"6 of 6 quad4 .* number 0 at \(0.5, 0.5\)"):
+        turned.check()
+    with pytest.raises(MeshError, match=r"no side 'rigth' \(did you mean 'right'\?\)"):
+        mesh.faces("rigth")
+    with pytest.raises(MeshError, match=r"no group 'x'; there are none"):
+        mesh.cells_of("x")
+    with pytest.raises(MeshError, match="no face of the boundary"):
+        mesh.with_side("none", lambda x: x[:, 0] > 100.0)
+    with pytest.raises(MeshError, match="booleans of shape"):
+        mesh.with_side("none", lambda x: x)  # type: ignore[arg-type, return-value]
+    with pytest.raises(MeshError, match="order = 1: serendipity cells have order 2"):
+        Mesh.rectangle(1, 1, cells=(1, 1), shape="serendipity")
+    with pytest.raises(MeshError, match="allowed are quad, serendipity, triangle"):
+        Mesh.rectangle(1, 1, cells=(1, 1), shape="hex")
+    with pytest.raises(MeshError, match="2 numbers of at least 1"):
+        Mesh.rectangle(1, 1, cells=(0, 1))
+    with pytest.raises(MeshError, match="lengths must be positive"):
+        Mesh.rectangle(-1, 1, cells=(1, 1))
+    with pytest.raises(MeshError, match=r"no cells 'quad5' \(did you mean 'quad"):
+        Mesh(mesh.points, {"quad5": mesh.cells["quad4"]})
+    with pytest.raises(MeshError, match=r"must be \(m, 4\)"):
+        Mesh(mesh.points, {"quad4": mesh.cells["quad4"][:, :3]})
+    with pytest.raises(MeshError, match="beyond the 12 points"):
+        Mesh(mesh.points, {"quad4": mesh.cells["quad4"] + 1})
+    with pytest.raises(MeshError, match="no mesh file"):
+        Mesh.read(tmp_path / "missing.msh")
+    (tmp_path / "bad.msh").write_text("nothing of a mesh\n")
+    with pytest.raises(MeshError, match=r"bad\.msh"):
+        Mesh.read(tmp_path / "bad.msh")
