@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.problem import Array, Case, Elements, Result
+from benchmarks.problem import Case, Elements, Result
+from softehl.runtime.arrays import Array
 
 ENTRY = """void bench_entry(
     ptrdiff_t n, const double *X, const double *u, const double *p, double *values,

@@ -11,7 +11,8 @@ import numpy as np
 from benchmarks.candidate import Candidate
 from benchmarks.compiling import run
 from benchmarks.deriving import TimeLimitError
-from benchmarks.problem import Array, Elements
+from benchmarks.problem import Elements
+from softehl.runtime.arrays import Array
 
 HEADER = Path(__file__).resolve().with_name("counted.hpp")
 FLAGS = ("-std=gnu++20", "-O0", "-w", "-fpermissive")

@@ -12,9 +12,10 @@ from benchmarks import compiling, counting
 from benchmarks.candidate import Candidate
 from benchmarks.compiling import COMMON_FLAGS, CompileError, Compiler
 from benchmarks.deriving import DerivationError, TimeLimitError, derive
-from benchmarks.problem import TOLERANCE, Array, Case, Result, deviation, elements, reference
+from benchmarks.problem import TOLERANCE, Case, Result, deviation, elements, reference
 from benchmarks.routes import OURS, Generator
 from benchmarks.timing import Driver, Loaded
+from softehl.runtime.arrays import Array
 
 SHIPPED = OURS.routes[0]
 NOBODY = "-"

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from softehl.runtime.arrays import Array
 from tests.reference import solids
 from tests.reference.differentiate import mpf
 from tests.reference.states import displacement, quad
-
-Array = npt.NDArray[np.float64]
 
 TOLERANCE = 1e-12
 MATERIAL = (3.04, 0.62, 500.0)

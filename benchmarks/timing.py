@@ -12,7 +12,8 @@ import numpy as np
 
 from benchmarks.candidate import Layout
 from benchmarks.compiling import COMMON_FLAGS, Compiler
-from benchmarks.problem import Array, Case, Elements, Result
+from benchmarks.problem import Case, Elements, Result
+from softehl.runtime.arrays import Array
 
 POINTER = ctypes.c_void_p
 Key = tuple[int, str]

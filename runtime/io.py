@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from softehl.runtime.arrays import Array, Integers
 
 Cell = float | int | str
 
@@ -43,14 +44,14 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def write_arrays(path: Path, arrays: Mapping[str, NDArray[np.float64]]) -> None:
+def write_arrays(path: Path, arrays: Mapping[str, Array]) -> None:
     """Write named arrays (.npz), atomically also for several processes at once.  OSError."""
     named: dict[str, Any] = dict(arrays)
     with replacing(path, shared=True) as temporary, temporary.open("wb") as file:
         np.savez(file, **named)
 
 
-def read_arrays(path: Path) -> dict[str, NDArray[np.float64]] | None:
+def read_arrays(path: Path) -> dict[str, Array] | None:
     """What :func:`write_arrays` wrote; None if the file is missing or anything is wrong with it."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
@@ -90,12 +91,12 @@ def read_csv(path: Path, header: Sequence[str]) -> list[list[str]]:
     return table[1:]
 
 
-def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
+def write_columns(path: Path, columns: Mapping[str, Array]) -> None:
     """Write arrays of one length (n,) as the columns of a table.  ValueError if they differ."""
     write_csv(path, list(columns), zip(*(c.tolist() for c in columns.values()), strict=True))
 
 
-def read_columns(path: Path, header: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def read_columns(path: Path, header: Sequence[str]) -> dict[str, Array]:
     """Read what :func:`write_columns` wrote: name -> (n,).  Raises OSError, ValueError."""
     rows = [[float(cell) for cell in row] for row in read_csv(path, header)]
     table = np.array(rows, dtype=np.float64).reshape(len(rows), len(header))
@@ -130,10 +131,10 @@ def _plain(value: object) -> object:
 
 def write_vtu(
     path: Path,
-    points: NDArray[np.float64],
-    cells: NDArray[np.int64],
-    point_data: Mapping[str, NDArray[np.float64]],
-    cell_data: Mapping[str, NDArray[np.float64]],
+    points: Array,
+    cells: Integers,
+    point_data: Mapping[str, Array],
+    cell_data: Mapping[str, Array],
 ) -> None:
     """Write four-node cells in the plane as VTK XML, atomically.
 

@@ -1,53 +1,63 @@
-"""Generated kernels as functions of NumPy arrays: the only module that knows cffi.
+"""Generated kernels as functions of NumPy arrays.
 
 The shapes, orders and units of every array are those of `codegen/abi.py`; names and counts come
-from `generated/manifest.json`.  No SymPy is needed.
+from the `manifest.json` beside the C.  No SymPy is needed.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-import sysconfig
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import cffi
 import numpy as np
-import numpy.typing as npt
 
-from softehl.runtime.fem.rules import Rule
-
-Array = npt.NDArray[np.float64]
-
-GENERATED = Path(__file__).resolve().parent.parent / "generated"
-LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
-REMEDY = "run `python -m softehl.codegen.tools.build` (make does it)"
-REMEDY_OF_OTHERS = "run `softehl generate` with its model file"
-
-_SIGNATURE = (
-    "(ptrdiff_t, ptrdiff_t, ptrdiff_t, const double *, const double *, const double *,"
-    " const double *, const double *, const double *, const double *, double *, double *);"
+from softehl.runtime.arrays import Array
+from softehl.runtime.library import (
+    GENERATED,
+    KernelError,
+    Library,
+    MissingKernelsError,
+    StaleKernelsError,
+    library_of,
+    manifest,
 )
 
-
-class KernelError(RuntimeError):
-    """A kernel cannot be used; the message says what to do."""
-
-
-class MissingKernelsError(KernelError):
-    """The library has not been built, or has no such kernel."""
-
-
-class StaleKernelsError(KernelError):
-    """The library was built from other C than what stands in `generated/` now."""
+__all__ = [
+    "ArgumentError",
+    "Kernel",
+    "KernelError",
+    "MissingKernelsError",
+    "Rule",
+    "StaleKernelsError",
+    "kernel_in",
+    "load_kernel",
+]
 
 
 class ArgumentError(KernelError, ValueError):
     """An array has a wrong shape or kind, or a task is not offered."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """A quadrature rule and, for the film, the pressure shape functions at its points.
+
+    points: (q, dim) reference coordinates; weights: (q,); basis: (q, modes, 2) value and d/dxi of
+    every pressure shape function at every point, or None; a facet has two such pairs, (q, modes,
+    4). All arrays are read-only.
+    """
+
+    points: Array
+    weights: Array
+    basis: Array | None = None
+
+    def __post_init__(self) -> None:
+        for array in (self.points, self.weights, self.basis):
+            if array is not None:
+                array.setflags(write=False)
 
 
 Condition = tuple[str, str, float, str]
@@ -77,7 +87,7 @@ class Kernel:
     default_rule: Rule
     unrolled: bool
     signature: str
-    library: Any
+    library: Library
     components: int = 2
     conditions: tuple[Condition, ...] = ()
 
@@ -132,7 +142,7 @@ class _Call:
         if task not in kernel.tasks:
             raise ArgumentError(f"{kernel.name} offers {', '.join(kernel.tasks)}, not {task}")
         self.kernel = kernel
-        self.function = getattr(kernel.library, f"softehl_{kernel.name}_{task}")
+        self.function = kernel.library.function(kernel.name, task)
         if rule is not None and kernel.unrolled:
             raise ArgumentError(
                 f"the quadrature rule of {kernel.name} is written into it: give none"
@@ -234,74 +244,13 @@ class _Call:
             self.table,
             self.basis,
         )
-        self.function(
-            self.n,
-            len(self.rule.weights),
-            self.modes,
-            *(_pointer(a, "const double *") for a in read),
-            _pointer(values, "double *"),
-            _ffi.NULL if tangent is None else _pointer(tangent, "double *"),
-        )
+        counts = (self.n, len(self.rule.weights), self.modes)
+        self.function(counts, read, values, tangent)
         return values
 
 
 def _or_empty(value: Array | None) -> Array:
     return np.empty(0) if value is None else value
-
-
-_ffi = cffi.FFI()
-
-
-def _pointer(array: Array, kind: str) -> Any:
-    return _ffi.cast(kind, array.ctypes.data)
-
-
-def _sources_signature(directory: Path) -> str:
-    digest = hashlib.sha256()
-    for path in sorted(directory.glob("*.[ch]")):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
-
-
-@cache
-def manifest(directory: Path = GENERATED) -> dict[str, Any]:
-    """Kernel families of a directory of generated C, by name."""
-    path = directory / "manifest.json"
-    if not path.exists():
-        raise MissingKernelsError(f"{path} is missing: run `softehl generate`")
-    kernels: dict[str, Any] = json.loads(path.read_text())["kernels"]
-    return kernels
-
-
-@cache
-def _library(directory: Path) -> Any:
-    path = directory / LIBRARY
-    remedy = REMEDY if directory == GENERATED else REMEDY_OF_OTHERS
-    if not path.exists():
-        raise MissingKernelsError(f"the kernels are not built: {remedy}")
-    _ffi.cdef(_declarations(directory), override=True)
-    library: Any = _ffi.dlopen(str(path))
-    if _built_from(library) != _sources_signature(directory):
-        _ffi.dlclose(library)
-        raise StaleKernelsError(
-            f"{path.name} was built from other sources than {directory.name}/ holds now: {remedy}"
-        )
-    return library
-
-
-def _built_from(library: Any) -> str:
-    """Signature of the sources that a library was built from."""
-    text: bytes = _ffi.string(library.softehl_signature())
-    return text.decode()
-
-
-def _declarations(directory: Path) -> str:
-    functions = [
-        f"void softehl_{name}_{task}{_SIGNATURE}"
-        for name, entry in manifest(directory).items()
-        for task in entry["tasks"]
-    ]
-    return "\n".join([*functions, "const char *softehl_signature(void);"])
 
 
 @cache
@@ -326,7 +275,7 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         unrolled=entry["unrolled"],
         default_rule=Rule(np.array(rule["points"]), np.array(rule["weights"]), None),
         signature=entry["signature"],
-        library=_library(directory),
+        library=library_of(directory),
         components=entry["components"],
         conditions=tuple((n, r, b, w) for n, r, b, w in entry["conditions"]),
     )
@@ -341,7 +290,7 @@ def kernel_in(directory: Path, name: str | None = None) -> Kernel:
     if name is None and len(entries) > 1:
         raise MissingKernelsError(f"{directory.name} holds {', '.join(entries)}: name one of them")
     kernel = load_kernel(name or next(iter(entries)), directory)
-    if _built_from(kernel.library) != _sources_signature(directory):
+    if not kernel.library.current:
         raise StaleKernelsError(
             f"{directory.name}/ has changed since it was loaded: start Python anew, or load the "
             "model file itself"

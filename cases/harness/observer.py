@@ -10,9 +10,7 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.solution import Status
 
 OK = "ok"
@@ -24,19 +22,16 @@ UNDER_RESOLVED = "under-resolved"
 OSCILLATING = "oscillating"
 """Verdict of a state whose film zigzags from node to node: h* is sound, the profile is not."""
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
 
 @dataclass(frozen=True, eq=False)
 class Profile:
     """Fields along the film, sealed side first; five arrays of one length (n,)."""
 
-    x_mm: Floats
-    h_um: Floats
-    p_MPa: Floats
-    tau_MPa: Floats
-    flux_mm2_s: Floats
+    x_mm: Array
+    h_um: Array
+    p_MPa: Array
+    tau_MPa: Array
+    flux_mm2_s: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +42,10 @@ class Section:
     point_data: name -> (n,) or (n, k).  cell_data: name -> (m,) or (m, k).
     """
 
-    points: Floats
+    points: Array
     cells: Integers
-    point_data: Mapping[str, Floats] = field(default_factory=dict)
-    cell_data: Mapping[str, Floats] = field(default_factory=dict)
+    point_data: Mapping[str, Array] = field(default_factory=dict)
+    cell_data: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +59,8 @@ class ContactState:
     p_max_MPa: float
     contact_start_mm: float
     contact_end_mm: float
-    x_mm: Floats
-    p_MPa: Floats
+    x_mm: Array
+    p_MPa: Array
     section: Section
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from softehl.cases.harness.curve import CurveRow
-from softehl.cases.harness.observer import Floats
 from softehl.cases.paper.item import Scope
 from softehl.cases.paper.states import State, Store, setup
+from softehl.runtime.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def numbers(values: Sequence[float], form: str = ".3g") -> str:
     return " ".join(format(v, form) if isfinite(v) else "-" for v in values)
 
 
-def angle(x: Floats, h: Floats, low: float, high: float) -> float:
+def angle(x: Array, h: Array, low: float, high: float) -> float:
     """Inclination in degrees of h (n,) in um over x (n,) in mm, between two thicknesses.
 
     The points run away from the contact; the first crossings of low and high are taken.
@@ -98,7 +98,7 @@ def angle(x: Floats, h: Floats, low: float, high: float) -> float:
     return float(np.degrees(np.arctan2(1e-3 * (high - low), abs(at[1] - at[0]))))
 
 
-def _crossing(x: Floats, h: Floats, i: int, level: float) -> float:
+def _crossing(x: Array, h: Array, i: int, level: float) -> float:
     if i == 0:
         return float(x[0])
     share = (level - h[i - 1]) / (h[i] - h[i - 1])

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.harness.curve import PROFILE_COLUMNS, CurveFolder, CurveRow
-from softehl.cases.harness.observer import COLLAPSED, OK, Floats, Profile
+from softehl.cases.harness.observer import COLLAPSED, OK, Profile
 from softehl.cases.harness.record import SELECTION, SIGNS
 from softehl.cases.harness.sweep import differences
 from softehl.cases.seal.parameters import ORing
+from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text, read_columns, read_json
 
 NOT_REACHED = "not reached"
@@ -154,7 +155,7 @@ class Store:
         """The states at several signed speeds."""
         return [self.state(parameters, u) for u in speeds]
 
-    def contact(self, parameters: ORing) -> tuple[Floats, Floats] | None:
+    def contact(self, parameters: ORing) -> tuple[Array, Array] | None:
         """x (mm) and frictionless contact pressure (MPa) along the arc, None if not reached."""
         name = number_text(parameters.sealed_pressure)
         path = self.run_folder(parameters) / f"contact_{name}.csv"

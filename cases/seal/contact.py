@@ -12,9 +12,6 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
 from softehl.cases.seal.grading import PASSES, graded_disc
 from softehl.cases.seal.parameters import ORing
@@ -23,9 +20,9 @@ from softehl.cases.seal.refinement import carried_contact, finer
 from softehl.cases.seal.section import OringSection, build_section
 from softehl.cases.seal.stage import Stage
 from softehl.cases.seal.stopped import Stopped
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
 
-Array = NDArray[np.float64]
 State = tuple[OringSection, Array]
 
 GUIDE = 2

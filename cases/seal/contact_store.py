@@ -16,17 +16,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, contact_problem, contact_stage
 from softehl.cases.seal.section import OringSection
 from softehl.cases.seal.stage import Stage
+from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Newton
-
-Array = NDArray[np.float64]
 
 WITHOUT_INFLUENCE = (
     *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),

@@ -13,13 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softehl.cases.seal.section import OringSection, uniform_disc
+from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG, Disc
 from softehl.runtime.mesh.spacing import Spot, graded
-
-Array = NDArray[np.float64]
 
 PASSES = 2
 """Meshes in a row, each graded by the contact on the one before."""

@@ -9,17 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softehl.cases.seal.path import Film, PathSettings, film_problem
 from softehl.cases.seal.section import OringSection, build_section, flux_scales
 from softehl.cases.seal.stage import Stage
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.rules import lagrange, pressure_nodes
-
-Array = NDArray[np.float64]
 
 REFERENCE_ORDER = 4
 """Order from which lower ones are reached."""

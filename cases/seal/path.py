@@ -12,15 +12,14 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softehl.cases.seal.section import OringSection, film_guard, flux_scales
 from softehl.cases.seal.stage import Stage
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.continuation import Point, StepRule
 from softehl.runtime.solve.newton import Corrector, NonlinearProblem
 
-Array = NDArray[np.float64]
 Stroke = Literal["out", "in"]
 
 

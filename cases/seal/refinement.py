@@ -11,13 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, contact_problem, contact_stage
 from softehl.cases.seal.section import HOUSING, OringSection
 from softehl.cases.seal.stage import Stage
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import HeldPressure, element_pressures
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.prolongation import (
@@ -30,8 +28,6 @@ from softehl.runtime.mesh.prolongation import (
 )
 from softehl.runtime.mesh.sections import LONG
 from softehl.runtime.mesh.transfer import transfer_chain, transfer_elements, transfer_nodes
-
-Array = NDArray[np.float64]
 
 
 def finer(parameters: ORing) -> ORing:

@@ -12,7 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from softehl.cases.harness.curve import CurveRow
-from softehl.cases.harness.observer import OK, Floats, Profile
+from softehl.cases.harness.observer import OK, Profile
+from softehl.runtime.arrays import Array
 from softehl.runtime.io import replacing
 
 if TYPE_CHECKING:  # imported late: matplotlib is slow to import
@@ -180,7 +181,7 @@ def _curve_figure(rows: Sequence[CurveRow]) -> "Figure":
     return figure
 
 
-def _columns(rows: Sequence[CurveRow]) -> tuple[Floats, Floats]:
+def _columns(rows: Sequence[CurveRow]) -> tuple[Array, Array]:
     """|U| and h* of the rows, by rising speed: two arrays (n,)."""
     ordered = sorted(rows, key=lambda row: abs(row.rod_speed_mm_s))
     return (

@@ -6,12 +6,12 @@ from dataclasses import replace
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softehl.cases.harness.observer import ContactState, FilmState, Profile, Section
 from softehl.cases.seal.path import Film
 from softehl.cases.seal.section import OringSection
 from softehl.cases.seal.verdict import FilmNumbers, Verdict
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.postprocess import (
     alternating_difference,
@@ -24,8 +24,6 @@ from softehl.runtime.fem.postprocess import (
 )
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.rules import trace_rule
-
-Array = NDArray[np.float64]
 
 CONTACT_FILM = 0.02
 """Film thickness that counts as contact, mm."""

@@ -8,9 +8,6 @@ from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from softehl.cases.harness.observer import FilmState, Observer, Outcome, StageRecord
 from softehl.cases.seal.contact import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
@@ -41,12 +38,12 @@ from softehl.cases.seal.section import OringSection, build_section
 from softehl.cases.seal.stage import Stage, Walker
 from softehl.cases.seal.stopped import Stopped
 from softehl.cases.seal.verdict import Verdict, fewest_inlet_segments
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.continuation import Point
 from softehl.runtime.solve.linear import Condenser, choose
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Status
 
-Array = NDArray[np.float64]
 OnSpeed = Callable[[Film, Point], None]
 
 

@@ -11,9 +11,9 @@ from fractions import Fraction
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softehl.cases.seal.parameters import ORing
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.contact import (
     Obstacle,
@@ -34,9 +34,6 @@ from softehl.runtime.fem.problem import KeepsOrientation, Problem, StaysPositive
 from softehl.runtime.fem.rules import facet_rule, film_rule
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.sections import Disc, SectionMesh, disc_mesh
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 HOUSING = ("housing", "sealed_wall", "air_wall")
 

@@ -6,14 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from softehl.cases.harness.observer import Observer, StageRecord
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.continuation import Branch, Continuation, Point, Predictor, StepRule
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
-
-Array = NDArray[np.float64]
 
 
 def _nothing(point: Point) -> None:

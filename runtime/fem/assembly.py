@@ -11,14 +11,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.pattern import Pattern, build_pattern
-from softehl.runtime.fem.rules import Rule
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from softehl.runtime.kernels import Rule
 
 _PIECE = 1 << 18  # entries of the tangents that are evaluated before they are added up
 _CROSSES = 4  # sets of unknowns that are remembered

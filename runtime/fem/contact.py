@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import ElementBlock, ElementKernel
 from softehl.runtime.fem.dofs import displacement_dofs, gather_rows
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

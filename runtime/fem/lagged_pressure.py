@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from softehl.runtime.fem.assembly import Array, ElementBlock, ElementKernel
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.assembly import ElementBlock, ElementKernel
 from softehl.runtime.fem.problem import Problem
 
 _EDGES = np.array([[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 6, 7], [6, 7, 0, 1]])  # dofs of each edge
@@ -44,7 +44,7 @@ class HeldPressure:
     stiffness: float
     surface: ElementBlock
     volumes: Array
-    places: NDArray[np.int64]
+    places: Integers
 
     @classmethod
     def of(

@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.runtime.fem.assembly import Array, Assembler, ElementBlock, Integers
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.problem import Guard, Problem
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from softehl.runtime.arrays import Array, Integers
+
 Small = NDArray[np.int32]
 
 

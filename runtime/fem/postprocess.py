@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from softehl.runtime.arrays import Array, Flags, Integers
 
 
 def element_means(values: Array, weights: Array) -> Array:

@@ -12,7 +12,8 @@ from typing import Protocol
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.runtime.fem.assembly import Array, Assembler, Integers
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.dofs import DofLayout
 
 

@@ -2,35 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from softehl.runtime.arrays import Array
+from softehl.runtime.kernels import Rule
+
 Kind = Literal["gauss", "lobatto"]
-
-
-@dataclass(frozen=True, eq=False)
-class Rule:
-    """A quadrature rule and, for the film, the pressure shape functions at its points.
-
-    points: (q, dim) reference coordinates; weights: (q,); basis: (q, modes, 2) value and d/dxi of
-    every pressure shape function at every point, or None; a facet has two such pairs, (q, modes,
-    4). All arrays are read-only.
-    """
-
-    points: Array
-    weights: Array
-    basis: Array | None = None
-
-    def __post_init__(self) -> None:
-        for array in (self.points, self.weights, self.basis):
-            if array is not None:
-                array.setflags(write=False)
 
 
 def _line(points: Array, weights: Array, basis: Array | None = None) -> Rule:

@@ -9,13 +9,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.sections import LAYERS, LONG, SHORT
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 def node_blocks(density: int) -> list[Integers]:

@@ -11,12 +11,9 @@ from fractions import Fraction
 from math import cos, radians, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.spacing import Spacing
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LONG, SHORT, LAYERS = 27, 6, 3  # segments at density 1: bottom and top, each side, layers around
 

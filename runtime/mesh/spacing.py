@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import brentq
 
-Array = NDArray[np.float64]
+from softehl.runtime.arrays import Array
 
 _STATIONS = 20001  # points at which a size function is tabulated
 _STEPS = 27 * 64  # of the table of a map: nodes of every density up to 64 are entries of it

@@ -7,13 +7,10 @@ one mesh holds the nodes of the other.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, RBFInterpolator
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.sections import SectionMesh
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 _NEIGHBOURS = 32  # of a local spline: about three rings of a structured mesh
 

@@ -14,14 +14,15 @@ from typing import Literal, TypeAlias
 import numpy as np
 from scipy.sparse import csc_array, hstack, vstack
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
-from softehl.runtime.solve.solution import Branch, LimitPoint, Point, Solution, Status, Vector
+from softehl.runtime.solve.solution import Branch, LimitPoint, Point, Solution, Status
 
 __all__ = ["Arclength", "Branch", "Continuation", "LimitPoint", "Point", "StepRule"]
 
 ProblemAt: TypeAlias = Callable[[float], NonlinearProblem]
-Derivative: TypeAlias = Callable[[float, Vector], Vector]
+Derivative: TypeAlias = Callable[[float, Array], Array]
 OnPoint: TypeAlias = Callable[[Point], object]
 Predictor: TypeAlias = Literal["secant", "parabola", "previous"]
 
@@ -157,7 +158,7 @@ class Continuation:
         problem_at: ProblemAt,
         start: float,
         stop: float,
-        x0: Vector,
+        x0: Array,
         *,
         waypoints: Iterable[float] = (),
         on_point: OnPoint | None = None,
@@ -205,7 +206,7 @@ class Continuation:
         return self.newton.solve(problem, x + _admissible(problem, x, dx) * dx)
 
 
-def _extrapolated(known: Sequence[Point], parameter: float) -> Vector:
+def _extrapolated(known: Sequence[Point], parameter: float) -> Array:
     """Change (n,) from the first of the points to `parameter`, on the polynomial through them all;
     on that of fewer points where it goes further beyond them than they are apart.
     """
@@ -245,7 +246,7 @@ def _approach(here: float, goal: float, step: float) -> float:
     return here + math.copysign(min(step, 0.5 * remaining), goal - here)
 
 
-def _admissible(problem: NonlinearProblem, x: Vector, dx: Vector) -> float:
+def _admissible(problem: NonlinearProblem, x: Array, dx: Array) -> float:
     """Fraction of a predictor that the problem admits; 0 if it admits none."""
     fraction = problem.step_limit(x, dx)
     return min(1.0, fraction) if fraction > 0.0 else 0.0
@@ -257,10 +258,10 @@ class _Trial:
 
     parameter: float
     solution: Solution
-    t: Vector = field(default_factory=lambda: np.empty(0))
+    t: Array = field(default_factory=lambda: np.empty(0))
 
     @property
-    def y(self) -> Vector:
+    def y(self) -> Array:
         return np.append(self.solution.x, self.parameter)
 
     def refuse(self, status: Status, message: str) -> _Trial:
@@ -277,13 +278,13 @@ class _Path:
     parameter_scale: float
     difference: float
 
-    def weigh(self, t: Vector) -> Vector:
+    def weigh(self, t: Array) -> Array:
         """Covector of t: weigh(t) @ y is the scalar product of the metric."""
         weights = np.full(t.size, 1.0 / ((t.size - 1) * self.x_scale**2))
         weights[-1] = self.parameter_scale**-2
         return weights * t
 
-    def parameter_derivative(self, y: Vector) -> Vector:
+    def parameter_derivative(self, y: Array) -> Array:
         """dR/dparameter at y, shape (n,); a central difference unless a derivative is given."""
         x, parameter = y[:-1], float(y[-1])
         if self.derivative is not None:
@@ -293,14 +294,14 @@ class _Path:
         behind = self.problem_at(parameter - h).residual(x)
         return (ahead - behind) / (2.0 * h)
 
-    def bordered(self, y: Vector, row: Vector) -> tuple[Vector, SparseMatrix]:
+    def bordered(self, y: Array, row: Array) -> tuple[Array, SparseMatrix]:
         """R at y, and [[dR/dx, dR/dparameter], [row]], regular at a simple limit point."""
         r, K = self.problem_at(float(y[-1])).linearise(y[:-1])
         column = self.parameter_derivative(y)[:, None]
         upper = hstack([csc_array(K), csc_array(column)])
         return r, vstack([upper, csc_array(row[None, :])], format="csc")
 
-    def tangent(self, y: Vector, along: Vector, linear: LinearSolver) -> Vector:
+    def tangent(self, y: Array, along: Array, linear: LinearSolver) -> Array:
         """Unit tangent at y on the side of the covector `along`; may raise SingularMatrix."""
         _, matrix = self.bordered(y, along)
         unit = np.zeros(y.size)
@@ -314,28 +315,28 @@ class _Corrector:
     """NonlinearProblem in y: R = 0 on the plane `length` along the unit tangent t at `base`."""
 
     path: _Path
-    base: Vector
-    covector: Vector
+    base: Array
+    covector: Array
     length: float
 
-    def _plane(self, y: Vector) -> Vector:
+    def _plane(self, y: Array) -> Array:
         return np.array([self.covector @ (y - self.base) / self.length - 1.0])
 
-    def _problem(self, y: Vector) -> NonlinearProblem:
+    def _problem(self, y: Array) -> NonlinearProblem:
         return self.path.problem_at(float(y[-1]))
 
-    def residual(self, y: Vector) -> Vector:
+    def residual(self, y: Array) -> Array:
         return np.concatenate([self._problem(y).residual(y[:-1]), self._plane(y)])
 
-    def linearise(self, y: Vector) -> tuple[Vector, SparseMatrix]:
+    def linearise(self, y: Array) -> tuple[Array, SparseMatrix]:
         r, matrix = self.path.bordered(y, self.covector / self.length)
         return np.concatenate([r, self._plane(y)]), matrix
 
-    def norm(self, r: Vector) -> float:
+    def norm(self, r: Array) -> float:
         problem = self._problem(self.base)
         return max(problem.norm(r[:-1]), abs(float(r[-1])))
 
-    def step_limit(self, y: Vector, dy: Vector) -> float:
+    def step_limit(self, y: Array, dy: Array) -> float:
         return self._problem(y).step_limit(y[:-1], dy[:-1])
 
 
@@ -368,7 +369,7 @@ class Arclength:
         self,
         problem_at: ProblemAt,
         start: float,
-        x0: Vector,
+        x0: Array,
         *,
         direction: float = 1.0,
         within: tuple[float, float] = (-math.inf, math.inf),
@@ -414,7 +415,7 @@ class Arclength:
         message = f"{self.max_points} points, the last at {self.name} = {here.parameter:.9g}"
         return log.branch(status, message)
 
-    def _start(self, path: _Path, start: float, x0: Vector, direction: float) -> _Trial:
+    def _start(self, path: _Path, start: float, x0: Array, direction: float) -> _Trial:
         """Solve at `start` and find the tangent on which the parameter changes as asked."""
         trial = _Trial(start, self.newton.solve(path.problem_at(start), x0))
         along = np.zeros(trial.y.size)
@@ -430,7 +431,7 @@ class Arclength:
         cosine = math.cos(math.radians(self.turn))
         return self._with_tangent(path, trial, corrector.covector, cosine)
 
-    def _with_tangent(self, path: _Path, trial: _Trial, along: Vector, cosine: float) -> _Trial:
+    def _with_tangent(self, path: _Path, trial: _Trial, along: Array, cosine: float) -> _Trial:
         """The trial with its tangent; refused if there is none or it turns away from `along`."""
         if not trial.solution.converged:
             return trial

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csc_matrix
 from scipy.sparse import linalg as sparse_linalg
 
-from softehl.runtime.solve.solution import Vector
+from softehl.runtime.arrays import Array, Flags, Integers
 
 SparseMatrix: TypeAlias = "csc_array[np.float64] | csc_matrix[np.float64]"
 Backend: TypeAlias = Literal["auto", "superlu", "pardiso"]
@@ -32,7 +32,7 @@ class SingularMatrix(ArithmeticError):  # noqa: N818 (named after what it is)
 class Factors(Protocol):
     """A factorised matrix A."""
 
-    def solve(self, b: Vector) -> Vector:
+    def solve(self, b: Array) -> Array:
         """x of A x = b, shapes (n,)."""
         ...
 
@@ -57,20 +57,20 @@ class Condensed(Protocol):
     """
 
     @property
-    def boundary(self) -> NDArray[np.int64]:
+    def boundary(self) -> Integers:
         """See the class."""
         ...
 
     @property
-    def schur(self) -> NDArray[np.float64]:
+    def schur(self) -> Array:
         """See the class."""
         ...
 
-    def reduce(self, r: Vector) -> tuple[Vector, Vector]:
+    def reduce(self, r: Array) -> tuple[Array, Array]:
         """r_B - K_BI K_II^-1 r_I, (m,), for r (n,), and what `extend` wants to know of it, (n,)."""
         ...
 
-    def extend(self, reduced: Vector, x: Vector) -> Vector:
+    def extend(self, reduced: Array, x: Array) -> Array:
         """(n,): x (m,) on the boundary and K_II^-1 (r_I - K_IB x) in the interior."""
         ...
 
@@ -79,7 +79,7 @@ class Condensed(Protocol):
 class Condenser(LinearSolver, Protocol):
     """A linear solver that can also eliminate all unknowns but a few."""
 
-    def condense(self, K: SparseMatrix, boundary: NDArray[np.int64]) -> Condensed:
+    def condense(self, K: SparseMatrix, boundary: Integers) -> Condensed:
         """Condensation of K, (n, n), onto unknowns (m,) in rising order; raises SingularMatrix."""
         ...
 
@@ -100,16 +100,16 @@ class Factorisation:
 
     matrix: SparseMatrix
     factors: Any
-    row_sums: Vector
+    row_sums: Array
     refinement: int
     accuracy: float
     settled: float = math.inf
 
-    def solve(self, b: Vector) -> Vector:
+    def solve(self, b: Array) -> Array:
         """x of matrix x = b, shapes (n,); raises SingularMatrix if x is not finite or not a
         solution to `accuracy`, as weak pivots may cause.
         """
-        x: Vector = self.factors.solve(b)
+        x: Array = self.factors.solve(b)
         correction = 0.0
         for _ in range(self.refinement):
             dx = self.factors.solve(b - self.matrix @ x)
@@ -127,7 +127,7 @@ class Factorisation:
             )
         return x
 
-    def _backward_error(self, x: Vector, b: Vector) -> float:
+    def _backward_error(self, x: Array, b: Array) -> float:
         """Largest |b - A x|_i / (|A|_i |x|_max + |b|_i); each row has its own units."""
         size = float(np.abs(x).max(initial=0.0))
         scale = self.row_sums * size + np.abs(b)
@@ -136,7 +136,7 @@ class Factorisation:
         return float(ratio.max(initial=0.0))
 
 
-def checked_row_sums(K: SparseMatrix) -> Vector:
+def checked_row_sums(K: SparseMatrix) -> Array:
     """Sums (n,) of |K| along rows; raises SingularMatrix for a zero row or entries not finite."""
     if not np.isfinite(K.data).all():
         raise SingularMatrix("the matrix has entries that are not finite")
@@ -181,10 +181,10 @@ class SuperLU:
         except RuntimeError as error:  # SuperLU's word for an exactly singular matrix
             raise SingularMatrix(f"no LU factors: {error}") from error
 
-    def condense(self, K: SparseMatrix, boundary: NDArray[np.int64]) -> SchurBySolves:
+    def condense(self, K: SparseMatrix, boundary: Integers) -> SchurBySolves:
         """See `Condenser`; the Schur complement takes a solve for each boundary unknown."""
         checked_row_sums(K)
-        inner: NDArray[np.bool_] = np.ones(K.shape[0], dtype=bool)
+        inner: Flags = np.ones(K.shape[0], dtype=bool)
         inner[boundary] = False
         interior = np.flatnonzero(inner)
         rows = csc_array(K[boundary, :])
@@ -205,19 +205,19 @@ class SchurBySolves:
     interior: (n - m,) eliminated unknowns. couplings: K_BI and K_IB.
     """
 
-    boundary: NDArray[np.int64]
-    schur: NDArray[np.float64]
+    boundary: Integers
+    schur: Array
     interior: NDArray[np.intp]
     factors: sparse_linalg.SuperLU
     couplings: tuple[SparseMatrix, SparseMatrix]
 
-    def reduce(self, r: Vector) -> tuple[Vector, Vector]:
+    def reduce(self, r: Array) -> tuple[Array, Array]:
         """See `Condensed`."""
         y = np.zeros(len(r))
         y[self.interior] = self.factors.solve(r[self.interior])
         return np.asarray(r[self.boundary] - self.couplings[0] @ y[self.interior]), y
 
-    def extend(self, reduced: Vector, x: Vector) -> Vector:
+    def extend(self, reduced: Array, x: Array) -> Array:
         """See `Condensed`."""
         full = reduced.copy()
         full[self.interior] -= self.factors.solve(np.asarray(self.couplings[1] @ x))

@@ -19,16 +19,13 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg as dense
 from scipy.sparse import csc_array
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.linear import Condensed, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import NonlinearProblem
-from softehl.runtime.solve.solution import Solution, Status, Vector
-
-Integers = NDArray[np.int64]
-Matrix = NDArray[np.float64]
+from softehl.runtime.solve.solution import Solution, Status
 
 
 class LayeredProblem(NonlinearProblem, Protocol):
@@ -44,27 +41,27 @@ class LayeredProblem(NonlinearProblem, Protocol):
         """Unknowns (k,) that only the layer has, numbered along it."""
         ...
 
-    def admissible(self, x: Vector) -> Vector:
+    def admissible(self, x: Array) -> Array:
         """x with whatever values are prescribed."""
         ...
 
-    def body(self, x: Vector) -> SparseMatrix:
+    def body(self, x: Array) -> SparseMatrix:
         """dB/dx, (n, n), csc; rows and columns of `own` are those of the identity."""
         ...
 
-    def layer_residual(self, x: Vector) -> Vector:
+    def layer_residual(self, x: Array) -> Array:
         """L(x), (m + k,), shared unknowns first."""
         ...
 
-    def layer_linearise(self, x: Vector) -> tuple[Vector, SparseMatrix]:
+    def layer_linearise(self, x: Array) -> tuple[Array, SparseMatrix]:
         """L(x), (m + k,), and its tangent, (m + k, m + k), csc."""
         ...
 
-    def scaled(self, r: Vector) -> Vector:
+    def scaled(self, r: Array) -> Array:
         """Dimensionless residual, (n,); its 2-norm is `norm`."""
         ...
 
-    def layer_limit(self, x: Vector, dx: Vector) -> float:
+    def layer_limit(self, x: Array, dx: Array) -> float:
         """Largest fraction of the step dx that the layer admits, in (0, 1]."""
         ...
 
@@ -89,12 +86,12 @@ class Chord:
     patience: int = 3
     depth: int = 4
 
-    def solve(self, problem: LayeredProblem, condensed: Condensed, x0: Vector) -> Solution:
+    def solve(self, problem: LayeredProblem, condensed: Condensed, x0: Array) -> Solution:
         """Solve R(x) = 0 from x0, (n,), with the body's condensation at a state near by."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return self._solve(problem, condensed, problem.admissible(x0))
 
-    def _solve(self, problem: LayeredProblem, condensed: Condensed, x: Vector) -> Solution:
+    def _solve(self, problem: LayeredProblem, condensed: Condensed, x: Array) -> Solution:
         history = _History(problem, self.depth)
         history.add(x, problem.residual(x))
         norms = [_size(problem, history.latest.r)]
@@ -137,7 +134,7 @@ class Chord:
 
     def _outer(
         self, problem: LayeredProblem, condensed: Condensed, at: _Iterate, target: float
-    ) -> Vector | None:
+    ) -> Array | None:
         """The next iterate, None if the inner iteration fails."""
         g, reduced = condensed.reduce(at.body)
         y = self._inner(_Inner(problem, condensed.schur, g, at), at.x, target)
@@ -147,7 +144,7 @@ class Chord:
         dx[problem.own] = (y - at.x)[problem.own]
         return np.asarray(at.x + dx)
 
-    def _inner(self, inner: _Inner, x: Vector, target: float) -> Vector | None:
+    def _inner(self, inner: _Inner, x: Array, target: float) -> Array | None:
         """x with the shared and own unknowns that solve the small system, or nearly do."""
         best, least, before = x, math.inf, math.inf
         for _ in range(self.max_inner):
@@ -172,9 +169,9 @@ class Chord:
 class _Iterate:
     """An outer iterate x with the residual r and the body's part of it, all (n,)."""
 
-    x: Vector
-    r: Vector
-    body: Vector
+    x: Array
+    r: Array
+    body: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +179,8 @@ class _Inner:
     """The small system at the outer iterate `at`, with its condensed residual g (m,)."""
 
     problem: LayeredProblem
-    schur: Matrix
-    g: Vector
+    schur: Array
+    g: Array
     at: _Iterate
 
     @property
@@ -191,7 +188,7 @@ class _Inner:
         """Size of the residual at the outer iterate."""
         return _size(self.problem, self.at.r)
 
-    def linearise(self, y: Vector) -> tuple[Vector, SparseMatrix]:
+    def linearise(self, y: Array) -> tuple[Array, SparseMatrix]:
         """Residual (m + k,) and the layer's part of the tangent."""
         r, L = self.problem.layer_linearise(y)
         shared = self.problem.shared
@@ -199,14 +196,14 @@ class _Inner:
         r[: len(shared)] += self.g + self.schur @ (y - self.at.x)[shared]
         return r, L
 
-    def norm(self, r: Vector) -> float:
+    def norm(self, r: Array) -> float:
         """Size of r as a part of a full residual."""
         full, m = np.zeros_like(self.at.x), len(self.problem.shared)
         full[self.problem.shared] = r[:m]
         full[self.problem.own] = r[m:]
         return _size(self.problem, full)
 
-    def step(self, r: Vector, L: SparseMatrix) -> Vector:
+    def step(self, r: Array, L: SparseMatrix) -> Array:
         """Newton step (n,): the own unknowns by a banded solve, the shared by a dense one."""
         m = len(self.problem.shared)
         own = L[m:, m:]
@@ -225,11 +222,11 @@ class _Inner:
             raise SingularMatrix("the condensed system has no finite solution")
         return step
 
-    def limit(self, x: Vector, dx: Vector) -> float:
+    def limit(self, x: Array, dx: Array) -> float:
         return self.problem.layer_limit(x, dx)
 
 
-def solve_banded(A: SparseMatrix, b: Matrix) -> Matrix:
+def solve_banded(A: SparseMatrix, b: Array) -> Array:
     """A^-1 b, (k, j), by LU of the band that holds A (k, k); raises SingularMatrix."""
     entries = A.tocoo()
     rows, columns = entries.coords
@@ -255,7 +252,7 @@ class _History:
     def latest(self) -> _Iterate:
         return self.iterates[-1]
 
-    def add(self, x: Vector, r: Vector) -> None:
+    def add(self, x: Array, r: Array) -> None:
         """Add x with its residual r, both (n,)."""
         problem, body = self.problem, r.copy()
         body[problem.shared] -= problem.layer_residual(x)[: len(problem.shared)]
@@ -282,12 +279,12 @@ class _History:
         return _Iterate(x, r, body) if self.problem.layer_limit(now.x, x - now.x) == 1.0 else now
 
 
-def _size(problem: NonlinearProblem, r: Vector) -> float:
+def _size(problem: NonlinearProblem, r: Array) -> float:
     norm = float(problem.norm(r)) if np.isfinite(r).all() else math.inf
     return norm if math.isfinite(norm) else math.inf
 
 
-def _solution(x: Vector, status: Status, norms: list[float], message: str = "") -> Solution:
+def _solution(x: Array, status: Status, norms: list[float], message: str = "") -> Solution:
     return Solution(
         x=x,
         status=status,

@@ -12,8 +12,9 @@ from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix, SuperLU
-from softehl.runtime.solve.solution import Solution, Status, Vector
+from softehl.runtime.solve.solution import Solution, Status
 
 _SUFFICIENT_DECREASE = 1e-4  # Armijo's constant on the norm, the customary value
 
@@ -21,19 +22,19 @@ _SUFFICIENT_DECREASE = 1e-4  # Armijo's constant on the norm, the customary valu
 class NonlinearProblem(Protocol):
     """All that the solvers know of a problem: n equations R(x) = 0 in n unknowns."""
 
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Array) -> Array:
         """R(x), shape (n,)."""
         ...
 
-    def linearise(self, x: Vector) -> tuple[Vector, SparseMatrix]:
+    def linearise(self, x: Array) -> tuple[Array, SparseMatrix]:
         """R(x), shape (n,), and K = dR/dx, shape (n, n), csc."""
         ...
 
-    def norm(self, r: Vector) -> float:
+    def norm(self, r: Array) -> float:
         """Dimensionless size of a residual; 1 is about the reference load."""
         ...
 
-    def step_limit(self, x: Vector, dx: Vector) -> float:
+    def step_limit(self, x: Array, dx: Array) -> float:
         """Largest admissible fraction of the step dx from x, in (0, 1]."""
         ...
 
@@ -41,7 +42,7 @@ class NonlinearProblem(Protocol):
 class Corrector(Protocol):
     """Anything that solves R(x) = 0 from a guess: Newton's method, or a cheaper relative."""
 
-    def solve(self, problem: Any, x0: Vector) -> Solution:
+    def solve(self, problem: Any, x0: Array) -> Solution:
         """The solution from x0, shape (n,); failure is its status."""
         ...
 
@@ -50,7 +51,7 @@ class Corrector(Protocol):
 class EvolvingProblem(NonlinearProblem, Protocol):
     """A problem whose tangent depends on the iterates so far (its residual must not)."""
 
-    def after(self, before: Vector, x: Vector) -> Self:
+    def after(self, before: Array, x: Array) -> Self:
         """The problem as it is after a step from `before` to x, shapes (n,)."""
         ...
 
@@ -62,7 +63,7 @@ class NewtonState:
     x: (n,) the last accepted iterate; norms: of the residuals at x0 and every accepted iterate.
     """
 
-    x: Vector
+    x: Array
     norms: tuple[float, ...]
     factorisations: int = 0
     status: Status | None = None
@@ -102,7 +103,7 @@ class Newton:
     line_search: bool = False
     linear: LinearSolver = field(default_factory=SuperLU)
 
-    def solve(self, problem: NonlinearProblem, x0: Vector) -> Solution:
+    def solve(self, problem: NonlinearProblem, x0: Array) -> Solution:
         """Solve R(x) = 0 from x0, shape (n,), which is left unchanged."""
         # An inadmissible trial is a handled value here, so numpy need not warn of it.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -121,7 +122,7 @@ class Newton:
             iterations=state.iterations,
         )
 
-    def init(self, problem: NonlinearProblem, x0: Vector) -> NewtonState:
+    def init(self, problem: NonlinearProblem, x0: Array) -> NewtonState:
         """The state before the first iteration."""
         x = np.array(x0, dtype=np.float64)
         return NewtonState(x, (_norm_at(problem, x),))
@@ -159,7 +160,7 @@ class Newton:
         before, now = norms[-2:]
         return before <= now <= self.stagnation * self.tolerance
 
-    def _advance(self, problem: NonlinearProblem, state: NewtonState, dx: Vector) -> NewtonState:
+    def _advance(self, problem: NonlinearProblem, state: NewtonState, dx: Array) -> NewtonState:
         """Go along dx as far as the problem admits; shorter while the residual is refused."""
         fraction = min(problem.step_limit(state.x, dx), 1.0)  # in this order nan stays nan
         if not fraction > 0.0:
@@ -184,7 +185,7 @@ class Newton:
         return not self.line_search or norm <= (1.0 - _SUFFICIENT_DECREASE * fraction) * before
 
 
-def _norm_at(problem: NonlinearProblem, x: Vector) -> float:
+def _norm_at(problem: NonlinearProblem, x: Array) -> float:
     """Norm of the residual at x, inf if either is not finite."""
     r = problem.residual(x)
     norm = float(problem.norm(r)) if np.isfinite(r).all() else math.inf

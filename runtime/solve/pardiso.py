@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.linear import (
     Factorisation,
     SingularMatrix,
     SparseMatrix,
     checked_row_sums,
 )
-from softehl.runtime.solve.solution import Vector
 
-Integers = NDArray[np.int32]
+Small = NDArray[np.int32]
 
 _STRUCTURALLY_SYMMETRIC, _GENERAL = 1, 11
 _ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
@@ -61,14 +61,14 @@ class _Structure:
     """
 
     kind: int
-    csc: tuple[Integers, Integers]
-    indptr: Integers
-    indices: Integers
+    csc: tuple[Small, Small]
+    indptr: Small
+    indices: Small
     order: NDArray[np.intp]
-    last: Integers
+    last: Small
 
     @classmethod
-    def of(cls, K: SparseMatrix, boundary: NDArray[np.int64]) -> _Structure:
+    def of(cls, K: SparseMatrix, boundary: Integers) -> _Structure:
         n = K.shape[0]
         count = csc_array((np.arange(1.0, K.nnz + 1.0), K.indices, K.indptr), shape=(n, n)).tocsr()
         count.sort_indices()
@@ -87,7 +87,7 @@ class _Structure:
             last=last,
         )
 
-    def fits(self, K: SparseMatrix, boundary: NDArray[np.int64]) -> bool:
+    def fits(self, K: SparseMatrix, boundary: Integers) -> bool:
         """Whether K has this pattern, and the boundary is the same."""
         return (
             np.array_equal(self.csc[0], K.indptr)
@@ -111,7 +111,7 @@ class _Handle:
         release = (self._memory, self._settings, structure, nothing, nothing, nothing)
         weakref.finalize(self, _call, _RELEASE, *release).atexit = False
 
-    def factorise(self, K: SparseMatrix, schur: Vector) -> None:
+    def factorise(self, K: SparseMatrix, schur: Array) -> None:
         """Factorise a matrix of the pattern; the Schur complement (m, m) is written to `schur`."""
         fresh = not len(self._data)
         self._data = K.data[self.structure.order]
@@ -120,18 +120,18 @@ class _Handle:
         self.call(_FACTORISE, np.zeros(self.size), schur)
         self.perturbed = int(self._settings[13])
 
-    def call(self, phase: int, b: Vector, x: Vector) -> None:
+    def call(self, phase: int, b: Array, x: Array) -> None:
         """One phase with this right side, writing to x; raises SingularMatrix."""
         _call(phase, self._memory, self._settings, self.structure, self._data, b, x)
 
-    def solve(self, b: Vector) -> Vector:
+    def solve(self, b: Array) -> Array:
         """x of K x = b, shapes (n,), without a check."""
         x = np.empty(self.size)
         self.call(_SOLVE, np.ascontiguousarray(b, dtype=np.float64), x)
         return x
 
 
-def _settings(structure: _Structure, perturbation: int) -> Integers:
+def _settings(structure: _Structure, perturbation: int) -> Small:
     general, condensed = structure.kind == _GENERAL, bool(structure.last.any())
     iparm = np.zeros(64, dtype=np.int32)
     iparm[0] = 1  # these settings, no defaults
@@ -145,12 +145,12 @@ def _settings(structure: _Structure, perturbation: int) -> Integers:
 
 def _call(
     phase: int,
-    memory: NDArray[np.int64],
-    settings: Integers,
+    memory: Integers,
+    settings: Small,
     structure: _Structure,
-    data: Vector,
-    b: Vector,
-    x: Vector,
+    data: Array,
+    b: Array,
+    x: Array,
 ) -> None:
     """PARDISO itself; raises SingularMatrix on its errors."""
 
@@ -180,7 +180,7 @@ class _Lent:
 
     handle: _Handle
 
-    def solve(self, b: Vector) -> Vector:
+    def solve(self, b: Array) -> Array:
         return self.handle.solve(b)
 
 
@@ -189,16 +189,16 @@ class PartialFactors:
     """Factors of all but the boundary unknowns; see `runtime.solve.linear.Condensed`."""
 
     handle: _Handle
-    boundary: NDArray[np.int64]
-    schur: NDArray[np.float64]
+    boundary: Integers
+    schur: Array
 
-    def reduce(self, r: Vector) -> tuple[Vector, Vector]:
+    def reduce(self, r: Array) -> tuple[Array, Array]:
         """See `Condensed`."""
         y = np.empty(self.handle.size)
         self.handle.call(_FORWARD, np.ascontiguousarray(r, dtype=np.float64), y)
         return y[self.boundary].copy(), y
 
-    def extend(self, reduced: Vector, x: Vector) -> Vector:
+    def extend(self, reduced: Array, x: Array) -> Array:
         """See `Condensed`."""
         y, full = reduced.copy(), np.empty(self.handle.size)
         y[self.boundary] = x
@@ -234,7 +234,7 @@ class Pardiso:
         weakref.finalize(lent, _give_back, self.idle, handle, self.keep).atexit = False
         return Factorisation(K, lent, row_sums, self.refinement, self.accuracy, self.settled)
 
-    def condense(self, K: SparseMatrix, boundary: NDArray[np.int64]) -> PartialFactors:
+    def condense(self, K: SparseMatrix, boundary: Integers) -> PartialFactors:
         """Factors of K, (n, n), without those unknowns, (m,), and their Schur complement."""
         checked_row_sums(K)
         order = np.sort(boundary)
@@ -247,7 +247,7 @@ class Pardiso:
         weakref.finalize(partial, _give_back, self.idle, handle, self.keep).atexit = False
         return partial
 
-    def _handle(self, K: SparseMatrix, boundary: NDArray[np.int64]) -> _Handle:
+    def _handle(self, K: SparseMatrix, boundary: Integers) -> _Handle:
         """A handle for this pattern that nobody uses; analysed already if there is one."""
         for handle in self.idle:
             if handle.structure.fits(K, boundary):

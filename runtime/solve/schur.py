@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condensed, Condenser, SingularMatrix
 from softehl.runtime.solve.modified_newton import Chord, LayeredProblem
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import Solution, Status, Vector
+from softehl.runtime.solve.solution import Solution, Status
 
 _HELD_UP = 10.0  # times the tolerance, or what rounding may make of it
 _RESCUE = 3  # Newton steps after a chord iteration that ended near the solution
@@ -22,8 +23,8 @@ class Memory:
     """
 
     condensed: Condensed | None = None
-    place: Vector | None = None
-    settled: Vector | None = None
+    place: Array | None = None
+    settled: Array | None = None
     worn: bool = False
 
 
@@ -51,7 +52,7 @@ class FrozenBody:
         """The same with another tolerance, far above rounding, sharing the condensation."""
         return replace(self, chord=replace(self.chord, tolerance=tolerance, stagnation=1.0))
 
-    def solve(self, problem: LayeredProblem, x0: Vector) -> Solution:
+    def solve(self, problem: LayeredProblem, x0: Array) -> Solution:
         """Solve R(x) = 0 from x0, (n,); the body may have been condensed anywhere near by."""
         memory = self.memory
         if memory.settled is None:
@@ -67,7 +68,7 @@ class FrozenBody:
             memory.worn = rate > self.wear
         return solution
 
-    def _from(self, problem: LayeredProblem, x0: Vector) -> Solution:
+    def _from(self, problem: LayeredProblem, x0: Array) -> Solution:
         """The solution from x0, with new condensations where the one in use makes it too slow."""
         memory = self.memory
         assert memory.settled is not None
@@ -89,7 +90,7 @@ class FrozenBody:
         return solution
 
     def _attempt(
-        self, problem: LayeredProblem, place: Vector | None, start: Vector, before: Solution
+        self, problem: LayeredProblem, place: Array | None, start: Array, before: Solution
     ) -> Solution:
         """The solution from `start`, with a condensation made at `place` if there is one; its cost
         includes that of what was tried `before`.
@@ -142,14 +143,14 @@ class FrozenBody:
             return 0.0
         return float((norms[last] / norms[0]) ** (1.0 / last))
 
-    def _condense(self, problem: LayeredProblem, place: Vector) -> None:
+    def _condense(self, problem: LayeredProblem, place: Array) -> None:
         memory = self.memory
         memory.condensed = None  # its memory is free for the new one
         memory.condensed = self.linear.condense(problem.body(place), problem.shared)
         memory.place, memory.worn = place, False
 
 
-def _continued(solution: Solution, exact: Solution, x: Vector | None = None) -> Solution:
+def _continued(solution: Solution, exact: Solution, x: Array | None = None) -> Solution:
     """The solution with the cost of exact steps, and their result unless x (n,) is to be kept."""
     norms = solution.residual_norms
     return replace(
@@ -161,5 +162,5 @@ def _continued(solution: Solution, exact: Solution, x: Vector | None = None) -> 
     )
 
 
-def _not_begun(x0: Vector) -> Solution:
+def _not_begun(x0: Array) -> Solution:
     return Solution(x0, Status.MAX_ITERATIONS, "not begun", (), 0, 0)

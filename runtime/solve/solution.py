@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector: TypeAlias = NDArray[np.float64]
+from softehl.runtime.arrays import Array
 
 
 class Status(enum.Enum):
@@ -75,7 +73,7 @@ class Solution:
     iterations: completed Newton iterations.
     """
 
-    x: Vector
+    x: Array
     status: Status
     message: str
     residual_norms: tuple[float, ...]
@@ -115,7 +113,7 @@ class LimitPoint:
     """
 
     parameter: float
-    x: Vector
+    x: Array
     kind: str
     index: int
     located: bool

@@ -11,9 +11,10 @@ from softehl.cases.harness.observer import Outcome
 from softehl.cases.seal import fast as oring_fast
 from softehl.cases.seal.fast import METHOD
 from softehl.cases.seal.run import run
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import choose
 from softehl.runtime.solve.schur import FrozenBody
-from softehl.runtime.solve.solution import Solution, Status, Vector
+from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
 from tests.cases.test_oring_path import Recorder
 
@@ -89,7 +90,7 @@ class Tired(FrozenBody):
 
     slowest = 1000.0
 
-    def solve(self, problem: Any, x0: Vector) -> Solution:
+    def solve(self, problem: Any, x0: Array) -> Solution:
         film = problem.problem.assembler.block("film").kernel.parameters
         speed = problem.problem.parameters["film"][film.index("rod_speed")]
         solution = super().solve(problem, x0)

@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, function_name
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build
+from softehl.runtime.arrays import Array, Integers
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 STRICT = ("-Wall", "-Wextra", "-Werror", "-Wpedantic", "-Wmissing-prototypes")
 TENSOR = (0, 1, 3, 2)
 """Position in DOLFINx's tensor-product order of each corner, counterclockwise."""

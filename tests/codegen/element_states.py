@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from softehl.codegen.graph.evaluate import State
-from softehl.runtime.fem.rules import Kind, Rule, facet_rule, film_rule
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.rules import Kind, facet_rule, film_rule
+from softehl.runtime.kernels import Kernel, Rule, load_kernel
 
-Array = npt.NDArray[np.float64]
 MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))
 
 

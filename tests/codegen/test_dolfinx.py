@@ -17,9 +17,10 @@ import pytest
 from softehl.codegen.abi import Target
 from softehl.codegen.models import ALL
 from softehl.codegen.pipeline import compile_model
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.kernels import load_kernel
-from tests.codegen.cell_kernels import TENSOR, Array, CellKernels, Plane, cell_kernels, distorted
+from tests.codegen.cell_kernels import TENSOR, CellKernels, Plane, cell_kernels, distorted
 from tests.codegen.element_states import MATERIALS
 
 with warnings.catch_warnings(), contextlib.suppress(ImportError):

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from softehl.codegen.graph.graph import Node, Op
@@ -22,11 +21,11 @@ from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
 from softehl.codegen.tools.oracle import Oracle
+from softehl.runtime.arrays import Array
 from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases
 from tests.codegen.workshop import compiled
 
-Array = npt.NDArray[np.float64]
 LIMIT = 1e-12
 CASES = {f"{c.family}: {c.label}": c for c in all_cases()}
 ENERGIES = ("solid_q4", "solid_taylor", "mean_rotation", "axial_spring")

@@ -5,22 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import shapes
 from softehl.codegen.tools.oracle import Oracle
-from softehl.runtime.fem.rules import Rule
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.arrays import Array
+from softehl.runtime.kernels import Kernel, Rule
 from tests.codegen.pages.gent import gent
 from tests.codegen.pages.maxwell import maxwell
 from tests.codegen.pages.ogden_hex8 import ogden
 from tests.codegen.pages.penalty_spring import penalty_spring
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors
 
-Array = npt.NDArray[np.float64]
 SQUARE = np.array(shapes.QUAD_NODES) / 2.0
 CUBE = np.array(shapes.HEX_NODES) / 2.0
 CENTRE = Rule(np.zeros((1, 3)), np.array([8.0]), None)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import sympy as sp
 
@@ -22,10 +21,10 @@ from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build
 from softehl.codegen.tools.oracle import Oracle
+from softehl.runtime.arrays import Array
 from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors, write
 
-Array = npt.NDArray[np.float64]
 PARAMETERS = (0.7, 1.7, 0.3)
 GAPS = (0.3, 0.052, 0.048, 1e-3, 1e-6, 1e-9, 1e-12, 0.0)
 ENTRIES = ("c11", "c22", "c33", "c12", "c13", "c23")

@@ -20,9 +20,10 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.kernels import load_kernel
-from tests.codegen.cell_kernels import TENSOR, Array, CellKernels, Plane, cell_kernels, distorted
+from tests.codegen.cell_kernels import TENSOR, CellKernels, Plane, cell_kernels, distorted
 from tests.codegen.element_states import MATERIALS, Case, all_cases
 from tests.codegen.workshop import compiled
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from softehl.runtime.fem import rules
+from softehl.runtime.kernels import Rule
 from tests.reference.calling import Part, assemble, fitted_order, solve
 from tests.reference.slider import ROD, Slider
 
@@ -40,7 +41,7 @@ class Film:
         return float(np.sqrt(np.sum(wrong**2 * values["dx"])))
 
 
-def replace_rule(part: Part, rule: rules.Rule) -> Part:
+def replace_rule(part: Part, rule: Rule) -> Part:
     return Part("film", part.coordinates, part.maps, part.parameters, rule=rule)
 
 

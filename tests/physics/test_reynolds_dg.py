@@ -9,6 +9,7 @@ import pytest
 
 from softehl.runtime.fem import rules
 from softehl.runtime.fem.dofs import separate_dofs
+from softehl.runtime.kernels import Rule
 from tests.reference.calling import Part, fitted_order
 from tests.reference.slider import ROD, Slider
 
@@ -47,7 +48,7 @@ def solved(slider: Slider, count: int, order: int, *, facet_sign: float = 1.0) -
     pressures = separate_dofs(count, order, first)
 
     def part(
-        family: str, width: int, after: np.ndarray, oil: tuple[float, ...], rule: rules.Rule
+        family: str, width: int, after: np.ndarray, oil: tuple[float, ...], rule: Rule
     ) -> Part:
         chain = np.arange(len(after))[:, None] + np.arange(width)
         moved = (2 * chain[:, :, None] + np.arange(2)).reshape(len(chain), -1)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softehl.runtime.fem.assembly import Array
-from softehl.runtime.fem.rules import Rule
+from softehl.runtime.arrays import Array
+from softehl.runtime.kernels import Rule
 
 
 @dataclass(frozen=True)

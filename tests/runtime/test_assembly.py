@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem import assembly
-from softehl.runtime.fem.assembly import Array, Assembler, ElementBlock, Integers
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.pattern import build_pattern
 from softehl.runtime.fem.problem import KeepsOrientation, Problem, StaysPositive

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve import pardiso
 from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.linear import Condenser, SingularMatrix, SuperLU
@@ -20,7 +21,7 @@ from softehl.runtime.solve.modified_newton import Chord, solve_banded
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.pardiso import Pardiso
 from softehl.runtime.solve.schur import FrozenBody, Memory
-from softehl.runtime.solve.solution import Status, Vector
+from softehl.runtime.solve.solution import Status
 
 N, M, K = 30, 4, 5
 SHARED, OWN = np.arange(10, 10 + M), np.arange(N - K, N)
@@ -33,7 +34,7 @@ SOLVERS: Sequence[Any] = [
 ]
 
 
-def answer(load: float) -> Vector:
+def answer(load: float) -> Array:
     """The solution at a load."""
     return load * np.sin(1.0 + np.arange(float(N)))
 
@@ -51,17 +52,17 @@ class Chain:
     shared: np.ndarray[Any, np.dtype[np.int64]] = field(default_factory=lambda: SHARED)
     own: np.ndarray[Any, np.dtype[np.int64]] = field(default_factory=lambda: OWN)
 
-    def _springs(self) -> Vector:
+    def _springs(self) -> Array:
         A = 3.0 * np.eye(N) - np.eye(N, k=1) - 0.8 * np.eye(N, k=-1)
         A[OWN], A[:, OWN] = 0.0, 0.0
         return A
 
-    def _body(self, x: Vector) -> Vector:
+    def _body(self, x: Array) -> Array:
         r = self._springs() @ x + self.softening * x**3
         r[OWN] = 0.0
         return np.asarray(r)
 
-    def _layer(self, x: Vector) -> tuple[Vector, Vector]:
+    def _layer(self, x: Array) -> tuple[Array, Array]:
         a, p = x[SHARED], x[OWN]
         couple = np.ones((M, K)) / K
         r = np.concatenate([np.exp(2.0 * a) + 0.3 * couple @ p, 2.0 * p + p**3 - couple.T @ a])
@@ -71,51 +72,51 @@ class Chain:
         A[M:, M:] = np.diag(2.0 + 3.0 * p**2)
         return r, A
 
-    def _sources(self) -> tuple[Vector, Vector]:
+    def _sources(self) -> tuple[Array, Array]:
         x = answer(self.load)
         return self._body(x), self._layer(x)[0]
 
-    def admissible(self, x: Vector) -> Vector:
+    def admissible(self, x: Array) -> Array:
         return x.copy()
 
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Array) -> Array:
         self.asked.append("residual")
         r = self._body(x) - self._sources()[0]
         r[BOTH] += self.layer_residual(x)
         return r
 
-    def linearise(self, x: Vector) -> tuple[Vector, csc_array[np.float64]]:
+    def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
         A = self.body(x).toarray()
         A[OWN, OWN] = 0.0
         A[np.ix_(BOTH, BOTH)] += self._layer(x)[1]
         return self.residual(x), csc_array(A)
 
-    def body(self, x: Vector) -> csc_array[np.float64]:
+    def body(self, x: Array) -> csc_array[np.float64]:
         A = self._springs() + np.diag(3.0 * self.softening * x**2)
         A[OWN] = 0.0
         A[OWN, OWN] = 1.0
         return csc_array(A)
 
-    def layer_residual(self, x: Vector) -> Vector:
+    def layer_residual(self, x: Array) -> Array:
         return np.asarray(self._layer(x)[0] - self._sources()[1])
 
-    def layer_linearise(self, x: Vector) -> tuple[Vector, csc_array[np.float64]]:
+    def layer_linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
         return self.layer_residual(x), csc_array(self._layer(x)[1])
 
-    def scaled(self, r: Vector) -> Vector:
+    def scaled(self, r: Array) -> Array:
         return r
 
-    def norm(self, r: Vector) -> float:
+    def norm(self, r: Array) -> float:
         return float(np.linalg.norm(self.scaled(r)))
 
-    def step_limit(self, x: Vector, dx: Vector) -> float:
+    def step_limit(self, x: Array, dx: Array) -> float:
         return 1.0
 
-    def layer_limit(self, x: Vector, dx: Vector) -> float:
+    def layer_limit(self, x: Array, dx: Array) -> float:
         return 1.0
 
 
-def condensed(linear: Condenser, problem: Chain, x: Vector) -> Any:
+def condensed(linear: Condenser, problem: Chain, x: Array) -> Any:
     return linear.condense(problem.body(x), SHARED)
 
 
@@ -138,7 +139,7 @@ def test_condensation_against_dense_elimination(
     assert full[SHARED] == pytest.approx(x)
     assert full[interior] == pytest.approx(inverse @ (r[interior] - D @ x), rel=1e-10)
     # with the solution of the condensed system it solves the whole
-    shared: Vector = np.asarray(np.linalg.solve(c.schur, g), dtype=np.float64)
+    shared: Array = np.asarray(np.linalg.solve(c.schur, g), dtype=np.float64)
     assert dense @ c.extend(reduced, shared) == pytest.approx(r, abs=1e-11)
 
 
@@ -196,10 +197,10 @@ def test_a_wrong_schur_complement_costs_iterations_only() -> None:
 
 def test_a_layer_that_contradicts_the_residual_never_converges() -> None:
     class Forged(Chain):
-        def layer_residual(self, x: Vector) -> Vector:
+        def layer_residual(self, x: Array) -> Array:
             return super().layer_residual(x) + 0.1
 
-        def residual(self, x: Vector) -> Vector:
+        def residual(self, x: Array) -> Array:
             r = super().residual(x)
             r[BOTH] -= 0.1
             r[BOTH[0]] += 0.01
@@ -334,7 +335,7 @@ class Rough(Chain):
 
     error = 1e-8
 
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Array) -> Array:
         noise = np.sin(1e12 * x)
         noise[BOTH] = 0.0
         return np.asarray(super().residual(x) + self.error * noise)
@@ -368,7 +369,7 @@ def test_rounding_does_not_wear_a_condensation() -> None:
 
 def test_a_singular_body_is_a_status() -> None:
     class Loose(Chain):
-        def body(self, x: Vector) -> csc_array[np.float64]:
+        def body(self, x: Array) -> csc_array[np.float64]:
             A = super().body(x).toarray()
             A[3] = 0.0
             return csc_array(A)

@@ -13,13 +13,14 @@ import pytest
 from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.continuation import Arclength, Continuation, Predictor, StepRule
 from softehl.runtime.solve.linear import SparseMatrix
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import Branch, NotConverged, Point, Status, Vector
+from softehl.runtime.solve.solution import Branch, NotConverged, Point, Status
 
 
-def _full_step(x: Vector, dx: Vector) -> float:
+def _full_step(x: Array, dx: Array) -> float:
     return 1.0
 
 
@@ -27,22 +28,22 @@ def _full_step(x: Vector, dx: Vector) -> float:
 class Algebraic:
     """R and dR/dx at one parameter; `visited` lists the x at which R was asked for."""
 
-    equations: Callable[[Vector], Vector]
-    jacobian: Callable[[Vector], Vector]
-    limit: Callable[[Vector, Vector], float] = _full_step
-    visited: list[Vector] = field(default_factory=list)
+    equations: Callable[[Array], Array]
+    jacobian: Callable[[Array], Array]
+    limit: Callable[[Array, Array], float] = _full_step
+    visited: list[Array] = field(default_factory=list)
 
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Array) -> Array:
         self.visited.append(x.copy())
         return self.equations(x)
 
-    def linearise(self, x: Vector) -> tuple[Vector, SparseMatrix]:
+    def linearise(self, x: Array) -> tuple[Array, SparseMatrix]:
         return self.equations(x), csc_array(np.atleast_2d(self.jacobian(x)))
 
-    def norm(self, r: Vector) -> float:
+    def norm(self, r: Array) -> float:
         return float(np.abs(r).max())
 
-    def step_limit(self, x: Vector, dx: Vector) -> float:
+    def step_limit(self, x: Array, dx: Array) -> float:
         return self.limit(x, dx)
 
 
@@ -288,7 +289,7 @@ def test_the_predictor_stays_admissible() -> None:
     # log x = -p: the secant through p = 0 and 2 is negative at 4.
     tried: list[Algebraic] = []
 
-    def positive(x: Vector, dx: Vector) -> float:
+    def positive(x: Array, dx: Array) -> float:
         return min(1.0, 0.9 * x[0] / -dx[0]) if dx[0] < 0.0 else 1.0
 
     def problem_at(p: float) -> Algebraic:
@@ -439,11 +440,11 @@ HEIGHT = 0.3  # of the truss, over half its span 1; load in units of E A height^
 def truss(p: float) -> Algebraic:
     """Two bars of a von Mises truss in Green strain: p = s (1 - s^2), s = 1 - w / height."""
 
-    def force(w: Vector) -> Vector:
+    def force(w: Array) -> Array:
         s = 1.0 - w / HEIGHT
         return s * (1.0 - s**2)
 
-    def stiffness(w: Vector) -> Vector:
+    def stiffness(w: Array) -> Array:
         return np.diag((3.0 * (1.0 - w / HEIGHT) ** 2 - 1.0) / HEIGHT)
 
     return Algebraic(lambda w: force(w) - p, stiffness)
@@ -468,7 +469,7 @@ def test_von_mises_truss_snaps_through_at_its_closed_form_limit_loads() -> None:
     assert (np.diff(deflections) > 0.0).all()
 
 
-def quadratic_order(derivative: Callable[[float, Vector], Vector] | None) -> float:
+def quadratic_order(derivative: Callable[[float, Array], Array] | None) -> float:
     """Exponent of the last residual norms of the longest corrector on the Bratu path."""
     walk = arc(parameter_scale=3.0, steps=StepRule(0.6, 0.6, 0.6), turn=60.0, max_points=3)
     branch = walk.follow(bratu(15), 0.0, np.zeros(15), derivative=derivative)

@@ -7,10 +7,10 @@ import pytest
 
 from softehl.cases.seal.path import PathSettings, contact_problem
 from softehl.cases.seal.section import OringSection, build_section
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import HeldPressure, element_pressures
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
-from softehl.runtime.solve.solution import Vector
 from tests.cases.oring_cases import oring
 
 KAPPA = 500.0
@@ -27,18 +27,18 @@ def problem(section: OringSection) -> Problem:
 
 
 @pytest.fixture
-def state(section: OringSection, rng: np.random.Generator) -> Vector:
+def state(section: OringSection, rng: np.random.Generator) -> Array:
     x = section.at_rest()
     u = 0.02 * (section.mesh.points - section.mesh.points.mean(axis=0))
     x[section.layout.part("displacement")] = u.ravel() + 1e-4 * rng.normal(size=u.size)
     return x
 
 
-def held(problem: Problem, pressures: Vector) -> HeldPressure:
+def held(problem: Problem, pressures: Array) -> HeldPressure:
     return HeldPressure.of(problem, "solid", load_kernel("follower_pressure"), pressures, KAPPA)
 
 
-def volumes(section: OringSection, x: Vector) -> Vector:
+def volumes(section: OringSection, x: Array) -> Array:
     """Volumes of the rings by Pappus: area times the path of the centroid, in closed form."""
     a = section.deformed(x)[section.mesh.quads]
     b = np.roll(a, -1, axis=1)
@@ -47,7 +47,7 @@ def volumes(section: OringSection, x: Vector) -> Vector:
 
 
 def test_with_the_true_pressures_the_tangent_is_the_problem_s(
-    problem: Problem, state: Vector
+    problem: Problem, state: Array
 ) -> None:
     own = held(problem, element_pressures(problem, "solid", state))
     r, K = own.linearise(state)
@@ -58,7 +58,7 @@ def test_with_the_true_pressures_the_tangent_is_the_problem_s(
 
 
 def test_an_excess_pressure_adds_the_second_derivative_of_the_volume(
-    section: OringSection, problem: Problem, state: Vector, rng: np.random.Generator
+    section: OringSection, problem: Problem, state: Array, rng: np.random.Generator
 ) -> None:
     excess = rng.normal(size=len(section.mesh.quads))
     pressures = element_pressures(problem, "solid", state)
@@ -74,7 +74,7 @@ def test_an_excess_pressure_adds_the_second_derivative_of_the_volume(
 
 
 def test_pressures_follow_the_linearised_volume(
-    section: OringSection, problem: Problem, state: Vector, rng: np.random.Generator
+    section: OringSection, problem: Problem, state: Array, rng: np.random.Generator
 ) -> None:
     start = held(problem, np.zeros(len(section.mesh.quads)))
     assert start.volumes == pytest.approx(volumes(section, section.at_rest()), rel=1e-3)

@@ -6,20 +6,20 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
-from softehl.runtime.fem.rules import Rule, facet_rule, film_rule, gauss
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.rules import facet_rule, film_rule, gauss
 from softehl.runtime.kernels import (
     ArgumentError,
     Kernel,
     KernelError,
     MissingKernelsError,
+    Rule,
     load_kernel,
-    manifest,
 )
+from softehl.runtime.library import manifest
 
-Array = npt.NDArray[np.float64]
 FAMILIES = tuple(manifest())
 VALUES = {
     "mu_1": 3.04,

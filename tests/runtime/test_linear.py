@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, csc_matrix
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import SingularMatrix, SparseMatrix, SuperLU
-from softehl.runtime.solve.solution import Vector
 
 
-def laplacian(n: int) -> Vector:
+def laplacian(n: int) -> Array:
     """Second differences on n inner points of (0, 1), dense."""
     return (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)) * (n + 1.0) ** 2
 
@@ -25,7 +25,7 @@ def grid(n: int) -> SparseMatrix:
 
 
 @pytest.mark.parametrize("kind", [csc_array, csc_matrix])
-def test_second_differences_reproduce_the_parabola(kind: Callable[[Vector], SparseMatrix]) -> None:
+def test_second_differences_reproduce_the_parabola(kind: Callable[[Array], SparseMatrix]) -> None:
     # -u'' = 1, u = 0 at both ends: second differences are exact for u = x (1 - x) / 2.
     x = np.linspace(0.0, 1.0, 101)[1:-1]
     u = SuperLU().factorise(kind(laplacian(99))).solve(np.ones(99))

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import SparseMatrix
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import NotConverged, Solution, Status, Vector
+from softehl.runtime.solve.solution import NotConverged, Solution, Status
 
 
-def _full_step(x: Vector, dx: Vector) -> float:
+def _full_step(x: Array, dx: Array) -> float:
     return 1.0
 
 
@@ -24,22 +25,22 @@ def _full_step(x: Vector, dx: Vector) -> float:
 class Algebraic:
     """R and dR/dx as plain functions; `visited` lists the x at which R was asked for."""
 
-    equations: Callable[[Vector], Vector]
-    jacobian: Callable[[Vector], Vector]
-    limit: Callable[[Vector, Vector], float] = _full_step
-    visited: list[Vector] = field(default_factory=list)
+    equations: Callable[[Array], Array]
+    jacobian: Callable[[Array], Array]
+    limit: Callable[[Array, Array], float] = _full_step
+    visited: list[Array] = field(default_factory=list)
 
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Array) -> Array:
         self.visited.append(x.copy())
         return self.equations(x)
 
-    def linearise(self, x: Vector) -> tuple[Vector, SparseMatrix]:
+    def linearise(self, x: Array) -> tuple[Array, SparseMatrix]:
         return self.equations(x), csc_array(np.atleast_2d(self.jacobian(x)))
 
-    def norm(self, r: Vector) -> float:
+    def norm(self, r: Array) -> float:
         return float(np.abs(r).max())
 
-    def step_limit(self, x: Vector, dx: Vector) -> float:
+    def step_limit(self, x: Array, dx: Array) -> float:
         return self.limit(x, dx)
 
 
@@ -205,7 +206,7 @@ def test_step_into_the_undefined_is_halved() -> None:
 
 
 def test_step_limit_keeps_every_trial_admissible() -> None:
-    def positive(x: Vector, dx: Vector) -> float:
+    def positive(x: Array, dx: Array) -> float:
         return min(1.0, 0.9 * x[0] / -dx[0]) if dx[0] < 0.0 else 1.0
 
     problem = Algebraic(LOGARITHM.equations, LOGARITHM.jacobian, positive)

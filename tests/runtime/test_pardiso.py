@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, random_array
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve import pardiso
 from softehl.runtime.solve.linear import (
     Factorisation,
@@ -21,7 +22,7 @@ from softehl.runtime.solve.linear import (
 )
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.pardiso import Pardiso
-from softehl.runtime.solve.solution import Status, Vector
+from softehl.runtime.solve.solution import Status
 from tests.runtime.test_linear import grid, laplacian
 
 installed = pytest.mark.skipif(not pardiso.available(), reason="the extra `fast` is not installed")
@@ -152,17 +153,17 @@ def test_the_wrong_factors_are_noticed() -> None:
 class Cubic:
     """x_i^3 - x_(i+1) = c, cyclic, with the solution x = 2 everywhere for c = 6."""
 
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Array) -> Array:
         return x**3 - np.roll(x, -1) - 6.0
 
-    def linearise(self, x: Vector) -> tuple[Vector, csc_array[np.float64]]:
+    def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
         K = np.diag(3.0 * x**2) - np.roll(np.eye(len(x)), 1, axis=1)
         return self.residual(x), csc_array(K)
 
-    def norm(self, r: Vector) -> float:
+    def norm(self, r: Array) -> float:
         return float(np.abs(r).max())
 
-    def step_limit(self, x: Vector, dx: Vector) -> float:
+    def step_limit(self, x: Array, dx: Array) -> float:
         return 1.0
 
 
