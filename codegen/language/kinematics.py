@@ -6,6 +6,7 @@ axisymmetric motion is a 2x2 block and the hoop stretch.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -122,28 +123,11 @@ def invariants(m: Model, label: str, F: Gradient) -> tuple[Any, Any, Any]:
     return scale * I1, scale**2 * I2, I3
 
 
-def mooney_rivlin_isochoric(mu: tuple[Any, Any], I1bar: Any, I2bar: Any) -> Any:
-    """First two terms of the energy (3)."""
-    return mu[0] * (I1bar - 3) / 2 + mu[1] * (I2bar - 3) / 2
-
-
-def volumetric(kappa: Any, I3: Any) -> Any:
-    """Volumetric energy (6)."""
-    return kappa * ((I3 - 1) / 2 - sp.log(I3) / 2) / 2
-
-
-def cauchy_mooney_rivlin(mu: tuple[Any, Any], kappa: Any, F: Gradient) -> tuple[Any, ...]:
-    """Cauchy stress of (3)-(6): J, then sigma_zz, sigma_rr, sigma_tt, sigma_zr."""
-    J = F.J
-    B = F.plane * F.plane.T
-    s = J ** sp.Rational(-2, 3)
-    b = [s * B[0, 0], s * B[1, 1], s * F.hoop**2, s * B[0, 1]]
-    I1 = b[0] + b[1] + b[2]
-    square = [b[0] ** 2 + b[3] ** 2, b[1] ** 2 + b[3] ** 2, b[2] ** 2, b[3] * (b[0] + b[1])]
-    mean_b, I2 = I1 / 3, (I1**2 - square[0] - square[1] - square[2]) / 2
-    pressure = kappa * (J**2 - 1) / (2 * J)
-    normal = [
-        (mu[0] * (b[k] - mean_b) + mu[1] * (I1 * b[k] - square[k] - 2 * I2 / 3)) / J + pressure
-        for k in range(3)
-    ]
-    return (J, *normal, (mu[0] * b[3] + mu[1] * (I1 * b[3] - square[3])) / J)
+def cauchy(m: Model, W: Callable[[Gradient], Any], F: Gradient) -> tuple[Any, ...]:
+    """J and the Cauchy stress P F^T / J, P = dW/dF: J, sigma_zz, sigma_rr, sigma_tt, sigma_zr."""
+    plane, hoop = m.define("F_of_stress", F.plane), m.define("F_of_stress_t", F.hoop)
+    F = Gradient(plane, hoop)
+    *P, P_t = m.derivative("P", W(F), [*plane, hoop])
+    tau = sp.Matrix(2, 2, P) * plane.T
+    J = m.define("J_of_stress", F.J)
+    return J, tau[0, 0] / J, tau[1, 1] / J, P_t * hoop / J, tau[0, 1] / J

@@ -8,6 +8,8 @@ The boundary conditions (15) prescribe the end unknowns in both: dp vanishes the
 
 from __future__ import annotations
 
+from typing import Any
+
 import sympy as sp
 
 from softehl.codegen.language.definition import Definition
@@ -46,8 +48,8 @@ def reynolds_segment() -> Definition:
     h = m.define("h", shapes.interpolate(N, nodal_h), interface=True)
     r = m.define("r", R_rod + h)
     slope = m.define("slope", p_xi / z_xi)
-    eta = m.define("eta", eta_0 * sp.exp(alpha * p))
-    q = m.define("q", U / 2 * h - h**3 / (12 * eta) * slope)
+    eta = m.define("eta", _viscosity(eta_0, alpha, p))
+    q = m.define("q", _flux(U, h, _conductance(h, eta), slope))
     couette = m.define("couette", eta * U / h)
     poiseuille = m.define("poiseuille", h / 2 * slope)
     tau = couette - poiseuille
@@ -73,6 +75,21 @@ def reynolds_segment() -> Definition:
         eta=eta,
     )
     return m.finish()
+
+
+def _viscosity(eta_0: Any, alpha: Any, p: Any) -> Any:
+    """eta(p) of (13)."""
+    return eta_0 * sp.exp(alpha * p)
+
+
+def _conductance(h: Any, eta: Any) -> Any:
+    """Flow through the gap for a unit pressure gradient, per width."""
+    return h**3 / (12 * eta)
+
+
+def _flux(U: Any, h: Any, conductance: Any, slope: Any) -> Any:
+    """Volume flux of (14): half of what the rod drags along less what the pressure drives back."""
+    return U / 2 * h - conductance * slope
 
 
 def _nodal_thickness(m: Model, X: Vectors, u: Vectors, R_rod: sp.Symbol) -> list[sp.Symbol]:
@@ -106,7 +123,7 @@ def bubble_load() -> Definition:
     z_xi = m.define("z_xi", (X[0][1] + u[0][1] - X[0][0] - u[0][0]) / 2)
     h = _nodal_thickness(m, X, u, R_rod)
     h_m = m.define("h_m", (h[0] + h[1]) / 2)
-    peclet = m.define("peclet", 6 * eta_0 * U * z_xi**2 / (sp.pi * G * h_m**3))
+    peclet = m.define("peclet", U * z_xi**2 / (2 * sp.pi * G * _conductance(h_m, eta_0)))
     delta = m.define("delta", peclet**2 / (9 + peclet**2))
     # p_b vanishes at both ends: the integral of r p_b is that of -W p_b', with W' = r, and also
     # of -W p', where the integral of W is zero.
@@ -142,10 +159,10 @@ def reynolds_facet() -> Definition:
     mobilities, fluxes = [], []
     for k, (name, (p, p_xi)) in enumerate(zip(("minus", "plus"), sides, strict=True)):
         z_xi = m.define(f"z_xi_{name}", (z[k + 1] - z[k]) / 2)
-        eta = m.define(f"eta_{name}", eta_0 * sp.exp(alpha * p))
+        eta = m.define(f"eta_{name}", _viscosity(eta_0, alpha, p))
         # dq of (24) for a unit xi-derivative of dp
-        mobilities.append(m.define(f"mobility_{name}", -(h**3) / (12 * eta * z_xi)))
-        fluxes.append(m.define(f"q_{name}", U / 2 * h + mobilities[k] * p_xi))
+        mobilities.append(m.define(f"mobility_{name}", -_conductance(h, eta) / z_xi))
+        fluxes.append(m.define(f"q_{name}", _flux(U, h, -mobilities[k], p_xi)))
     (p_minus, p_minus_xi), (p_plus, p_plus_xi) = sides
     jump = m.define("jump", p_minus - p_plus)
     q = m.define("q", (fluxes[0] + fluxes[1]) / 2)

@@ -10,35 +10,31 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.language import kinematics as kin
+from softehl.codegen.language import materials
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 
 
 def _element(name: str, doc: str) -> tuple[Model, Any, Any, Any]:
-    """Arguments that the three solids share: coordinates, displacements, material."""
+    """Arguments that the three solids share: coordinates, displacements, terms of the energy."""
     m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), unroll=True, doc=doc)
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
-    material = m.parameters(
-        mu_1="elastic parameter [MPa]",
-        mu_2="elastic parameter [MPa]",
-        kappa="bulk modulus [MPa]",
-    )
-    return m, X, u, material
+    return m, X, u, (materials.MOONEY_RIVLIN.declared(m), materials.VOLUMETRIC.declared(m))
 
 
 def _energy(m: Model, label: str, F: kin.Gradient, material: Any) -> Any:
     """W(F) of (3)."""
-    mu_1, mu_2, kappa = material
+    isochoric, volumetric = material
     I1, I2, I3 = kin.invariants(m, label, F)
-    return kin.mooney_rivlin_isochoric((mu_1, mu_2), I1, I2) + kin.volumetric(kappa, I3)
+    return isochoric(I1, I2) + volumetric(I3)
 
 
 def _fields(m: Model, X: Any, u: Any, N: Any, F: kin.Gradient, material: Any) -> None:
     """Deformed position, volume ratio and Cauchy stress at the quadrature points."""
     z, r = (shapes.interpolate(N, [a + b for a, b in zip(X[c], u[c], strict=True)]) for c in (0, 1))
-    J, zz, rr, tt, zr = kin.cauchy_mooney_rivlin(material[:2], material[2], F)
+    J, zz, rr, tt, zr = kin.cauchy(m, lambda F: _energy(m, "_of_stress", F, material), F)
     m.fields(z=z, r=r, J=J, sigma_zz=zz, sigma_rr=rr, sigma_tt=tt, sigma_zr=zr)
 
 
@@ -77,9 +73,9 @@ def fbar() -> Definition:
 def taylor() -> Definition:
     """Under-integrated element with Taylor-expanded gradients, after Korelc and Wriggers (1997).
 
-    Our reading.  Gradients of the shape functions are expanded about the centre to first order in
-    xi and eta (N_a in the hoop term likewise, over the exact radius), and integrated with the
-    Jacobian of the centre: their mean is then that of the exact ones, as the patch test asks.
+    The gradients of the shape functions are expanded about the centre to first order in xi and
+    eta (N_a in the hoop term likewise, over the exact radius), and integrated with the Jacobian
+    of the centre: their mean is then that of the exact ones, as the patch test asks.
     The isochoric energy is taken at the 2x2 points, the volumetric one at the centre only.
     """
     m, X, u, material = _element("solid_taylor", taylor.__doc__ or "")
@@ -89,14 +85,14 @@ def taylor() -> Definition:
     dN, N = _expanded(m, X, centre, xi, eta)
     F = kin.gradient(m, "", dN, [n / R for n in N], u)
     F0 = kin.gradient(m, "0", centre.dN, [n / centre.R for n in centre.N], u)
-    mu_1, mu_2, kappa = material
+    isochoric, volumetric = material
     I1, I2, _ = kin.invariants(m, "", F)
-    isochoric = m.integral(
-        "isochoric",
-        2 * sp.pi * R * centre.detJ * kin.mooney_rivlin_isochoric((mu_1, mu_2), I1, I2),
-    )
+    ring = 2 * sp.pi * R * centre.detJ
     volume = 8 * sp.pi * centre.R * centre.detJ
-    m.potential(isochoric + volume * kin.volumetric(kappa, m.define("I3_0", F0.J**2)))
+    m.potential(
+        m.integral("isochoric", ring * isochoric(I1, I2))
+        + volume * volumetric(m.define("I3_0", F0.J**2))
+    )
     # The stress combines the point's isochoric part with the centre's volume ratio.
     shared = F.scaled(m.define("to_J0", (F0.J / F.J) ** sp.Rational(1, 3)))
     _fields(m, X, u, shapes.quad4(xi, eta), shared, material)
