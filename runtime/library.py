@@ -1,27 +1,31 @@
 """Where compiled kernels are found, and calls into them: the only module that knows cffi.
 
-A folder holds generated C, its `manifest.json` and the shared library that was built from it.
+A folder holds generated C, its `manifest.json` and the shared library that was built from it.  Of
+the kernels that ship the library is one tuned to the processor (`tuning`), or where there is none
+the plain one of the wheel.  No library is opened before its SHA-256 is that which stands beside it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import multiprocessing
+import sys
 import sysconfig
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import cffi
 
+from softehl.runtime import tuning
 from softehl.runtime.arrays import Array
 
 GENERATED = Path(__file__).resolve().parent.parent / "generated"
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
-REMEDY = "run `python -m softehl.codegen.tools.build` (make does it)"
-REMEDY_OF_OTHERS = "run `softehl generate` with its model file"
+DIGEST = f"{LIBRARY}.sha256"
 
 _SIGNATURE = (
     "(ptrdiff_t, ptrdiff_t, ptrdiff_t, const double *, const double *, const double *,"
@@ -43,15 +47,22 @@ class MissingKernelsError(KernelError):
 
 
 class StaleKernelsError(KernelError):
-    """The library was built from other C than what stands in its folder now."""
+    """The library was built from other C than what stands in its folder now, or is damaged."""
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """The shared library of a folder, loaded."""
+    """The shared library of a folder of C, loaded.
+
+    kind: "tuned" (to the processor of this machine) or "plain" (for all of its platform).
+    reason: why it is not tuned; empty if it is.
+    """
 
     directory: Path
     loaded: Any
+    path: Path
+    kind: str = "tuned"
+    reason: str = ""
 
     def function(self, kernel: str, task: str) -> Function:
         """The C function of a task of a kernel."""
@@ -85,29 +96,76 @@ class Library:
 
 @cache
 def manifest(directory: Path = GENERATED) -> dict[str, Any]:
-    """Kernel families of a directory of generated C, by name."""
+    """Kernel families of a directory of generated C, by name.  Raises `KernelError`."""
     path = directory / "manifest.json"
     if not path.exists():
         raise MissingKernelsError(f"{path} is missing: run `softehl generate`")
-    kernels: dict[str, Any] = json.loads(path.read_text())["kernels"]
-    return kernels
+    try:
+        kernels = json.loads(path.read_text(encoding="utf-8"))["kernels"]
+        if all("tasks" in entry for entry in kernels.values()):
+            return dict(kernels)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        pass
+    raise StaleKernelsError(f"{path} is damaged: {_remedy(directory)}")
 
 
 @cache
-def library_of(directory: Path) -> Library:
-    """The library of a folder; raises `KernelError` when it is missing or stale."""
-    path = directory / LIBRARY
-    remedy = REMEDY if directory == GENERATED else REMEDY_OF_OTHERS
+def library_of(directory: Path = GENERATED) -> Library:
+    """The library of a folder; for the kernels that ship the best there is.
+
+    Raises `KernelError` when it is missing, stale or damaged.
+    """
+    if directory != GENERATED:
+        return _opened(directory / LIBRARY, directory)
+    try:
+        return _opened(tuning.tuned(), directory, "set SOFTEHL_CACHE to another folder")
+    except (KernelError, tuning.NotTunedError) as error:
+        reason = " ".join(str(error).split())
+        expected = isinstance(error, tuning.NotTunedError) and error.expected
+    if not (directory / DIGEST).exists():
+        raise MissingKernelsError(f"the kernels are not built: {reason}")
+    if not expected and multiprocessing.parent_process() is None:
+        print(f"softehl: the plain kernels are used: {reason}", file=sys.stderr)
+    return replace(_opened(directory / LIBRARY, directory), kind="plain", reason=reason)
+
+
+def _opened(path: Path, directory: Path, remedy: str = "") -> Library:
+    """Open a library that is whole and was built from the C of a directory."""
+    remedy = remedy or _remedy(directory)
     if not path.exists():
         raise MissingKernelsError(f"the kernels are not built: {remedy}")
-    _ffi.cdef(_declarations(directory), override=True)
-    library = Library(directory, _ffi.dlopen(str(path)))
-    if not library.current:
+    if not _whole(path):
+        raise StaleKernelsError(f"{path} or the digest beside it is damaged: {remedy}")
+    try:
+        _ffi.cdef(_declarations(directory), override=True)
+        library = Library(directory, _ffi.dlopen(str(path)), path)
+        current = library.current
+    except (OSError, AttributeError, cffi.CDefError) as error:
+        reason = " ".join(str(error).split())
+        raise StaleKernelsError(f"{path} cannot be used ({reason}): {remedy}") from None
+    if not current:
         library.close()
         raise StaleKernelsError(
             f"{path.name} was built from other sources than {directory.name}/ holds now: {remedy}"
         )
     return library
+
+
+def _whole(path: Path) -> bool:
+    """Whether the SHA-256 of a library stands beside it."""
+    try:
+        told = path.with_name(DIGEST).read_text(encoding="ascii").split()
+        return told[:1] == [hashlib.sha256(path.read_bytes()).hexdigest()]
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def _remedy(directory: Path) -> str:
+    return (
+        "install softehl anew"
+        if directory == GENERATED
+        else "run `softehl generate` with its model file"
+    )
 
 
 def _pointer(array: Array, kind: str) -> Any:

@@ -89,7 +89,12 @@ class Walker:
             starter=stage.corrector or patient,
         )
         return continuation.follow(
-            stage.problem_at, stage.start, stage.stop, x0, waypoints=stage.waypoints, on_point=report
+            stage.problem_at,
+            stage.start,
+            stage.stop,
+            x0,
+            waypoints=stage.waypoints,
+            on_point=report,
         )
 
 

@@ -1,15 +1,18 @@
-"""Compile the generated C into one shared library (no SymPy needed).
+"""Compile generated C into one shared library (no SymPy needed).
 
-`python -m softehl.codegen.tools.build` is what `make` calls.  The library carries the signature
-of the sources
-it was built from; it is written under a temporary name and moved into place, so that two builds
-at once do no harm.
+`build` fills one folder: the library carries the signature of the sources that it was built from,
+and its SHA-256 stands beside it, so that a damaged one is never loaded.  Both are written under
+temporary names and moved into place: two builds at once do no harm.
+
+`python -m softehl.codegen.tools.build` compiles the kernels that ship, for the processor of this
+machine, into the user's cache (`codegen.tools.shipped`) and prints where they are.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import shlex
 import shutil
 import subprocess
@@ -17,25 +20,30 @@ import sys
 import sysconfig
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from time import perf_counter
 
+from softehl.codegen.tools import cache
+
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
-FLAGS = (
-    "-std=c11",
-    "-O2",
-    "-march=native",
-    "-fno-math-errno",
-    "-ffp-contract=fast",
-    "-fPIC",
-    "-shared",
-)
+COMMON = ("-std=c11", "-O2", "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared")
+FLAGS = (*COMMON, "-march=native")
+"""For the processor of this machine."""
+PLAIN = (*COMMON, *(["-march=x86-64"] if platform.machine() in ("x86_64", "AMD64") else []))
+"""For every processor of this platform: what a wheel carries."""
 STRICT = ("-Wall", "-Wextra", "-Werror")
+"""For our own tests alone: another compiler may warn of what ours does not."""
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
+DIGEST = f"{LIBRARY}.sha256"
 
 
 class BuildError(RuntimeError):
-    """The compiler failed or is missing; the message holds its command line and its words."""
+    """The compiler failed; the message holds what is wrong, its command line and its words."""
+
+
+class NoCompilerError(BuildError):
+    """There is no C compiler: $CC is not set, and there is no cc on the PATH."""
 
 
 def signature(directory: Path) -> str:
@@ -46,76 +54,119 @@ def signature(directory: Path) -> str:
     return digest.hexdigest()
 
 
+def intact(directory: Path) -> bool:
+    """Whether the library there is whole and was built from the sources there; never loads it."""
+    try:
+        data = (directory / LIBRARY).read_bytes()
+        told = (directory / DIGEST).read_text(encoding="ascii").split()
+        return told[:1] == [_sha256(data)] and signature(directory).encode() in data
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
 def compiler() -> list[str]:
     """The C compiler as a command: $CC, or cc from the PATH."""
-    return shlex.split(os.environ.get("CC") or "cc")
-
-
-def build(directory: Path = GENERATED, *, extra: Sequence[str] = STRICT) -> Path:
-    """Compile every C file of `directory` into its shared library and return its path."""
-    sources = sorted(str(p) for p in directory.glob("*.c"))
-    target = directory / LIBRARY
-    handle, scratch = tempfile.mkstemp(suffix=".so", dir=directory)
-    os.close(handle)
-    define = f'-DSOFTEHL_SIGNATURE="{signature(directory)}"'
-    command = [*compiler(), *FLAGS, *extra, define, *sources, "-o", scratch, "-lm"]
+    given = os.environ.get("CC", "")
     try:
-        _run(command)
-        os.replace(scratch, target)
-    finally:
-        Path(scratch).unlink(missing_ok=True)
-    return target
+        return shlex.split(given) or ["cc"]
+    except ValueError as error:
+        reason = str(error)[:1].lower() + str(error)[1:]
+        raise BuildError(f"CC={given!r} is no command ({reason}): set CC to a C compiler") from None
 
 
-def build_each(directory: Path) -> dict[str, float]:
-    """Like `build`, one C file after another; returns the seconds that each took, by its stem.
+def build(
+    directory: Path, *, flags: Sequence[str] = FLAGS, extra: Sequence[str] = ()
+) -> dict[str, float]:
+    """Compile every C file of `directory` into its shared library.
 
-    Warnings are no errors here: a newer compiler may warn of what ours does not.
+    Returns the seconds that each file took, by its stem.  An older library stays if anything fails.
     """
-    seconds = {}
     define = f'-DSOFTEHL_SIGNATURE="{signature(directory)}"'
+    sources = sorted(directory.glob("*.c"))
+    command = [*compiler(), *flags, *extra]
     with tempfile.TemporaryDirectory(prefix=".part-", dir=directory) as scratch:
-        objects = []
-        for source in sorted(directory.glob("*.c")):
-            objects.append(str(Path(scratch) / f"{source.stem}.o"))
-            compiling = [f for f in FLAGS if f != "-shared"]
+        objects = [Path(scratch) / f"{source.stem}.o" for source in sources]
+        compiling = [*(word for word in command if word != "-shared"), define, "-c"]
+
+        def compiled(source: Path, to: Path) -> float:
             start = perf_counter()
-            _run([*compiler(), *compiling, define, "-c", str(source), "-o", objects[-1]])
-            seconds[source.stem] = perf_counter() - start
-        _run([*compiler(), *FLAGS, *objects, "-o", str(directory / LIBRARY), "-lm"])
-    return seconds
+            _run([*compiling, str(source), "-o", str(to)], to)
+            return perf_counter() - start
+
+        with ThreadPoolExecutor(_processors()) as pool:
+            seconds = list(pool.map(compiled, sources, objects))
+        linked = Path(scratch) / LIBRARY
+        _run([*command, *map(str, objects), "-o", str(linked), "-lm"], linked)
+        data = linked.read_bytes()
+    cache.write(directory / LIBRARY, data, mode=0o755)
+    cache.write(directory / DIGEST, f"{_sha256(data)}  {LIBRARY}\n".encode())
+    return {source.stem: s for source, s in zip(sources, seconds, strict=True)}
 
 
-def identification() -> str:
+def tuned() -> tuple[tuple[str, ...], str]:
+    """Flags for this processor, as far as the compiler knows it, and its `identification`."""
+    try:
+        return FLAGS, identification(FLAGS)
+    except NoCompilerError:
+        raise
+    except BuildError:
+        return PLAIN, identification(PLAIN)
+
+
+def identification(flags: Sequence[str] = FLAGS) -> str:
     """What the compiler says of itself, the flags and the processor they compile for.
 
     Its predefined macros hold all of that, the instruction set of -march=native included.
     """
-    command = [*compiler(), *(f for f in FLAGS if f != "-shared"), "-dM", "-E", "-x", "c", "-"]
-    return shlex.join([*compiler(), *FLAGS]) + "\n" + _run(command)
-
-
-def _run(command: Sequence[str]) -> str:
-    line = shlex.join(command)
-    if shutil.which(command[0]) is None:
+    command = [*compiler(), *(f for f in flags if f != "-shared"), "-dM", "-E", "-x", "c", "-"]
+    done = _called(command)
+    if done.returncode != 0 or "#define __STDC__" not in done.stdout:
+        words = " ".join((done.stderr or done.stdout).split())[:200] or "nothing"
         raise BuildError(
-            f"no C compiler: {command[0]!r} is not on the PATH; install one or set CC\n  {line}"
+            f"{shlex.join(compiler())} does not answer as a C compiler does "
+            f"(exit code {done.returncode}: {words}): set CC to one"
         )
-    result = subprocess.run(command, capture_output=True, text=True, check=False, input="")
-    if result.returncode != 0:
-        raise BuildError(f"the C compiler failed ({result.returncode}):\n  {line}\n{result.stderr}")
-    return result.stdout
+    return shlex.join([*compiler(), *flags]) + "\n" + done.stdout
 
 
-def main() -> int:
-    """Build the kernels that ship."""
+def _run(command: Sequence[str], makes: Path) -> None:
+    done = _called(command)
+    line = shlex.join(command)
+    if done.returncode != 0:
+        raise BuildError(f"the C compiler failed ({done.returncode}):\n  {line}\n{done.stderr}")
+    if not makes.is_file():
+        raise BuildError(
+            f"{command[0]} is no C compiler: it wrote nothing; set CC to one\n  {line}"
+        )
+
+
+def _called(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    if shutil.which(command[0]) is None:
+        kind = BuildError if os.environ.get("CC", "").strip() else NoCompilerError
+        raise kind(
+            f"no C compiler: {command[0]!r} is not on the PATH; install one, or set CC to one"
+        )
     try:
-        print(f"built {build()}")
-    except BuildError as error:
-        print(f"softehl: {error}", file=sys.stderr)
-        return 2
-    return 0
+        return subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False, input=""
+        )
+    except OSError as error:
+        raise BuildError(
+            f"{command[0]} cannot be run ({error.strerror}): set CC to a C compiler"
+        ) from None
+
+
+def _processors() -> int:
+    """How many processors this process may use."""
+    allowed = getattr(os, "sched_getaffinity", None)  # not on macOS
+    return len(allowed(0)) if allowed else os.cpu_count() or 1
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 if __name__ == "__main__":
+    from softehl.codegen.tools.shipped import main
+
     sys.exit(main())

@@ -8,64 +8,36 @@ else ~/.cache/softehl.  It may be deleted at any time.  It holds
                           of the compiler, its flags, the processor and the ABI
 
 Everything is made under a temporary name in the same folder and moved into place in one step, so
-there are no locks: of two processes that make the same thing, the later one takes what is there.
+no reader waits and nothing is ever half there.  Of two processes that make the same thing one waits
+for the other while that lives; this only spares work, and is left out where files have no locks.
 What a killed process leaves behind is a temporary folder, removed a day later.
 """
 
 from __future__ import annotations
 
-import atexit
 import hashlib
 import json
 import os
 import shutil
-import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from softehl.codegen.tools import location
+from softehl.codegen.tools.location import CacheError, own, root, writable
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
 Files = Mapping[str, str]
 _SCRATCH = ".part-"
 _DAY = 86400.0
-
-
-def root() -> Path:
-    """The cache folder, created; a temporary one, with a warning, where it cannot be written."""
-    wanted = _wanted()
-    try:
-        wanted.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=wanted):
-            return wanted
-    except OSError as error:
-        return _fallback(wanted, error.strerror or str(error))
-
-
-def _wanted() -> Path:
-    chosen = os.environ.get("SOFTEHL_CACHE")
-    if chosen:
-        return Path(chosen).expanduser().absolute()
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "softehl"
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "softehl"
-
-
-@cache
-def _fallback(wanted: Path, reason: str) -> Path:
-    """One folder for the life of the process."""
-    instead = tempfile.mkdtemp(prefix="softehl-")
-    atexit.register(shutil.rmtree, instead, ignore_errors=True)
-    warnings.warn(
-        f"the cache {wanted} cannot be written ({reason}): kernels are built in a temporary folder "
-        "and lost when this process ends; set SOFTEHL_CACHE to a folder that can be written",
-        RuntimeWarning,
-        stacklevel=4,
-    )
-    return Path(instead)
+_PATIENCE = 300.0
 
 
 def digest(*parts: str) -> str:
@@ -88,7 +60,10 @@ def content(files: Files) -> str:
 def recall(key: str) -> dict[str, str] | None:
     """The files stored under a key; None if there are none or they were damaged."""
     try:
-        stored = json.loads((root() / "derived" / f"{key}.json").read_text(encoding="utf-8"))
+        derived = root() / "derived"
+        if location.fault(derived):
+            return None
+        stored = json.loads((derived / f"{key}.json").read_text(encoding="utf-8"))
         files: dict[str, str] = stored["files"]
         return files if stored["content"] == content(files) else None
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -96,23 +71,29 @@ def recall(key: str) -> dict[str, str] | None:
 
 
 def remember(key: str, files: Files) -> None:
-    """Store files under a key."""
+    """Store files under a key.  Raises `CacheError`, OSError."""
     text = json.dumps({"content": content(files), "files": dict(files)})
-    place = root() / "derived" / f"{key}.json"
-    place.parent.mkdir(exist_ok=True)
-    write(place, text.encode())
+    write(own(root() / "derived") / f"{key}.json", text.encode(), mode=0o644)
 
 
-def write(path: Path, data: bytes) -> None:
-    """Write a file under a temporary name and move it into place."""
-    handle, scratch = tempfile.mkstemp(prefix=f"{_SCRATCH}{path.name}.", dir=path.parent)
+def write(path: Path, data: bytes, mode: int = 0o666) -> None:
+    """Write a file under a temporary name and move it into place, safe against a power cut.
+
+    Raises OSError with the name of the file.
+    """
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(scratch, 0o666 & ~_umask())
-        os.replace(scratch, path)
-    finally:
-        Path(scratch).unlink(missing_ok=True)
+        handle, scratch = tempfile.mkstemp(prefix=f"{_SCRATCH}{path.name}.", dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(scratch, mode & ~_umask())
+            os.replace(scratch, path)
+        finally:
+            Path(scratch).unlink(missing_ok=True)
+    except OSError as error:
+        raise type(error)(error.errno, error.strerror or str(error), str(path)) from None
 
 
 @cache
@@ -125,16 +106,75 @@ def _umask() -> int:
 # --------------------------------------------------------------------------------- built folders
 
 
-def folder(key: str, complete: Callable[[Path], bool], make: Callable[[Path], None]) -> Path:
-    """The folder of a key; `make` fills an empty one where it is missing or not `complete`."""
-    place = root() / "built" / key
-    if complete(place):
-        return place
-    place.parent.mkdir(exist_ok=True)
-    with _scratch(place.parent) as scratch:
-        make(scratch)
-        _publish(scratch, place, complete)
+def folder(
+    key: str,
+    complete: Callable[[Path], bool],
+    make: Callable[[Path], None],
+    *,
+    keep: bool = False,
+) -> Path:
+    """The folder of a key; `make` fills an empty one where it is missing or not `complete`.
+
+    keep: raise `CacheError` where the cache cannot be used, instead of taking a temporary folder.
+    """
+    found = _found(key, complete)
+    if found is not None:
+        return found
+    built = own((writable() if keep else root()) / "built")
+    place = built / key
+    with _alone(built / f".lock-{key}"):
+        if not complete(place):
+            with _scratch(built) as scratch:
+                make(scratch)
+                _synchronise(scratch)
+                _publish(scratch, place, complete)
+                _synchronise(built)
     return place
+
+
+def _found(key: str, complete: Callable[[Path], bool]) -> Path | None:
+    """The folder of a key in a cache that need not be writable."""
+    try:
+        built = location.wanted() / "built"
+        place = built / key
+        safe = not any(map(location.fault, (built.parent, built, place)))
+    except (CacheError, OSError):
+        return None
+    return place if safe and complete(place) else None
+
+
+@contextmanager
+def _alone(lock: Path) -> Iterator[None]:
+    """Wait, within reason, for another process that makes the same: it spares the work, no more."""
+    try:
+        file = lock.open("w")
+    except OSError:
+        yield
+        return
+    with file:
+        end = time.monotonic() + _PATIENCE
+        while fcntl is not None and time.monotonic() < end:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                time.sleep(0.05)
+            except OSError:  # a file system without locks
+                break
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
+
+
+def _synchronise(folder: Path) -> None:
+    """Bring the names in a folder to the disk, where the system can."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _publish(scratch: Path, place: Path, complete: Callable[[Path], bool]) -> None:
@@ -149,6 +189,8 @@ def _publish(scratch: Path, place: Path, complete: Callable[[Path], bool]) -> No
         if complete(place):
             return
         damaged = Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=place.parent))
+        with suppress(OSError):  # a folder that may not be written cannot be moved
+            place.chmod(0o700)
         with suppress(FileNotFoundError):  # another process has set it aside already
             os.rename(place, damaged / place.name)
         shutil.rmtree(damaged, ignore_errors=True)
@@ -158,7 +200,7 @@ def _publish(scratch: Path, place: Path, complete: Callable[[Path], bool]) -> No
 def _scratch(parent: Path) -> Iterator[Path]:
     _sweep(parent)
     path = Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=parent))
-    path.chmod(0o777 & ~_umask())
+    path.chmod(0o755 & ~_umask())
     try:
         yield path
     finally:

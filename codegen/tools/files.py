@@ -6,9 +6,7 @@ all named files go together to DIR.  Such a folder holds nothing else and can be
 
 from __future__ import annotations
 
-import ctypes
 import json
-import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,6 +20,7 @@ from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, Task
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build, cache, library, targets, user, verify
+from softehl.codegen.tools.location import CacheError
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.codegen.tools.samples import NoStateError
 
@@ -38,11 +37,11 @@ def generate(
         if trace is not None:
             return _trace(paths, trace)
         codes = [(_check if check else _generate)(files, folder) for files, folder in groups]
-    except (ModelFileError, NoStateError, build.BuildError) as error:
+    except (ModelFileError, NoStateError, build.BuildError, CacheError) as error:
         print(f"softehl: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"softehl: cannot write {error.filename}: {error.strerror}", file=sys.stderr)
+        print(f"softehl: cannot write {error.filename}: {error.strerror or error}", file=sys.stderr)
         return 2
     if check and any(codes):
         where = f" --out {out}" if out else ""
@@ -70,7 +69,7 @@ def _generate(paths: Sequence[Path], folder: Path) -> int:
     definitions, made = library.of_files(paths)
     changed = write(folder, made)
     names = " ".join(p.name for p in paths)
-    print(f"{names}: {len(made.files) + 1} files in {folder}, {changed} of them new or changed")
+    print(f"{names}: {len(made.files) + 2} files in {folder}, {changed} of them new or changed")
     errors = {
         d.name: verify.errors(d, _entries(made.files)[d.name]["tasks"], made.folder / build.LIBRARY)
         for d in definitions
@@ -138,7 +137,7 @@ def write(folder: Path, made: library.Library) -> int:
         )
     folder.mkdir(parents=True, exist_ok=True)
     files = {name: text.encode() for name, text in made.files.items()}
-    files[build.LIBRARY] = (made.folder / build.LIBRARY).read_bytes()
+    files |= {name: (made.folder / name).read_bytes() for name in (build.LIBRARY, build.DIGEST)}
     changed = {n: data for n, data in files.items() if _bytes(folder / n) != data}
     for name in ours:
         (folder / name).unlink()
@@ -169,22 +168,11 @@ def _check(paths: Sequence[Path], folder: Path) -> int:
     stale = [n for n, text in files.items() if _bytes(folder / n) != text.encode()]
     ours, strange = _others(folder, files)
     stale += ours + strange
-    if _signature(folder / build.LIBRARY) != build.signature(folder):
+    if not build.intact(folder):
         stale.append(build.LIBRARY)
     for name in stale:
         print(f"stale: {folder / name}", file=sys.stderr)
     return 1 if stale else 0
-
-
-def _signature(path: Path) -> str | None:
-    """Signature of the sources that a library was built from; None if it cannot be loaded."""
-    try:
-        function = ctypes.CDLL(os.path.abspath(path)).softehl_signature
-    except (OSError, AttributeError):
-        return None
-    function.restype = ctypes.c_char_p
-    signature: bytes = function()
-    return signature.decode()
 
 
 # ------------------------------------------------------------------------------------- the trace

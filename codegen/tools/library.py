@@ -50,7 +50,7 @@ def folder_of(source: Path | Definition) -> Path:
         from softehl.codegen.tools import user
 
         return library(user.definitions(source), key).folder
-    return _compile(files)[0]
+    return compiled(files)[0]
 
 
 def of_files(paths: Sequence[Path]) -> tuple[list[Definition], Library]:
@@ -68,8 +68,8 @@ def library(definitions: Sequence[Definition], key: str | None = None) -> Librar
     files, derived = derive(definitions)
     if key is not None:
         store.remember(key, files)
-    folder, compiled = _compile(files)
-    return Library(folder, files, derived, compiled)
+    folder, seconds = compiled(files)
+    return Library(folder, files, derived, seconds)
 
 
 def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str, float]]:
@@ -90,21 +90,25 @@ def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str,
     return files, seconds
 
 
-def _compile(files: Mapping[str, str]) -> tuple[Path, dict[str, float]]:
-    """The folder of these files and their library, and seconds by kernel (empty if cached)."""
+def compiled(files: Mapping[str, str], *, keep: bool = False) -> tuple[Path, dict[str, float]]:
+    """The folder of these files and their library, and seconds by kernel (empty if cached).
+
+    keep: as in `cache.folder`.
+    """
     content = store.content(files)
-    key = store.digest(content, str(abi.VERSION), build.identification())
+    flags, told = build.tuned()
+    key = store.digest(content, str(abi.VERSION), told)
     seconds: dict[str, float] = {}
 
     def complete(folder: Path) -> bool:
-        return (folder / build.LIBRARY).is_file() and _content_of(folder, files) == content
+        return build.intact(folder) and _content_of(folder, files) == content
 
     def make(folder: Path) -> None:
         for name, text in files.items():
-            (folder / name).write_text(text, encoding="utf-8", newline="\n")
-        seconds.update(build.build_each(folder))
+            store.write(folder / name, text.encode(), mode=0o644)
+        seconds.update(build.build(folder, flags=flags))
 
-    return store.folder(key, complete, make), seconds
+    return store.folder(key, complete, make, keep=keep), seconds
 
 
 def _content_of(folder: Path, files: Mapping[str, str]) -> str | None:

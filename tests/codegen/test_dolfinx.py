@@ -1,6 +1,6 @@
 """A solid of ours assembled by DOLFINx through its custom kernels, against our own assembly.
 
-Runs where DOLFINx is installed (`pip install 'softehl[dolfinx]'`, Python >= 3.12).  Unknowns of the
+Runs where DOLFINx is installed (`pip install 'softehl[mpi]'`, Python >= 3.12).  Unknowns of the
 two sides are matched by the position of their node, not by any assumption on its number.
 """
 

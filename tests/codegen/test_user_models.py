@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import softehl
-from softehl.codegen.tools import cache, cli, library, model_text, user, verify
+from softehl.codegen.tools import cli, library, location, model_text, user, verify
 from softehl.codegen.tools import files as cli_files
-from softehl.codegen.tools.build import LIBRARY
+from softehl.codegen.tools.build import DIGEST, LIBRARY
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
 
@@ -155,10 +155,10 @@ def test_generate_writes_compiles_and_checks(capsys: pytest.CaptureFixture[str])
     folder = Path("models/generated/mine")
     written = {p.name for p in folder.iterdir()}
     assert written == {
-        *("soft.c", "hard.c", "signature.c", "softehl_kernels.h", "manifest.json", LIBRARY)
+        *("soft.c", "hard.c", "signature.c", "softehl_kernels.h", "manifest.json", LIBRARY, DIGEST)
     }
     printed = capsys.readouterr().out
-    assert "6 files in models/generated/mine, 6 of them new or changed" in printed
+    assert "7 files in models/generated/mine, 7 of them new or changed" in printed
     rows = [line.split() for line in printed.splitlines()]
     for name in ("soft", "hard"):
         (row,) = [r for r in rows if r[:2] == [name, "energy"]]
@@ -244,7 +244,9 @@ def test_a_failed_compilation_shows_the_command_and_the_compilers_words(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     compiler = Path("broken-cc").absolute()
-    compiler.write_text('#!/bin/sh\ncase "$*" in *-dM*) exit 0;; esac\necho no way >&2\nexit 3\n')
+    compiler.write_text(
+        '#!/bin/sh\ncase "$*" in *-dM*) exec cc "$@";; esac\necho no way >&2\nexit 3\n'
+    )
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", str(compiler))
     model_file(spring())
@@ -274,7 +276,7 @@ def test_a_wrong_kernel_is_caught_whichever_task_is_wrong(
         wrong = text[:start] + text[start:].replace("* v", "* 1.0000001 * v", 1)
         assert wrong != text
         files = {**derived, "spring.c": wrong}
-        folder, _ = library._compile(files)
+        folder, _ = library.compiled(files)
         errors = verify.errors(definitions[0], ("energy", "residual", "tangent"), folder / LIBRARY)
         assert {t for t, e in errors.items() if e > verify.BOUND} == {task}
         assert errors[task] < 1e-6
@@ -387,4 +389,4 @@ def test_equal_definitions_have_one_fingerprint_and_different_ones_differ() -> N
     prints = [library.fingerprint(user.definitions(model_file(t))[0]) for t in texts]
     assert prints[0] == prints[1]
     assert len(set(prints)) == 3
-    assert cache.root().name == "cache"
+    assert location.root().name == "cache"

@@ -1,0 +1,92 @@
+"""Where the user's cache is, and whether what lies in it may be run.
+
+What is in the cache is code: one that belongs to somebody else, or that others may write to, is not
+used.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import stat
+import sys
+import tempfile
+import warnings
+from functools import cache
+from pathlib import Path
+
+_REMEDY = "set SOFTEHL_CACHE to a folder of yours that can be written"
+
+
+class CacheError(RuntimeError):
+    """The cache cannot be used; the message is one line with a remedy."""
+
+
+def root() -> Path:
+    """The cache folder, created; a temporary one, with a warning, where it cannot be used."""
+    try:
+        return writable()
+    except CacheError as error:
+        return _fallback(str(error))
+
+
+def writable() -> Path:
+    """The cache folder, created.  Raises `CacheError` where it is not safe or not writable."""
+    folder = wanted()
+    try:
+        own(folder)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise CacheError(f"the cache {folder} cannot be written ({reason}): {_REMEDY}") from None
+
+
+def own(folder: Path) -> Path:
+    """Create a folder that only this user may write to.  Raises `CacheError` if it is another."""
+    folder.mkdir(mode=0o755, parents=True, exist_ok=True)
+    reason = fault(folder)
+    if reason:
+        raise CacheError(f"the cache {folder} is not used: {reason}")
+    return folder
+
+
+def fault(folder: Path) -> str:
+    """Why code in a folder is not to be run; empty if it may.  Raises OSError."""
+    if not hasattr(os, "geteuid"):
+        return ""
+    status = folder.stat()
+    if status.st_uid != os.geteuid():
+        return f"it belongs to another user, number {status.st_uid}; {_REMEDY}"
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"others may write to it; delete it, or if all is yours: chmod -R go-w {folder}"
+    return ""
+
+
+def wanted() -> Path:
+    """Where the cache is to be.  Raises `CacheError` where there is no home folder."""
+    chosen = os.environ.get("SOFTEHL_CACHE")
+    try:
+        if chosen:
+            return Path(chosen).expanduser().absolute()
+        if sys.platform == "darwin":
+            return Path.home() / "Library" / "Caches" / "softehl"
+        base = os.environ.get("XDG_CACHE_HOME")
+        return (Path(base) if base else Path.home() / ".cache") / "softehl"
+    except (RuntimeError, OSError) as error:
+        raise CacheError(f"there is no place for the cache ({error}): {_REMEDY}") from None
+
+
+@cache
+def _fallback(reason: str) -> Path:
+    """One folder for the life of the process."""
+    instead = tempfile.mkdtemp(prefix="softehl-")
+    atexit.register(shutil.rmtree, instead, ignore_errors=True)
+    warnings.warn(
+        f"{reason}; until then kernels are built in a temporary folder and lost when this process "
+        "ends",
+        RuntimeWarning,
+        stacklevel=4,
+    )
+    return Path(instead)
