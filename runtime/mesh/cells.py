@@ -14,10 +14,9 @@ from math import factorial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import roots_jacobi, roots_legendre
 
-Array = NDArray[np.float64]
+from softehl.runtime.arrays import Array
 
 Groups: TypeAlias = tuple[tuple[int, ...], ...]
 _Kind: TypeAlias = tuple[str, str, Groups, Groups, tuple[str, ...]]
@@ -95,6 +94,14 @@ class Cell:
             distance = np.linalg.norm(self.nodes[None] - places[:, None], axis=2)
             found.append((kind, tuple(int(k) for k in distance.argmin(axis=1))))
         return tuple(found)
+
+    def holds(self, at: Array, margin: float) -> bool:
+        """Whether a parent point (dim,) lies in the parent element, or no further out than that."""
+        if self.corners == 2**self.dimension:
+            return bool(np.abs(at).max(initial=0.0) <= 1.0 + margin)
+        flat = at if self.corners == self.dimension + 1 else at[:2]
+        inside = flat.min() >= -margin and flat.sum() <= 1.0 + margin
+        return bool(inside and (flat is at or abs(at[2]) <= 1.0 + margin))
 
     def rule(self, degree: int) -> tuple[Array, Array]:
         """Points (q, dim) and weights (q,) that integrate polynomials of a degree exactly."""

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from softehl.runtime.arrays import Integers
 from softehl.runtime.mesh.cells import BY_FILE, CELLS
-from softehl.runtime.mesh.mesh import Integers, Mesh, MeshError
+from softehl.runtime.mesh.mesh import Mesh, MeshError
 
 _DEFECTS = (OSError, ValueError, KeyError, IndexError, TypeError, AssertionError, SystemExit)
 

@@ -17,18 +17,18 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 Faces: TypeAlias = Mapping[str, Integers]
 """Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
 Shape = Literal["quad", "serendipity", "triangle", "hex", "tetrahedron"]
-Predicate = Callable[[Array], NDArray[np.bool_]]
+Predicate = Callable[[Array], Flags]
 """Of places (n, dim): which of them are meant, (n,)."""
+
+
+_NEAR = 1e-9  # of the size of a mesh or cell: places closer than that are the same
 
 
 class MeshError(ValueError):
@@ -197,6 +197,45 @@ class Mesh:
             raise MeshError(f"no group {group!r}{meant(group, self.groups)}; there are {known}")
         return {kind: self.cells[kind][chosen] for kind, chosen in self.groups[group].items()}
 
+    def node_at(self, place: Array) -> int:
+        """Number of the node at a place (dim,).  Raises MeshError that names the nearest one."""
+        self._require_place(place)
+        distance = np.linalg.norm(self.points - place, axis=1)
+        nearest = int(distance.argmin())
+        if distance[nearest] > _NEAR * self._size:
+            raise MeshError(
+                f"no node at {_place(place)}; the nearest is number {nearest} at "
+                f"{_place(self.points[nearest])}"
+            )
+        return nearest
+
+    def locate(self, place: Array) -> tuple[Integers, Array]:
+        """The nodes (k,) of the cell that holds a place (dim,), and their shape functions there.
+
+        Raises MeshError if the place lies outside the mesh.
+        """
+        self._require_place(place)
+        for kind, nodes in self.cells.items():
+            cell, places = CELLS[kind], self.points[nodes]
+            if cell.dimension != self.dimension:
+                continue
+            low, high = places.min(axis=1), places.max(axis=1)
+            margin = 0.1 * (high - low).max(axis=1, keepdims=True)
+            near = ((low - margin <= place) & (place <= high + margin)).all(axis=1)
+            for row in np.flatnonzero(near):
+                parent = _parent_place(cell, places[row], place)
+                if parent is not None:
+                    return nodes[row], cell.shape(parent[None])[0]
+        raise MeshError(f"{_place(place)} lies outside the mesh")
+
+    @cached_property
+    def _size(self) -> float:
+        return float(np.ptp(self.points, axis=0).max())
+
+    def _require_place(self, place: Array) -> None:
+        if place.shape != (self.dimension,) or not np.isfinite(place).all():
+            raise MeshError(f"a place has {self.dimension} coordinates, given {place.tolist()}")
+
     def check(self) -> None:
         """Raise MeshError for a cell that is turned inside out: its number and place."""
         for kind, nodes in self.cells.items():
@@ -228,7 +267,20 @@ def meant(given: object, known: Iterable[str]) -> str:
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
-def _told(where: Predicate, places: Array, name: str) -> NDArray[np.bool_]:
+def _parent_place(cell: Cell, places: Array, place: Array) -> Array | None:
+    """Parent coordinates of a place in a cell with nodes at `places`, None if it lies outside."""
+    xi = cell.nodes[: cell.corners].mean(axis=0)
+    for _ in range(20):
+        defect = cell.shape(xi[None])[0] @ places - place
+        slope = np.einsum("kd,kc->cd", cell.gradient(xi[None])[0], places)
+        step = np.linalg.lstsq(slope, defect, rcond=None)[0]
+        xi = xi - step
+        if np.abs(step).max() < 1e-13:
+            break
+    return xi if cell.holds(xi, _NEAR) else None
+
+
+def _told(where: Predicate, places: Array, name: str) -> Flags:
     chosen = np.asarray(where(places))
     if chosen.shape != (len(places),) or chosen.dtype != np.bool_:
         raise MeshError(

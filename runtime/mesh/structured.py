@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.mesh import Integers, Mesh, MeshError
+from softehl.runtime.mesh.mesh import Mesh, MeshError
 
 KINDS = {
     (1, "quad"): ("line2", "line3"),
@@ -69,7 +69,7 @@ def _numbers(kind: str, counts: Sequence[int], order: int) -> Integers:
     return np.asarray(rows.reshape(-1, rows.shape[-1]))
 
 
-def _simplices(dimension: int) -> list[NDArray[np.float64]]:
+def _simplices(dimension: int) -> list[Array]:
     """Corners of the simplices that share the main diagonal of the unit cube, positive all."""
     found = []
     for order in permutations(range(dimension)):
@@ -83,7 +83,7 @@ def _simplices(dimension: int) -> list[NDArray[np.float64]]:
     return found
 
 
-def _simplex(kind: str, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _simplex(kind: str, corners: Array) -> Array:
     flat = CELLS["tri3" if kind.startswith("tri") else "tet4"]
     return np.asarray(flat.shape(CELLS[kind].nodes) @ corners)
 

@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from softehl.runtime.fem.dofs import DofLayout
     from softehl.runtime.fem.problem import Problem
     from softehl.runtime.kernels import Kernel
+    from softehl.runtime.mesh.mesh import Mesh
     from softehl.runtime.solve.continuation import Continuation
     from softehl.runtime.solve.newton import Newton
     from softehl.runtime.solve.solution import Branch, Solution, Status
+    from softehl.runtime.study import Study
 
 __version__ = "0.1.0"
 
@@ -37,6 +39,7 @@ _PUBLIC = {
     "ElementBlock": "softehl.runtime.fem.assembly",
     "FilmState": "softehl.cases.harness.observer",
     "Kernel": "softehl.runtime.kernels",
+    "Mesh": "softehl.runtime.mesh.mesh",
     "Newton": "softehl.runtime.solve.newton",
     "ORing": "softehl.cases.seal.parameters",
     "Observer": "softehl.cases.harness.observer",
@@ -45,6 +48,7 @@ _PUBLIC = {
     "Silent": "softehl.cases.harness.observer",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
+    "Study": "softehl.runtime.study",
     "main": "softehl.__main__",
     "run_oring": "softehl.cases.seal.run:run",
     "solve_cases": "softehl.cases.harness.sweep",
@@ -68,6 +72,7 @@ __all__ = [
     "ElementBlock",
     "FilmState",
     "Kernel",
+    "Mesh",
     "Model",
     "Newton",
     "ORing",
@@ -77,6 +82,7 @@ __all__ = [
     "Silent",
     "Solution",
     "Status",
+    "Study",
     "kinematics",
     "load_kernel",
     "main",

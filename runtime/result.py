@@ -1,0 +1,191 @@
+"""What a study found at one load factor: values at places, sums, fields in cells, files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.io import replacing
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.mesh import meant
+from softehl.runtime.solve.solution import Point
+
+if TYPE_CHECKING:
+    from softehl.runtime.mesh.mesh import Predicate
+    from softehl.runtime.study import System
+
+
+_AXES = ("x", "y", "z", "r")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A converged state of a study."""
+
+    system: System
+    problem: Problem
+    point: Point
+
+    @property
+    def t(self) -> float:
+        """The load factor."""
+        return self.point.parameter
+
+    @property
+    def x(self) -> Array:
+        """All unknowns, (n,)."""
+        return self.point.solution.x
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations of the step that led here."""
+        return self.point.solution.iterations
+
+    @property
+    def residual_norms(self) -> tuple[float, ...]:
+        """Of the iterates of that step."""
+        return self.point.solution.residual_norms
+
+    def norm(self) -> float:
+        """2-norm of all unknowns."""
+        return float(np.linalg.norm(self.x))
+
+    def values(self, name: str) -> Array:
+        """An unknown at every node, (points,), nan where there is none; else all of its values.
+
+        Raises KeyError that names what there is.
+        """
+        numbers = self.system.numbering.nodal.get(name)
+        if numbers is None:
+            layout = self.system.numbering.layout
+            if name not in layout.names:
+                known = ", ".join(layout.names)
+                raise KeyError(f"no unknown {name!r}{meant(name, layout.names)}; there are {known}")
+            return self.x[layout.part(name)]
+        return np.where(numbers >= 0, self.x[numbers], np.nan)
+
+    def at(self, place: tuple[float, ...]) -> dict[str, float]:
+        """Values of the unknowns at a place of the undeformed mesh, interpolated within a cell.
+
+        Raises MeshError if the place lies outside.
+        """
+        nodes, weights = self.system.mesh.locate(np.asarray(place, dtype=np.float64))
+        found = {}
+        for name, numbers in self.system.numbering.nodal.items():
+            there = numbers[nodes]
+            # an unknown of lower order stands at corners only: interpolated by the cell's corners
+            if (there[np.abs(weights) > 1e-9] >= 0).all():
+                known = there >= 0
+                found[name] = float(self.x[there[known]] @ weights[known])
+        return found
+
+    def along(self, start: tuple[float, ...], end: tuple[float, ...], count: int = 100) -> Any:
+        """Values along a straight line: name -> (count,), and "s", the distance from the start."""
+        a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+        shares = np.linspace(0.0, 1.0, count)
+        rows = [self.at(tuple(a + s * (b - a))) for s in shares]
+        names = [name for name in rows[0] if all(name in row for row in rows)]
+        columns = {name: np.array([row[name] for row in rows]) for name in names}
+        return {"s": shares * float(np.linalg.norm(b - a)), **columns}
+
+    def fields(self, block: str) -> dict[str, Array]:
+        """Fields of a block's page at its quadrature points: name -> (cells, points)."""
+        blocks = self.system.blocks
+        if block not in blocks:
+            known = ", ".join(blocks)
+            raise KeyError(f"no block {block!r}{meant(block, blocks)}; there are {known}")
+        return self.problem.fields(block, self.x)
+
+    def at_nodes(self, block: str) -> dict[str, Array]:
+        """Fields of a block averaged to nodes: name -> (points,), nan away from the block.
+
+        Every cell counts with the mean of its points.
+        """
+        nodes = self.system.blocks[block].nodes
+        count = np.bincount(nodes.ravel(), minlength=len(self.system.mesh.points))
+        found = {}
+        for name, values in self.fields(block).items():
+            means = np.repeat(values.mean(axis=1), nodes.shape[1])
+            total = np.bincount(nodes.ravel(), means, len(count))
+            found[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        return found
+
+    @cached_property
+    def _forces(self) -> Array:
+        """What the supports do, (n,): internal less external forces, zero but for rounding where
+        nothing is prescribed.
+        """
+        return self.problem.assembler.residual(self.x, self.problem.parameters)
+
+    def reaction(self, where: str | Predicate) -> dict[str, float]:
+        """Sums of the reactions at the nodes of a side: unknown -> force."""
+        nodes = self.system.mesh.nodes(where)
+        found = {}
+        for name, numbers in self.system.numbering.nodal.items():
+            there = numbers[nodes]
+            found[name] = float(self._forces[there[there >= 0]].sum())
+        return found
+
+    def deformed(self, names: tuple[str, ...]) -> Array:
+        """Places of the nodes moved by the unknowns of these names, (points, dim)."""
+        moved = np.stack([np.nan_to_num(self.values(name)) for name in names], axis=1)
+        return np.asarray(self.system.mesh.points + moved)
+
+    def write(self, path: str | Path) -> None:
+        """Write the mesh with unknowns at nodes and fields in cells (means), as .vtu, atomically.
+
+        Unknowns u_x, u_y, u_z are written as one vector u as well.
+        """
+        import meshio  # late: it is slow to import
+
+        mesh, target = self.system.mesh, Path(path)
+        if target.suffix != ".vtu":
+            raise ValueError(f"write({str(path)!r}): results are written as .vtu")
+        nodal = {name: self.values(name) for name in self.system.numbering.nodal}
+        points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dimension)))
+        found = meshio.Mesh(
+            points,
+            [(CELLS[kind].meshio, nodes) for kind, nodes in mesh.cells.items()],
+            point_data={**nodal, **_vectors(nodal)},
+            cell_data=self._cell_data(),
+        )
+        with replacing(target) as temporary:
+            meshio.write(temporary, found, file_format="vtu")
+
+    def _cell_data(self) -> dict[str, list[Array]]:
+        """Means of fields: block.field -> for each kind of cell (m,), nan outside the block."""
+        mesh = self.system.mesh
+        found: dict[str, list[Array]] = {}
+        for name, block in self.system.blocks.items():
+            if block.kind not in mesh.cells or not block.kernel.fields:
+                continue
+            rows = {tuple(row): k for k, row in enumerate(mesh.cells[block.kind].tolist())}
+            chosen = [rows[tuple(row)] for row in block.nodes.tolist()]
+            for field, values in self.fields(name).items():
+                data = {kind: np.full(len(nodes), np.nan) for kind, nodes in mesh.cells.items()}
+                data[block.kind][chosen] = values.mean(axis=1)
+                found[f"{name}.{field}"] = list(data.values())
+        return found
+
+
+def _vectors(nodal: Mapping[str, Array]) -> dict[str, Array]:
+    """u_x, u_y, ... as vectors u of three components, (points, 3)."""
+    stems: dict[str, list[str]] = {}
+    for name in nodal:
+        stem, _, axis = name.rpartition("_")
+        if stem and axis in _AXES:
+            stems.setdefault(stem, []).append(name)
+    vectors = {}
+    for stem, names in stems.items():
+        if len(names) > 1 and stem not in nodal:
+            columns = [np.nan_to_num(nodal[name]) for name in names[:3]]
+            columns += [np.zeros_like(columns[0])] * (3 - len(columns))
+            vectors[stem] = np.stack(columns, axis=1)
+    return vectors
