@@ -153,3 +153,23 @@ def write_vtu(
     )
     with replacing(path) as temporary:
         meshio.write(temporary, mesh, file_format="vtu")
+
+
+def read_vtu(
+    path: Path,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], dict[str, NDArray[np.float64]]]:
+    """Points (n, 2), cells (m, 4) and point data that :func:`write_vtu` wrote.
+
+    Raises OSError, and ValueError where the file is damaged.
+    """
+    import meshio
+
+    with path.open("rb"):  # a missing file is no damaged one
+        pass
+    try:
+        mesh = meshio.read(path, file_format="vtu")
+        points = np.asarray(mesh.points[:, :2], dtype=np.float64)
+        cells = np.asarray(mesh.cells_dict["quad"], dtype=np.int64)
+    except Exception as error:  # damage may show as almost anything: in XML, base64, zlib, shapes
+        raise ValueError(f"{path}: not a section that can be read: {error}") from error
+    return points, cells, {name: np.asarray(data) for name, data in mesh.point_data.items()}

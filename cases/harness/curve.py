@@ -10,6 +10,7 @@ from softehl.runtime.io import (
     number_text,
     read_columns,
     read_csv,
+    read_vtu,
     write_columns,
     write_csv,
     write_vtu,
@@ -96,7 +97,7 @@ class CurveFolder:
         curve = self.path / "curve.csv"
         if curve.exists():
             rows = [CurveRow.parse(cells) for cells in read_csv(curve, CURVE_COLUMNS)]
-            self.rows = [row for row in rows if self._profile_path(row).exists()]
+            self.rows = [row for row in rows if all(map(Path.exists, self._files(row)))]
 
     def add(self, state: FilmState) -> CurveRow:
         """Write the files of a state, then the curve with its row."""
@@ -104,7 +105,7 @@ class CurveFolder:
         self.path.mkdir(parents=True, exist_ok=True)
         profile = {name: getattr(state.profile, name) for name in PROFILE_COLUMNS}
         write_columns(self._profile_path(row), profile)
-        write_section(self.path / f"section_{row.name}.vtu", state.section)
+        write_section(self._section_path(row), state.section)
         others = [r for r in self.rows if r.rod_speed_mm_s != row.rod_speed_mm_s]
         self.rows = sorted([*others, row], key=lambda r: r.order)
         self.save()
@@ -127,6 +128,16 @@ class CurveFolder:
             (row, Profile(**read_columns(self._profile_path(row), PROFILE_COLUMNS)))
             for row in self.rows
         ]
+
+    def section(self, row: CurveRow) -> Section:
+        """The section of a row, read back.  Raises OSError, ValueError."""
+        return Section(*read_vtu(self._section_path(row)))
+
+    def _files(self, row: CurveRow) -> tuple[Path, Path]:
+        return self._profile_path(row), self._section_path(row)
+
+    def _section_path(self, row: CurveRow) -> Path:
+        return self.path / f"section_{row.name}.vtu"
 
     def _profile_path(self, row: CurveRow) -> Path:
         return self.path / f"profile_{row.name}.csv"

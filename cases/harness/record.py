@@ -25,9 +25,10 @@ SELECTION = ("speeds", "stroke", "solver", "linear", "tolerance")
 """Parameters that do not change a row of a curve: a resumed run may change them."""
 SIGNS = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
+KINDS = ("csv", "png", "svg")
 _OURS = (
     *("run.json", "leakage.csv"),
-    *(f"{name}.{kind}" for name in ("curve", "profiles") for kind in ("csv", "png", "svg")),
+    *(f"{name}.{kind}" for name in ("curve", "profiles", "section") for kind in KINDS),
     *("profile_*.csv", "section_*.vtu", "contact_*.csv", "contact_*.vtu"),
 )
 _PACKAGES = (

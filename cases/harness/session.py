@@ -174,7 +174,7 @@ def _conclude(record: RunRecord, outcomes: Sequence[Outcome]) -> list[str]:
 
 def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
     """Draw and print the curve, and say what is missing."""
-    report.write_plots(record.folder, record.curve.profiles())
+    report.write_plots(record.case.parameters, record.curve, record.rejected.rows)
     if not quiet and (record.curve.rows or record.rejected.rows):
         report.print_curve(record.curve.rows, record.rejected.rows)
         for note in _notes(record.curve.rows):

@@ -9,7 +9,7 @@ import numpy as np
 
 from softehl.cases.harness.observer import ContactState, FilmState, Profile, Section
 from softehl.cases.seal.path import Film
-from softehl.cases.seal.section import OringSection
+from softehl.cases.seal.section import HOUSING, OringSection, sealed_side
 from softehl.cases.seal.verdict import FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
@@ -128,6 +128,22 @@ def contact_pressure(section: OringSection, sealed_pressure: float, x: Array) ->
     return np.asarray(pressure)
 
 
+def housing_pressure(section: OringSection, x: Array) -> Array:
+    """True pressure (nodes,) where the housing or a wall is touched, zero elsewhere, MPa.
+
+    The multipliers per current area, and p_s where it acts.
+    """
+    mesh, pressure = section.mesh, np.zeros(len(section.mesh.points))
+    nodes, segments, deformed = mesh.outer_nodes, mesh.outer_segments, section.deformed(x)
+    force = sum(np.maximum(-x[section.layout.part(name)], 0.0) for name in HOUSING)
+    current = tributary_areas(deformed, segments, nodes)
+    wet = tributary_areas(deformed, sealed_side(mesh), nodes)
+    fluid = wet * section.parameters.sealed_pressure
+    force = force * tributary_areas(mesh.points, segments, nodes)
+    pressure[nodes] = np.where(force > 0.0, (force + fluid) / current, 0.0)
+    return pressure
+
+
 def film_state(
     section: OringSection,
     problem: Problem,
@@ -165,7 +181,10 @@ def film_state(
 
 
 def section_view(section: OringSection, problem: Problem, x: Array) -> Section:
-    """The deformed section with nodal Cauchy stresses (MPa) and displacements (mm)."""
+    """The deformed section with its nodal displacements (mm) and Cauchy stresses (MPa).
+
+    contact_pressure: that of the housing and its walls, zero elsewhere (MPa).
+    """
     mesh = section.mesh
     stresses = problem.fields("solid", x)
     nodal = nodal_average(
@@ -177,7 +196,11 @@ def section_view(section: OringSection, problem: Problem, x: Array) -> Section:
     return Section(
         points=section.deformed(x),
         cells=mesh.quads,
-        point_data={"displacement": displacement, **nodal},
+        point_data={
+            "displacement": displacement,
+            "contact_pressure": housing_pressure(section, x),
+            **nodal,
+        },
     )
 
 

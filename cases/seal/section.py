@@ -192,7 +192,7 @@ def _blocks(
     pressures = number(mesh.arc, p.pressure_order, layout.part("pressure").start)
     rule = film_rule(p.pressure_order, p.quadrature, p.quadrature_points)
     follower, contact = load_kernel("follower_pressure"), load_kernel("contact")
-    outer = _sealed_side(p, mesh)
+    outer = sealed_side(mesh)
     bottom = arc[: _lowest(mesh)]
     candidates = {"rod": (mesh.arc_nodes, arc, layout.dofs("rod"))}
     for name in HOUSING:
@@ -243,7 +243,7 @@ def _flat(points: Array, segments: Integers) -> Array:
     return np.ascontiguousarray(points[segments].reshape(len(segments), -1))
 
 
-def _sealed_side(p: ORing, mesh: SectionMesh) -> Integers:
+def sealed_side(mesh: SectionMesh) -> Integers:
     """Segments from the crown to the sealed end of the arc."""
     outer = mesh.outer_segments
     middle = mesh.points[outer].mean(axis=1)

@@ -41,7 +41,7 @@ HEADER = (
     "inlet_segments,density,verdict"
 )
 FAST = ("--set", "speeds=[400, 100]")
-PLOTS = {"curve.png", "curve.svg", "profiles.png", "profiles.svg"}
+PLOTS = {f"{name}.{kind}" for name in report.PICTURES for kind in ("png", "svg")}
 FILES = {
     *("run.json", "curve.csv", "leakage.csv"),
     *("contact_1.csv", "contact_1.vtu"),
@@ -55,7 +55,10 @@ FILES = {
 
 def section() -> Section:
     points = np.array([[0.0, 25.0], [1.0, 25.0], [1.0, 26.0], [0.0, 26.0]])
-    return Section(points, np.array([[0, 1, 2, 3]]), {}, {"sigma_zz": np.array([-1.0])})
+    stresses = {f"sigma_{at}": np.array([-1.0, -1.0, -2.0, -2.0]) for at in ("zz", "rr", "tt")}
+    shear, contact = np.zeros(4), np.array([0.0, 0.0, 3.0, 3.0])
+    data = {**stresses, "sigma_zr": shear, "contact_pressure": contact}
+    return Section(points, np.array([[0, 1, 2, 3]]), data)
 
 
 def film_state(parameters: ORing, speed: float, verdict: str = OK) -> FilmState:

@@ -17,10 +17,12 @@ from softehl.cases.harness.observer import (
     Silent,
 )
 from softehl.cases.seal.path import PathSettings, squeeze_stage
+from softehl.cases.seal.report.section import boundary_edges
 from softehl.cases.seal.run import run
 from softehl.cases.seal.section import build_section
 from softehl.cases.seal.stopped import Stopped
 from softehl.cases.seal.verdict import FilmNumbers
+from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.solve.continuation import Branch, Point
 from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
@@ -93,6 +95,17 @@ def test_states_of_a_coarse_mesh_are_labelled(default: tuple[Outcome, Recorder])
         segments = [s.inlet_segments for s in states]
         assert segments == sorted(segments, reverse=True)
     assert all(bool(s.advice) == (s.verdict != OK) for s in default[0].states)
+
+
+def test_the_air_wall_carries_the_sealed_pressure(default: tuple[Outcome, Recorder]) -> None:
+    """Axial balance without friction: p_s on the annulus inside of the housing."""
+    section = default[1].contacts[0].section
+    pressure = section.point_data["contact_pressure"]
+    edges = boundary_edges(section.cells)
+    nodes = np.unique(edges[np.abs(section.points[edges, 0] - 0.5 * 3.74).max(axis=1) < 1e-6])
+    force = float(pressure[nodes] @ tributary_areas(section.points, edges, nodes))
+    inner = float(section.points[:, 1].min())
+    assert force == pytest.approx(math.pi * (28.15**2 - inner**2), rel=1e-6)
 
 
 def test_cost(default: tuple[Outcome, Recorder]) -> None:

@@ -1,0 +1,80 @@
+"""Pressure and film thickness along the film: a column a stroke, a line a speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softehl.cases.harness.curve import CurveRow
+from softehl.cases.harness.observer import OK, Profile
+from softehl.cases.seal.report import style
+from softehl.cases.seal.report.curve import plain_ticks
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from softehl.cases.seal.parameters import ORing
+
+Results = Sequence[tuple[CurveRow, Profile]]
+Colour = tuple[float, float, float, float]
+
+_MARGIN_MM = 0.3
+_SHOWN = 20.0
+
+
+def profiles_figure(p: ORing, results: Results) -> Figure:
+    """Pressure above film thickness; what is no plain result is dotted and says why."""
+    from matplotlib.figure import Figure
+
+    strokes = [stroke for stroke in style.STROKES if any(r.stroke == stroke for r, _ in results)]
+    figure = Figure(figsize=(3.9 * len(strokes) + 0.6, 5.6))
+    axes = figure.subplots(2, len(strokes), sharex=True, sharey="row", squeeze=False)
+    for column, stroke in enumerate(strokes):
+        pressure, film = axes[0, column], axes[1, column]
+        for row, profile, colour in _coloured(results, stroke):
+            plain = row.verdict == OK
+            label = f"{abs(row.rod_speed_mm_s):g}" + ("" if plain else f" ({row.verdict})")
+            line = {"color": colour, "linestyle": "-" if plain else ":"}
+            pressure.plot(profile.x_mm, profile.p_MPa, label=label, **line)
+            film.plot(profile.x_mm, profile.h_um, **line)
+        pressure.set_title(style.STROKES[stroke])
+        pressure.legend(title="$|U|$ [mm/s]", loc="upper right")
+        film.set_xlabel(style.POSITION)
+    axes[0, 0].set_ylabel(style.PRESSURE)
+    axes[1, 0].set_ylabel(style.FILM)
+    _show_contact(axes[1, 0], [row for row, _ in results])
+    style.set_margins(figure, left=0.55, right=0.12, bottom=0.5, top=0.75, between=0.07)
+    style.write_head(figure, style.subject(p), left=0.55)
+    return figure
+
+
+def _coloured(results: Results, stroke: str) -> Iterator[tuple[CurveRow, Profile, Colour]]:
+    """The states of a stroke; a speed has one colour for both strokes, dark fast, light slow."""
+    from matplotlib import colormaps
+
+    speeds = sorted({abs(row.rod_speed_mm_s) for row, _ in results}, reverse=True)
+    shades = dict(zip(speeds, np.linspace(0.05, 0.85, len(speeds)).tolist(), strict=True))
+    for row, profile in results:
+        if row.stroke == stroke:
+            yield row, profile, colormaps["viridis"](shades[abs(row.rod_speed_mm_s)])
+
+
+def _show_contact(film: Axes, rows: Sequence[CurveRow]) -> None:
+    """Show the contact and the thin film only: beside it h is a hundred times larger."""
+    from matplotlib.ticker import NullLocator
+
+    start = min(row.contact_start_mm for row in rows)
+    end = max(row.contact_end_mm for row in rows)
+    if np.isfinite(start) and np.isfinite(end):
+        film.set_xlim(start - _MARGIN_MM, end + _MARGIN_MM)
+    film.set_yscale("log")
+    low = min(row.h_min_um for row in rows)
+    high = max(row.h_star_um for row in rows)
+    if 0 < low < high:
+        film.set_ylim(0.7 * low, _SHOWN * high)
+    film.yaxis.set_ticks(plain_ticks(*film.get_ylim()))
+    film.yaxis.set_major_formatter("{x:g}")
+    film.yaxis.set_minor_locator(NullLocator())

@@ -1,0 +1,200 @@
+"""The deformed section in its gland: stress in the ring, pressure on the rod and the housing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softehl.cases.harness.curve import CurveRow
+from softehl.cases.harness.observer import Profile, Section
+from softehl.cases.seal.report import style
+from softehl.runtime.arrays import Array, Integers
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.tri import TriContourSet
+
+    from softehl.cases.seal.parameters import ORing
+
+
+_METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"
+_LEVELS = 14
+_NEEDED = {"contact_pressure", *(f"sigma_{name}" for name in ("zz", "rr", "tt", "zr"))}
+# in section diameters
+_BAND = 0.26
+"""Height of the largest pressure."""
+_CLEARANCE = 0.06
+"""Between a wall and the rod: the walls of the model are planes without an end."""
+_AROUND = (0.33, 0.44, 0.4)
+"""What is shown beside, below and above the gland."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A state to be drawn: its row of the curve, the profile of its film and its section."""
+
+    row: CurveRow
+    profile: Profile
+    section: Section
+
+    @property
+    def complete(self) -> bool:
+        """Whether the section has what is drawn of it (one of another version may lack some)."""
+        return self.section.point_data.keys() >= _NEEDED
+
+
+def von_mises(section: Section) -> Array:
+    """Von Mises stress (n,) at the nodes of a section that has its Cauchy stresses, MPa."""
+    z, r, t, s = (section.point_data[f"sigma_{name}"] for name in ("zz", "rr", "tt", "zr"))
+    normal = 0.5 * ((z - r) ** 2 + (r - t) ** 2 + (t - z) ** 2)
+    return np.asarray(np.sqrt(normal + 3.0 * s**2))
+
+
+def boundary_edges(cells: Integers) -> Integers:
+    """Edges (b, 2) that only one of the cells (m, 4) has, in the sense of the cells."""
+    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    _, first, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.asarray(edges[first[count == 1]])
+
+
+def section_figure(p: ORing, views: Sequence[View]) -> Figure:
+    """A panel for each state, all with one scale of stress and one of pressure."""
+    from matplotlib.figure import Figure
+
+    stresses = [von_mises(view.section) for view in views]
+    levels = _levels(max(float(stress.max()) for stress in stresses))
+    largest = max(float(np.max(pressures)) for view in views for pressures in _pressures(view))
+    left, panel, bar = 0.5, 3.3, 0.75
+    figure = Figure(figsize=(left + panel * len(views) + bar, 4.2))
+    panels = figure.subplots(1, len(views), sharey=True, squeeze=False)[0]
+    for axes, view, stress in zip(panels, views, stresses, strict=True):
+        _draw_gland(axes, p)
+        shown = _draw_ring(axes, view.section, stress, levels)
+        _draw_film(axes, p, view, _BAND * p.section_diameter / largest)
+        _draw_contact(axes, p, view.section, _BAND * p.section_diameter / largest)
+        _draw_rod(axes, p, view.row)
+    panels[0].set_ylabel("$r$ [mm]")
+    style.set_margins(figure, left=left, right=bar, bottom=0.48, top=0.75, between=0.05)
+    _, low, right, high = panels[-1].get_position(original=True).extents
+    width = figure.get_size_inches()[0]
+    scale = figure.add_axes((right + 0.1 / width, low, 0.13 / width, high - low))
+    figure.colorbar(shown, cax=scale, label="von Mises stress [MPa]")
+    style.write_head(figure, style.subject(p), left)
+    return figure
+
+
+def _pressures(view: View) -> tuple[Array, Array]:
+    """Pressures in the film and, at the nodes of the section, where the housing is touched, MPa."""
+    return view.profile.p_MPa, view.section.point_data["contact_pressure"]
+
+
+def _levels(largest: float) -> Array:
+    from matplotlib.ticker import MaxNLocator
+
+    return np.asarray(MaxNLocator(_LEVELS).tick_values(0.0, largest))
+
+
+def _draw_gland(axes: Axes, p: ORing) -> None:
+    """Rod, housing with its walls, and the fluid on the sealed side; limits of the picture."""
+    size, lip = p.section_diameter, 0.5 * p.rod_diameter + _CLEARANCE * p.section_diameter
+    rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
+    beside, below, above = (share * size for share in _AROUND)
+    start, end = (p.groove_centre + side * 0.5 * p.groove_width for side in (-1, 1))
+    left, right, bottom, top = start - size, end + size, rod - size, housing + size  # out of sight
+    if p.sealed_pressure:
+        middle = p.groove_centre
+        axes.fill([left, middle, middle, left], [rod, rod, housing, housing], color=_FLUID, lw=0)
+    metal: Any = {"facecolor": _METAL, "edgecolor": _LINE, "linewidth": 0.9}
+    axes.fill([left, right, right, left], [bottom, bottom, rod, rod], **metal)
+    axes.fill(
+        [left, start, start, end, end, right, right, left],
+        [lip, lip, housing, housing, lip, lip, top, top],
+        **metal,
+    )
+    axes.set(xlim=(start - beside, end + beside), ylim=(rod - below, housing + above))
+    axes.set(xlabel="$z$ [mm]", aspect="equal")
+    axes.grid(visible=False)
+
+
+def _draw_ring(axes: Axes, section: Section, stress: Array, levels: Array) -> TriContourSet:
+    """The stress in bands of colour, and the outline."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
+
+    cells = section.cells
+    triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    grid = Triangulation(section.points[:, 0], section.points[:, 1], triangles)
+    shown: TriContourSet = axes.tricontourf(grid, stress, levels=levels, cmap="YlOrRd")
+    edges = section.points[boundary_edges(cells)]
+    axes.add_collection(LineCollection(list(edges), colors=_LINE, linewidths=0.9))
+    return shown
+
+
+def _draw_film(axes: Axes, p: ORing, view: View, height: float) -> None:
+    """Film pressure as a band in the rod.  height: mm for 1 MPa."""
+    rod, x, film = 0.5 * p.rod_diameter, view.profile.x_mm, np.maximum(view.profile.p_MPa, 0.0)
+    axes.fill_between(x, rod, rod - height * film, color=_FILM, lw=0)
+    top = int(np.argmax(film))
+    _write(axes, (x[top], rod - height * film[top]), f"film pressure, max {film[top]:.3g} MPa", -3)
+
+
+def _draw_contact(axes: Axes, p: ORing, section: Section, height: float) -> None:
+    """Contact pressure as bands in the housing and its walls.  height: mm for 1 MPa."""
+    from matplotlib.collections import PolyCollection
+
+    pressure = section.point_data["contact_pressure"]
+    edges = boundary_edges(section.cells)
+    tips = section.points + height * pressure[:, None] * _normals(section.points, edges)
+    loaded = edges[(pressure[edges] > 0.0).any(axis=1)]
+    sides = [section.points[loaded], tips[loaded[:, ::-1]]]
+    bands = PolyCollection(list(np.concatenate(sides, axis=1)), linewidths=0.4)
+    bands.set_color(_CONTACT)
+    axes.add_collection(bands)
+    above = 0.5 * p.housing_diameter + height * pressure.max()
+    text = f"contact pressure, max {pressure.max():.3g} MPa"
+    _write(axes, (section.points[pressure.argmax(), 0], above), text, 3)
+
+
+def _normals(points: Array, edges: Integers) -> Array:
+    """Outward unit normals (n, 2) at the ends of boundary edges, zero elsewhere."""
+    along = points[edges[:, 1]] - points[edges[:, 0]]
+    across = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    total = np.zeros_like(points)
+    for side in (0, 1):
+        np.add.at(total, edges[:, side], across)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.asarray(np.divide(total, length, out=total, where=length > 0.0))
+
+
+def _draw_rod(axes: Axes, p: ORing, row: CurveRow) -> None:
+    """Which way the rod goes, and what the film is."""
+    speed = f"{row.rod_speed_mm_s:+g}".replace("-", "\N{MINUS SIGN}")
+    name = style.STROKES[row.stroke]
+    axes.set_title(f"{name}, $U$ = {speed} mm/s, $h^{{*}}$ = {row.h_star_um:.3g} µm")
+    half, sign = 0.3 * p.section_diameter, np.sign(row.rod_speed_mm_s)
+    level = 0.5 * p.rod_diameter - (_AROUND[1] - 0.05) * p.section_diameter
+    axes.annotate(
+        "",
+        (p.groove_centre + sign * half, level),
+        (p.groove_centre - sign * half, level),
+        arrowprops={"arrowstyle": "-|>", "color": _LINE, "linewidth": 1.2},
+    )
+
+
+def _write(axes: Axes, place: tuple[float, float], text: str, above: float) -> None:
+    """Small letters above or below a place, by so many points."""
+    axes.annotate(
+        text,
+        place,
+        xytext=(0, above),
+        textcoords="offset points",
+        ha="center",
+        va="bottom" if above > 0 else "top",
+        fontsize="x-small",
+    )

@@ -1,0 +1,81 @@
+"""The look that the pictures of a run share, and how one is saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from softehl.runtime.io import replacing
+
+if TYPE_CHECKING:  # imported late: matplotlib is slow to import
+    from matplotlib.figure import Figure
+
+    from softehl.cases.seal.parameters import ORing
+
+STYLE: Any = {
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": "medium",
+    "figure.dpi": 160,
+    "font.size": 9,
+    "grid.alpha": 0.35,
+    "grid.linewidth": 0.5,
+    "legend.fontsize": "small",
+    "legend.frameon": False,
+    "legend.title_fontsize": "small",
+    "lines.linewidth": 1.4,
+    "lines.markersize": 5,
+    "svg.hashsalt": "softehl",
+}
+STROKES = {"out": "outstroke", "in": "instroke"}
+COLOURS = {"out": "#1b6ca8", "in": "#c8553d"}
+MARKERS = {"out": "o", "in": "s"}
+
+POSITION = "$x$ [mm]   (sealed side left, air side right)"
+PRESSURE = "pressure $p$ [MPa]"
+FILM = "film thickness $h$ [µm]"
+H_STAR = "film thickness $h^{*} = 2q/|U|$ [µm]"
+SPEED = "rod speed $|U|$ [mm/s]"
+
+
+def subject(p: ORing) -> str:
+    """The ring, the oil and the sealed pressure in two lines, for the head of a picture."""
+    return (
+        f"O-ring {p.inner_diameter:g} \N{MULTIPLICATION SIGN} {p.section_diameter:g} mm, "
+        f"rod {p.rod_diameter:g} mm, housing {p.housing_diameter:g} mm\n"
+        f"rubber $\\mu$ = {p.shear_modulus:g} MPa, $\\kappa$ = {p.bulk_modulus:g} MPa; "
+        f"oil $\\eta_0$ = {p.viscosity * 1e9:g} mPa s, $\\alpha$ = {p.pressure_viscosity:g} /MPa; "
+        f"$p_s$ = {p.sealed_pressure:g} MPa"
+    )
+
+
+def write_head(figure: Figure, text: str, left: float) -> None:
+    """Write what a picture is about at its top, from `left` (inches) on."""
+    width, height = figure.get_size_inches()
+    figure.text(
+        left / width, 1.0 - 0.08 / height, text, ha="left", va="top", fontsize=7.5, color="0.25"
+    )
+
+
+def set_margins(
+    figure: Figure, left: float, right: float, bottom: float, top: float, between: float = 0.0
+) -> None:
+    """Margins of the panels in inches; a layout that is computed costs as much as the drawing."""
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(
+        left=left / width,
+        right=1.0 - right / width,
+        bottom=bottom / height,
+        top=1.0 - top / height,
+        wspace=between,
+        hspace=between,
+    )
+
+
+def save(figure: Figure, stem: Path) -> None:
+    """Write a figure as .png and .svg, each at once or not at all, the same bytes every time."""
+    for kind, metadata in (("png", None), ("svg", {"Date": None})):
+        with replacing(stem.with_suffix(f".{kind}")) as temporary:
+            figure.savefig(temporary, format=kind, metadata=metadata)
