@@ -157,17 +157,17 @@ def write_vtu(
 
 def read_vtu(
     path: Path,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], dict[str, NDArray[np.float64]]]:
+) -> tuple[Array, Integers, dict[str, Array]]:
     """Points (n, 2), cells (m, 4) and point data that :func:`write_vtu` wrote.
 
     Raises OSError, and ValueError where the file is damaged.
     """
-    import meshio
+    from meshio import vtu  # meshio.read prints and ends the process where this raises
 
     with path.open("rb"):  # a missing file is no damaged one
         pass
     try:
-        mesh = meshio.read(path, file_format="vtu")
+        mesh = vtu.read(path)
         points = np.asarray(mesh.points[:, :2], dtype=np.float64)
         cells = np.asarray(mesh.cells_dict["quad"], dtype=np.int64)
     except Exception as error:  # damage may show as almost anything: in XML, base64, zlib, shapes

@@ -101,3 +101,22 @@ def test_vtu_reads_back(tmp_path: Path, rng: np.random.Generator) -> None:
     assert np.array_equal(mesh.point_data["displacement"], moved)
     assert np.array_equal(mesh.cell_data["sigma_zz"][0], stress)
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_section_reads_back_as_it_was_written(tmp_path: Path) -> None:
+    points = np.array([[0.0, 25.0], [1.0, 25.0], [1.0, 26.0], [0.0, 26.0]])
+    cells, stress = np.array([[0, 1, 2, 3]]), np.array([1.0, np.pi, -3.0, 0.0])
+    io.write_vtu(tmp_path / "s.vtu", points, cells, {"sigma": stress}, {})
+    again = io.read_vtu(tmp_path / "s.vtu")
+    np.testing.assert_array_equal(again[0], points)
+    np.testing.assert_array_equal(again[1], cells)
+    np.testing.assert_array_equal(again[2]["sigma"], stress)
+
+
+def test_a_damaged_section_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "s.vtu"
+    with pytest.raises(FileNotFoundError):
+        io.read_vtu(path)
+    path.write_text("<VTKFile>")
+    with pytest.raises(ValueError, match=r"s\.vtu: not a section"):
+        io.read_vtu(path)
