@@ -42,7 +42,7 @@ def curve_figure(p: ORing, rows: Sequence[CurveRow], rejected: Sequence[CurveRow
     axes.set_xlabel(style.SPEED)
     axes.set_ylabel(style.H_STAR)
     axes.legend(loc="upper left")
-    style.set_margins(figure, left=0.62, right=0.12, bottom=0.5, top=0.48)
+    style.set_margins(figure, left=0.62, right=0.12, bottom=0.5, top=0.6)
     style.write_head(figure, style.subject(p), left=0.62)
     return figure
 

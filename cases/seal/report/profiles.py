@@ -46,7 +46,7 @@ def profiles_figure(p: ORing, results: Results) -> Figure:
     axes[0, 0].set_ylabel(style.PRESSURE)
     axes[1, 0].set_ylabel(style.FILM)
     _show_contact(axes[1, 0], [row for row, _ in results])
-    style.set_margins(figure, left=0.55, right=0.12, bottom=0.5, top=0.75, between=0.07)
+    style.set_margins(figure, left=0.55, right=0.12, bottom=0.5, top=0.82, between=0.07)
     style.write_head(figure, style.subject(p), left=0.55)
     return figure
 

@@ -80,7 +80,7 @@ def section_figure(p: ORing, views: Sequence[View]) -> Figure:
         _draw_contact(axes, p, view.section, _BAND * p.section_diameter / largest)
         _draw_rod(axes, p, view.row)
     panels[0].set_ylabel("$r$ [mm]")
-    style.set_margins(figure, left=left, right=bar, bottom=0.48, top=0.75, between=0.05)
+    style.set_margins(figure, left=left, right=bar, bottom=0.48, top=0.82, between=0.05)
     _, low, right, high = panels[-1].get_position(original=True).extents
     width = figure.get_size_inches()[0]
     scale = figure.add_axes((right + 0.1 / width, low, 0.13 / width, high - low))
