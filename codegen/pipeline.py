@@ -1,24 +1,37 @@
-"""The whole compiler on one screen: model -> outputs -> passes -> schedule -> C."""
+"""The whole compiler on one screen: every stage from a model page to C, in order.
+
+    page        SymPy expressions become a graph of exact numbers (`language`)
+    tasks       what the kernel family computes: energy, residual, tangent, ...
+    interfaces  the few linear forms through which the potential sees its unknowns
+    invariants  the fewest quadratic values of these forms of which the energy is a function
+    chain rule  the outputs of a task, differentiated in every way that may be the cheapest
+    passes      rewrites of each way that keep its values and lower its cost (`optimise`)
+    schedule    what is computed once, what at each point, what inside a branch
+    choice      of all ways the one with fewest operations
+    order       straight-line code in the order of a small register file
+    print       one value, one line of C: element by element, or several at once
+    routines    local iterations and functions of stretches as C functions of their own
+
+`softehl generate --trace KERNEL` shows what each of them did.
+"""
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from types import ModuleType
-from typing import Any
 
-from softehl.codegen import abi
-from softehl.codegen.abi import Target
-from softehl.codegen.derive import variants
+from softehl.codegen.abi import Target, Task
+from softehl.codegen.derive import structure, variants
 from softehl.codegen.derive.outputs import Entry, placed
+from softehl.codegen.derive.structure import Structure
+from softehl.codegen.derive.variants import Variant
 from softehl.codegen.emit import c as emit_c
 from softehl.codegen.emit import routines as emit_routines
 from softehl.codegen.emit import simd as emit_simd
+from softehl.codegen.emit import source as emit_source
 from softehl.codegen.emit import ufcx as emit_ufcx
-from softehl.codegen.emit.liveness import peak_live
 from softehl.codegen.emit.order import arranged
 from softehl.codegen.emit.schedule import Schedule, schedule, straight_line
 from softehl.codegen.graph.graph import Routine
@@ -27,13 +40,31 @@ from softehl.codegen.optimise import passes
 
 
 @dataclass(frozen=True)
+class Attempt:
+    """One chain rule to its end: what each pass left, the plan, operations of one element."""
+
+    rule: str
+    entries: list[Entry]
+    passes: list[passes.TraceRow]
+    plan: Schedule
+    operations: int
+
+
+@dataclass(frozen=True)
 class Function:
-    """One kernel: C text, plan, temporaries, and what each pass bought."""
+    """One kernel: its C text and how it came about.
+
+    `found` is what was found in the potential (None: nothing, or the task differentiates nothing);
+    of the `attempts` one was `chosen`; `plan` is its schedule in the printed order.
+    """
 
     text: str
     plan: Schedule
     temporaries: int
-    trace: list[passes.TraceRow]
+    found: Structure | None
+    attempts: tuple[Attempt, ...]
+    chosen: Attempt
+    printer: str
     routines: tuple[Routine, ...] = ()
 
 
@@ -57,51 +88,52 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
         return KernelSource(definition, emit_ufcx.source(definition, texts), functions)
     called = dict.fromkeys(r for f in functions.values() for r in f.routines)
     before = emit_routines.texts(definition, called) + emit_simd.wrappers("".join(texts))
-    return KernelSource(definition, emit_c.source(definition, texts, before), functions)
+    return KernelSource(definition, emit_source.source(definition, texts, before), functions)
 
 
-def compile_task(definition: Definition, task: str, target: Target = Target.SIMD) -> Function:
-    """One kernel, all stages in order; of several chain rules the one with fewest operations."""
-    written_out = definition.unroll and task != abi.Task.FIELDS
-    data = (len(definition.data), len(definition.point_data))
-    straight = passes.straight_line(_points(definition), data)
-    chosen = straight if written_out else passes.STANDARD
-    tried = []
-    for entries in variants.variants(definition, task):
-        wanted = emit_ufcx.chosen(entries, task) if target is Target.UFCX else entries
-        tried.append(_rewritten(definition, wanted, chosen))
-    entries, plan, trace = min(tried, key=lambda t: _work(definition, t[1]))
+def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Function:
+    """One kernel, all stages in the order of this file's first lines."""
+    forms = structure.linear_forms(d) if variants.differentiated(task) else None
+    found = None if forms is None else structure.quadratic_values(d, forms)
+    rewrites = _passes(d, task)
+    ways = (_for_target(v, task, target) for v in variants.variants(d, task, found))
+    attempts = tuple(_attempt(d, way, rewrites) for way in ways)
+    chosen = min(attempts, key=lambda a: a.operations)
+    entries, plan = chosen.entries, chosen.plan
     printer = _printer(target, task, plan)
     if printer is emit_simd:
-        entries, plan = _arranged(definition, entries)
-    text, temporaries = printer.function(definition, task, entries, plan)
-    routines = tuple(emit_routines.called([x.node for x in entries]))
-    return Function(text, plan, temporaries, trace, routines)
+        roots, order = arranged(d.graph, [x.node for x in entries])
+        entries, plan = placed(entries, roots), straight_line(order)
+    text, temporaries = printer.function(d, task, entries, plan)
+    called = tuple(emit_routines.called([x.node for x in entries]))
+    name = printer.__name__.rpartition(".")[2]
+    return Function(text, plan, temporaries, found, attempts, chosen, name, called)
 
 
-def _rewritten(
-    definition: Definition, entries: list[Entry], chosen: Sequence[passes.Pass]
-) -> tuple[list[Entry], Schedule, list[passes.TraceRow]]:
-    roots, trace = passes.run(definition.graph, [x.node for x in entries], chosen)
-    return placed(entries, roots), schedule(roots), trace
+def _passes(d: Definition, task: str) -> Sequence[passes.Pass]:
+    """The loop over the points is written out where the model says so, never for fields."""
+    if not d.unroll or task == Task.FIELDS:
+        return passes.STANDARD
+    return passes.straight_line(_points(d), (len(d.data), len(d.point_data)))
 
 
-def _arranged(definition: Definition, entries: Sequence[Entry]) -> tuple[list[Entry], Schedule]:
-    roots, order = arranged(definition.graph, [x.node for x in entries])
-    return placed(entries, roots), straight_line(order)
+def _for_target(v: Variant, task: str, target: Target) -> Variant:
+    return Variant(v.rule, emit_ufcx.chosen(v.entries, task)) if target is Target.UFCX else v
 
 
-def _work(definition: Definition, plan: Schedule) -> int:
-    """Operations of one element."""
-    return plan.operations_once + len(definition.rule.points) * plan.operations_per_point
+def _attempt(d: Definition, way: Variant, rewrites: Sequence[passes.Pass]) -> Attempt:
+    roots, trace = passes.run(d.graph, [x.node for x in way.entries], rewrites)
+    plan = schedule(roots)
+    work = plan.operations_once + len(d.rule.points) * plan.operations_per_point
+    return Attempt(way.rule, placed(way.entries, roots), trace, plan, work)
 
 
 def _printer(target: Target, task: str, plan: Schedule) -> ModuleType:
-    """Lanes where they are wanted and suit; fields are stored point by point, never in lanes."""
+    """Several elements at once where wanted and fit; fields are stored point by point."""
     if target is Target.UFCX:
         return emit_ufcx
-    lanes = target is Target.SIMD and task != abi.Task.FIELDS and emit_simd.suits(plan)
-    return emit_simd if lanes else emit_c
+    at_once = target is Target.SIMD and task != Task.FIELDS and emit_simd.suits(plan)
+    return emit_simd if at_once else emit_c
 
 
 def _points(definition: Definition) -> list[list[Fraction]]:
@@ -109,68 +141,3 @@ def _points(definition: Definition) -> list[list[Fraction]]:
     scale = 10**60
     rows = zip(definition.rule.points, definition.rule.weights, strict=True)
     return [[Fraction(int(x.evalf(70) * scale), scale) for x in (*p, w)] for p, w in rows]
-
-
-def files(kernels: Iterable[KernelSource]) -> dict[str, str]:
-    """Every file of `generated/`: C, header, signature, manifest."""
-    kernels = list(kernels)
-    declarations = [abi.declaration(k.definition.name, t) for k in kernels for t in k.functions]
-    out = {f"{k.definition.name}.c": k.text for k in kernels}
-    out[emit_c.HEADER] = emit_c.header(declarations)
-    out["signature.c"] = SIGNATURE_C
-    manifest = {k.definition.name: _manifest(k) for k in kernels}
-    out["manifest.json"] = json.dumps({"kernels": manifest}, indent=1) + "\n"
-    return out
-
-
-def ufcx_files(kernels: Iterable[KernelSource]) -> dict[str, str]:
-    """Self-contained C files of kernels compiled for target `ufcx`."""
-    return {f"{k.definition.name}_ufcx.c": k.text for k in kernels}
-
-
-SIGNATURE_C = f"""/* Generated by softehl; do not edit. */
-#include "{emit_c.HEADER}"
-
-#ifndef SOFTEHL_SIGNATURE
-#error "build with python -m softehl.codegen.tools.build, which passes the signature of the sources"
-#endif
-
-const char *softehl_signature(void)
-{{
-    return SOFTEHL_SIGNATURE;
-}}
-"""
-
-
-def _manifest(kernel: KernelSource) -> dict[str, Any]:
-    d = kernel.definition
-    points = [[float(x.evalf(30)) for x in p] for p in d.rule.points]
-    return {
-        "doc": d.doc,
-        "nodes": d.nodes,
-        "coordinates": list(d.coordinates),
-        "unknowns": list(d.unknowns),
-        "interpolated": d.interpolated,
-        "components": d.components,
-        "parameters": {a.name: a.meaning for a in d.parameters},
-        "data": {a.name: a.meaning for a in d.data},
-        "point_data": {a.name: a.meaning for a in d.point_data},
-        "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],
-        "fields": [name for name, _ in d.fields],
-        "unrolled": d.unroll,
-        "rule": {"points": points, "weights": [float(w.evalf(30)) for w in d.rule.weights]},
-        "tasks": {t: _cost(f, len(points)) for t, f in kernel.functions.items()},
-        "bytes": len(kernel.text.encode()),
-        "signature": hashlib.sha256(kernel.text.encode()).hexdigest()[:16],
-    }
-
-
-def _cost(f: Function, points: int) -> dict[str, int]:
-    once, per_point = f.plan.operations_once, f.plan.operations_per_point
-    return {
-        "operations": once + points * per_point,
-        "operations_once": once,
-        "operations_per_point": per_point,
-        "temporaries": f.temporaries,
-        "peak_live": peak_live(f.plan),
-    }

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from softehl.codegen.abi import Task, derivative_task
+from softehl.codegen.derive import modal
 from softehl.codegen.derive.linearise import Linearisation
-from softehl.codegen.derive.modal import through_interfaces
 from softehl.codegen.derive.outputs import Entry, Slot
+from softehl.codegen.derive.structure import Structure, found_in
 from softehl.codegen.graph.differentiate import directional, gradient
 from softehl.codegen.graph.graph import Input, Node
 from softehl.codegen.graph.traverse import reachable
@@ -31,25 +33,49 @@ def tasks(d: Definition) -> list[str]:
     return offered + [derivative_task(name) for name, _ in d.derivatives]
 
 
+@dataclass(frozen=True)
+class Variant:
+    """The outputs of a task by one chain rule, which has a name."""
+
+    rule: str
+    entries: list[Entry]
+
+
 def outputs(d: Definition, task: str) -> list[Entry]:
     """Output nodes of a task, before any pass: the first of its `variants`."""
-    return next(variants(d, task))
+    return next(variants(d, task, found_in(d))).entries
 
 
-def variants(d: Definition, task: str) -> Iterator[list[Entry]]:
-    """The same outputs by different chain rules: which one is the cheapest, passes will tell."""
-    if task == Task.ENERGY:
-        yield [Entry(Slot(False, 0), None, d.potential)]
-    elif task == Task.FIELDS:
-        yield [Entry(Slot(False, k), None, node) for k, (_, node) in enumerate(d.fields)]
-    elif task not in (Task.RESIDUAL, Task.TANGENT):
-        yield _rates(d, task)
+def differentiated(task: str) -> bool:
+    """False for what the page writes down itself."""
+    return task not in (Task.ENERGY, Task.FIELDS)
+
+
+def variants(d: Definition, task: str, found: Structure | None) -> Iterator[Variant]:
+    """The outputs of a task by different chain rules: passes will tell which is the cheapest."""
+    if not differentiated(task):
+        nodes = [d.potential] if task == Task.ENERGY else [n for _, n in d.fields]
+        yield Variant(
+            "none, the page writes it down",
+            [Entry(Slot(False, k), None, n) for k, n in enumerate(nodes)],
+        )
+    elif task in (Task.RESIDUAL, Task.TANGENT):
+        yield from _rules(d, task, found)
     else:
-        found = list(through_interfaces(d))
-        for modal in found:
-            yield modal.residual() + (modal.tangent() if task == Task.TANGENT else [])
-        if not found or len(reachable([d.potential])) <= SMALL:
-            yield _plain(d, task)
+        residual = next(_rules(d, Task.RESIDUAL, found))
+        yield Variant(f"along one direction, {residual.rule}", _rates(d, task, residual.entries))
+
+
+def _rules(d: Definition, task: str, found: Structure | None) -> Iterator[Variant]:
+    if found is not None:
+        ways = {
+            "level by level": modal.by_levels(d, found),
+            "by slopes of what the potential sees": modal.by_slopes(d, found),
+        }
+        for rule, way in ways.items():
+            yield Variant(rule, way.residual() + (way.tangent() if task == Task.TANGENT else []))
+    if found is None or len(reachable([d.potential])) <= SMALL:
+        yield Variant("through the values that the page names", _plain(d, task))
 
 
 def _plain(d: Definition, task: str) -> list[Entry]:
@@ -60,10 +86,9 @@ def _plain(d: Definition, task: str) -> list[Entry]:
     return rows + (_tangent(d, rows, slots, adjoint) if task == Task.TANGENT else [])
 
 
-def _rates(d: Definition, task: str) -> list[Entry]:
-    """The residual's derivative along `direction` or with respect to one argument."""
+def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
+    """The derivative of the residual `rows` along `direction` or with respect to one argument."""
     g = d.graph
-    rows = outputs(d, Task.RESIDUAL)
     if task == Task.PRODUCT:
         array = {"dofs": "direction", "interpolated": "interpolated direction"}
         seeds = {

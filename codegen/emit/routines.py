@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from softehl.codegen.emit.c import Printer, number
+from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.schedule import schedule
 from softehl.codegen.graph.graph import Graph, Node, Op, Routine
 from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, derivatives_of_energy

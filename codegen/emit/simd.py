@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
-from softehl.codegen.emit.c import Printer, number
+from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.schedule import If, Schedule, Statement
 from softehl.codegen.graph.graph import ELEMENTARY, FREE, Input, Node, Op
 from softehl.codegen.language.definition import Definition

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
 from softehl.codegen.emit import support as support_c
-from softehl.codegen.emit.c import Printer, number
+from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.schedule import Loop, Schedule
 from softehl.codegen.graph.graph import Input, Node, Op
 from softehl.codegen.graph.traverse import reachable

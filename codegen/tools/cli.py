@@ -13,9 +13,10 @@ from rich.table import Column, Table
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import cache, targets
+from softehl.codegen.tools import cache, product, targets
 from softehl.codegen.tools import files as cli_files
 from softehl.codegen.tools.build import GENERATED
+from softehl.codegen.tools.trace import show as show_trace
 
 
 def generate(
@@ -44,7 +45,7 @@ def generate(
         return 2
     if trace is not None:
         return _trace(trace)
-    files = pipeline.files(pipeline.compile_model(make()) for make in ALL.values())
+    files = product.files(pipeline.compile_model(make()) for make in ALL.values())
     stale = [name for name, text in files.items() if _differs(GENERATED / name, text)]
     known = {*files, "__init__.py"}
     strange = [p.name for p in GENERATED.glob("*.[chj]*") if p.name not in known]
@@ -71,7 +72,7 @@ def _trace(family: str) -> int:
     if family not in ALL:
         print(f"softehl: no model {family!r}; there are {', '.join(ALL)}", file=sys.stderr)
         return 2
-    cli_files.print_trace(ALL[family]())
+    show_trace(ALL[family]())
     return 0
 
 

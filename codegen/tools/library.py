@@ -18,7 +18,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from softehl.codegen import abi
-from softehl.codegen.tools import build, model_text
+from softehl.codegen.tools import build, model_text, product
 from softehl.codegen.tools import cache as store
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str,
         start = perf_counter()
         kernels.append(pipeline.compile_model(d))
         seconds[d.name] = perf_counter() - start
-    files = pipeline.files(kernels)
+    files = product.files(kernels)
     store.remember(key, files)
     return files, seconds
 

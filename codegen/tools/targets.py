@@ -13,7 +13,7 @@ from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.emit.ufcx import TargetError
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.tools import cache
+from softehl.codegen.tools import cache, product
 
 
 def write(definitions: Iterable[Definition], target: Target, folder: Path | None) -> int:
@@ -33,7 +33,7 @@ def write(definitions: Iterable[Definition], target: Target, folder: Path | None
             kernels.append(pipeline.compile_model(d, target))
         except TargetError as error:
             print(f"left out: {error}", file=sys.stderr)
-    files = pipeline.ufcx_files(kernels) if target is Target.UFCX else pipeline.files(kernels)
+    files = product.ufcx_files(kernels) if target is Target.UFCX else product.files(kernels)
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         cache.write(folder / name, text.encode())

@@ -14,13 +14,13 @@ import sympy as sp
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Task
-from softehl.codegen.emit import c as emit_c
+from softehl.codegen.emit.printer import number
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import build, shipped
+from softehl.codegen.tools import build, product, shipped
 from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.fem.rules import film_rule, gauss
 from softehl.runtime.kernels import Kernel, MissingKernelsError, StaleKernelsError, load_kernel
@@ -110,7 +110,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     """One library of all throw-away models."""
     directory = tmp_path_factory.mktemp("generated")
     models = {d.name: d for d in (branched(), nested_sums(), line())}
-    texts = pipeline.files([pipeline.compile_model(d) for d in models.values()])
+    texts = product.files([pipeline.compile_model(d) for d in models.values()])
     for name, text in texts.items():
         (directory / name).write_text(text, encoding="utf-8")
     build.build(directory)
@@ -273,7 +273,7 @@ def test_a_named_value_of_an_interpolated_field_in_one_side(tmp_path: Path) -> N
 
 def test_numbers_are_read_back_exactly() -> None:
     for v in (0.1, 1 / 3, -2.5, 1e300, 5e-324, 0.0):
-        text = emit_c.number(v)
+        text = number(v)
         assert float(text.strip("()")) == v
         assert text.startswith("(") == (v < 0)
 
@@ -308,8 +308,8 @@ def test_one_value_one_line() -> None:
 
 def test_the_manifest_tells_costs_and_meanings() -> None:
     source = pipeline.compile_model(nested_sums())
-    text = pipeline.files([source])["manifest.json"]
-    assert pipeline.files([source])["manifest.json"] == text
+    text = product.files([source])["manifest.json"]
+    assert product.files([source])["manifest.json"] == text
     plan = source.functions[Task.TANGENT].plan
     for expected in (
         '"doc": "A sum feeds a sum."',

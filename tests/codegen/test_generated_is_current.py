@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,15 +12,18 @@ from pathlib import Path
 
 import pytest
 
+from softehl.codegen import pipeline
+from softehl.codegen.emit.liveness import peak_live
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cli
 from softehl.codegen.tools.build import GENERATED
 
 DIGEST = """
 import hashlib
-from codegen import pipeline
+from softehl.codegen import pipeline
 from softehl.codegen.models import ALL
-for name, text in pipeline.files(pipeline.compile_model(make()) for make in ALL.values()).items():
+from softehl.codegen.tools import product
+for name, text in product.files(pipeline.compile_model(make()) for make in ALL.values()).items():
     print(name, hashlib.sha256(text.encode()).hexdigest())
 """
 REMEDY = "mend it with: softehl generate"
@@ -129,11 +133,39 @@ def test_generate_mends_what_check_names(copy: Path, capsys: pytest.CaptureFixtu
     assert (copy / "follower_pressure.c").stat().st_mtime_ns == untouched
 
 
-def test_trace_shows_every_pass_of_every_task(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.generate(trace="contact") == 0
+def test_trace_shows_every_stage_of_every_task(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
+    assert cli.generate(trace="solid_q4") == 0
     printed = capsys.readouterr().out
-    for words in ("contact residual", "contact tangent", "input", "common factors", "literals"):
-        assert words in printed
+    source = pipeline.compile_model(ALL["solid_q4"]())
+    assert re.findall(r"solid_q4 (\w+) ─", printed) == list(source.functions)
+    tangent = printed[printed.index("solid_q4 tangent") : printed.index("solid_q4 fields")]
+    function = source.functions["tangent"]
+    assert function.found is not None
+    assert "8 unknowns, 7 modal coordinates, 5 values at a point, 5 linear forms" in tangent
+    assert f"{len(function.found.squares)} invariants" in tangent
+    assert len(function.attempts) == 2
+    for a in function.attempts:
+        assert f"{a.rule}: {a.operations} operations" in tangent
+        for row in a.passes:
+            assert re.search(rf"{row.name} .*\b{row.nodes} +{row.operations}\b", tangent), row
+    best = min(a.operations for a in function.attempts)
+    assert function.chosen.operations == best
+    assert re.search(rf"choice +chain rule {function.attempts.index(function.chosen) + 1}", tangent)
+    assert f"{function.plan.operations_once} operations once; no loops" in tangent
+    assert f"{peak_live(function.plan)} in the printed order" in tangent
+    assert f"simd: {function.temporaries} temporaries" in tangent
+
+
+def test_every_stage_is_named_on_the_first_screen_of_the_pipeline() -> None:
+    stages = re.findall(r"^    (\w+(?: \w+)?)  +\w", pipeline.__doc__ or "", re.MULTILINE)
+    assert stages[:5] == ["page", "tasks", "interfaces", "invariants", "chain rule"]
+    assert stages[5:] == ["passes", "schedule", "choice", "order", "print", "routines"]
+
+
+def test_trace_of_an_unknown_kernel(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.generate(trace="nothing") == 2
     assert "no model 'nothing'; there are solid_q4," in capsys.readouterr().err
 

@@ -22,7 +22,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build
+from softehl.codegen.tools import build, product
 from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.kernels import ArgumentError, Kernel, load_kernel
 from tests.codegen.workshop import compiled, difference, element_state, off, tangent_errors
@@ -70,7 +70,7 @@ def family(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Definiti
     """One library of systems of all sizes, looped and written out."""
     directory = tmp_path_factory.mktemp("coupled")
     models = {d.name: d for d in (coupled(n, unroll=u) for n, u in SIZES)}
-    texts = pipeline.files([pipeline.compile_model(d) for d in models.values()])
+    texts = product.files([pipeline.compile_model(d) for d in models.values()])
     for name, text in texts.items():
         (directory / name).write_text(text, encoding="utf-8")
     build.build(directory, extra=(*build.STRICT, "-O1"))

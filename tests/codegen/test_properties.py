@@ -29,7 +29,7 @@ from softehl.codegen.graph.spec import check
 from softehl.codegen.graph.traverse import rewrite
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
-from softehl.codegen.tools import build
+from softehl.codegen.tools import build, product
 from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.random_models import (
     DIGITS,
@@ -76,7 +76,7 @@ def library(target: Target) -> dict[str, Kernel]:
     """Every random model compiled for a target, in one shared library."""
     directory = Path(tempfile.mkdtemp(prefix="random_models_"))
     models = [r.definition(name) for name, r in population().items()]
-    texts = pipeline.files([pipeline.compile_model(d, target) for d in models])
+    texts = product.files([pipeline.compile_model(d, target) for d in models])
     for name, text in texts.items():
         (directory / name).write_text(text, encoding="utf-8")
     build.build(directory, extra=(*build.STRICT, "-O0"))

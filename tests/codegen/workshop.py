@@ -17,7 +17,7 @@ from softehl.codegen.derive.outputs import Slot
 from softehl.codegen.graph.evaluate import State, evaluate
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.tools import build
+from softehl.codegen.tools import build, product
 from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.kernels import Kernel, load_kernel
 
@@ -112,7 +112,7 @@ def _contracted(d: Definition, node: Node, state: State, shapes: Sequence[Shape]
 
 def write(d: Definition, directory: Path) -> None:
     """All files of one model, as `softehl generate` writes them."""
-    for name, text in pipeline.files([pipeline.compile_model(d)]).items():
+    for name, text in product.files([pipeline.compile_model(d)]).items():
         (directory / name).write_text(text, encoding="utf-8")
 
 

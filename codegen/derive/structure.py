@@ -1,0 +1,93 @@
+"""What is found in a potential: linear forms of its unknowns, and quadratic values of these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from softehl.codegen.derive.interfaces import Interface, linear_interface
+from softehl.codegen.derive.invariants import quadratic_interface, through_invariants
+from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.traverse import reachable, strip, substitute
+from softehl.codegen.language.definition import Definition
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A potential `root` rewritten through what was found in it, with its `constant` values.
+
+    `interface` holds the modal coordinates and the point values, `forms` the linear forms of
+    these (displacement gradients), `squares` quadratic values of the forms (strain measures);
+    `invariants` is True where the squares are fewer than those of the page.
+    """
+
+    root: Node
+    constant: tuple[Node, ...]
+    interface: Interface
+    forms: tuple[Node, ...]
+    squares: tuple[Node, ...] = ()
+    invariants: bool = False
+
+
+def linear_forms(d: Definition) -> Structure | None:
+    """The potential through linear forms of the unknowns; None where there is nothing to gain."""
+    if d.interpolated or d.given:
+        return None
+    g = d.graph
+    (root,), kept = strip(g, [d.potential], d.constant)
+    if _has_guarded_values(root):
+        return None
+    interface = linear_interface(g, [root], d.directions)
+    if interface is None:
+        return None
+    named: dict[Node, Node] = {}
+    replacement = {z: _named(g, value, named) for z, value in interface.rewritten.items()}
+    (root,), new = substitute(g, [root], replacement)
+    constant = tuple(new[kept[c]] for c in d.constant)
+    return Structure(root, constant, interface, tuple(named.values()))
+
+
+def quadratic_values(d: Definition, s: Structure) -> Structure:
+    """The same through named quadratic values of the forms: invariants where some suffice."""
+    g = d.graph
+    reduced = through_invariants(g, [s.root], s.forms, s.constant)
+    if reduced is not None:
+        constant = tuple(reduced.images[c] for c in s.constant)
+        (root,), squares = reduced.roots, reduced.squares
+        return replace(s, root=root, constant=constant, squares=squares, invariants=True)
+    found = quadratic_interface([s.root], s.forms, s.constant)
+    named = {q: g.name(f"q{k}", q) for k, q in enumerate(found)}
+    (root,), new = substitute(g, [s.root], named)
+    constant = tuple(new[c] for c in s.constant)
+    return replace(s, root=root, constant=constant, squares=tuple(named.values()))
+
+
+def found_in(d: Definition) -> Structure | None:
+    """Both, one after the other."""
+    forms = linear_forms(d)
+    return None if forms is None else quadratic_values(d, forms)
+
+
+def _named(g: Graph, form: Node, named: dict[Node, Node]) -> Node:
+    """The name of a linear form; a form and its negative share one."""
+    negative = g.neg(form)
+    if negative in named:
+        return g.neg(named[negative])
+    return named.setdefault(form, g.name(f"z{len(named)}", form))
+
+
+_PARTIAL = frozenset({Op.RECIP, Op.POW, Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP})
+
+
+def _has_guarded_values(root: Node) -> bool:
+    """True where only a side of a branch holds a value that need not exist outside of it.
+
+    An interface would take such a value out of its branch.
+    """
+    always: set[Node] = set()
+    stack = [root]
+    while stack:
+        n = stack.pop()
+        if n not in always:
+            always.add(n)
+            stack += n.args[:1] if n.op is Op.BRANCH else n.args
+    return any(n.op in _PARTIAL and n not in always for n in reachable([root]))

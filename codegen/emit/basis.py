@@ -1,0 +1,77 @@
+"""Loops over the shape functions of an interpolated field: its values, and outputs along it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from softehl.codegen import abi
+from softehl.codegen.derive.outputs import Entry, Slot
+from softehl.codegen.emit.printer import Printer, dofs_expression
+from softehl.codegen.language.definition import Definition
+
+
+def gather(p: Printer, value: str, array: str) -> None:
+    """Values and xi-derivatives of the interpolated fields at the point."""
+    names = [f"{value}{k}" for k in range(p.d.components)]
+    p.line(3, f"double {', '.join(f'{name} = 0.0' for name in names)};")
+    p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
+    for name, shape in zip(names, _shapes(p.d, "i"), strict=True):
+        p.line(4, f"{name} += {shape} * {array}[{len(p.d.unknowns)} + i];")
+    p.line(3, "}")
+    p.line(3, f"{', '.join(f'(void){name}' for name in names)};")
+
+
+def _shapes(d: Definition, mode: str) -> list[str]:
+    """Where the components of a shape function stand in the basis of a point."""
+    offsets = ["", *(f" + {k}" for k in range(1, d.components))]
+    return [f"B[{d.components} * {mode}{offset}]" for offset in offsets]
+
+
+def _letters(d: Definition) -> list[str]:
+    """Names of the components of one shape function: N, D of the first field, N1, D1, ..."""
+    return [f"{letter}{k or ''}" for k in range(d.components // 2) for letter in "ND"]
+
+
+def scatter(p: Printer, task: str, entries: Sequence[Entry]) -> None:
+    direct = len(p.d.unknowns)
+    at = {(x.row, x.column): p.ref(x.node) for x in entries}
+    p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
+    letters = _letters(p.d)
+    values = zip(letters, _shapes(p.d, "i"), strict=True)
+    p.line(4, f"const double {', '.join(f'{name} = {shape}' for name, shape in values)};")
+    p.line(4, f"{', '.join(f'(void){name}' for name in letters)};")
+    for column, target in _scatter_targets(p.d, task):
+        left = _combination(letters, [at.get(k) for k in column])
+        if left:
+            p.line(4, f"{target} += {left};")
+    size = range(p.d.components)
+    blocks = [[at.get((Slot(True, r), Slot(True, c))) for r in size] for c in size]
+    if any(value is not None for pair in blocks for value in pair):
+        for c, pair in enumerate(blocks):
+            p.line(4, f"const double r{c} = {_combination(letters, pair) or '0.0'};")
+        p.line(4, "for (ptrdiff_t j = 0; j < modes; ++j)")
+        products = " + ".join(f"r{c} * {shape}" for c, shape in enumerate(_shapes(p.d, "j")))
+        p.line(
+            5,
+            f"K[({direct} + i) * {dofs_expression(p.d)} + {direct} + j] += {products};",
+        )
+    p.line(3, "}")
+
+
+Key = tuple[Slot, Slot | None]
+
+
+def _scatter_targets(d: Definition, task: str) -> list[tuple[list[Key], str]]:
+    """Pairs (components of an output, its place for basis function i)."""
+    direct, dofs = len(d.unknowns), dofs_expression(d)
+    both = [Slot(True, k) for k in range(d.components)]
+    out: list[tuple[list[Key], str]] = [([(s, None) for s in both], f"R[{direct} + i]")]
+    if task == abi.Task.TANGENT:
+        for k in range(direct):
+            out.append(([(s, Slot(False, k)) for s in both], f"K[({direct} + i) * {dofs} + {k}]"))
+            out.append(([(Slot(False, k), s) for s in both], f"K[{k} * {dofs} + {direct} + i]"))
+    return out
+
+
+def _combination(letters: Sequence[str], values: Sequence[str | None]) -> str:
+    return " + ".join(f"{b} * {v}" for b, v in zip(letters, values, strict=True) if v is not None)

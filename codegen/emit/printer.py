@@ -1,0 +1,128 @@
+"""Scheduled values as lines of C: one value, one line.  Nothing is optimised here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from softehl.codegen import abi
+from softehl.codegen.emit.schedule import If, Statement
+from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine
+from softehl.codegen.language.definition import Definition
+
+_FORMATS: dict[Op, str] = {
+    Op.ADD: "{} + {}",
+    Op.SUB: "{} - {}",
+    Op.MUL: "{} * {}",
+    Op.NEG: "-{}",
+    Op.RECIP: "1.0 / {}",
+    Op.SQRT: "sqrt({})",
+    Op.CBRT: "cbrt({})",
+    Op.RCBRT: "softehl_rcbrt({})",
+    Op.LOG: "log({})",
+    Op.EXP: "exp({})",
+    Op.SIN: "sin({})",
+    Op.COS: "cos({})",
+    Op.ATAN2: "atan2({}, {})",
+    **{op: f"{op}({{}})" for op in sorted(ELEMENTARY)},
+    Op.LT: "{} < {}",
+    Op.LE: "{} <= {}",
+    Op.EQ: "{} == {}",
+    Op.AND: "{} && {}",
+    Op.OR: "{} || {}",
+    Op.NOT: "!{}",
+}
+
+_ARRAYS = {
+    "coordinates": "X[{}]",
+    "dofs": "d[{}]",
+    "direction": "t[{}]",
+    "data": "a[{}]",
+    "parameters": "parameters[{}]",
+    "rule": "w[{}]",
+    "point data": "b[{}]",
+    "local": "s[{}]",
+    "external": "p[{}]",
+    "interpolated": "p{}",
+    "interpolated direction": "t{}",
+}
+
+
+def number(value: float) -> str:
+    """A double that C reads back exactly."""
+    text = repr(float(value))
+    return f"({text})" if text.startswith("-") else text
+
+
+class Printer:
+    """Lines of one function body."""
+
+    def __init__(self, definition: Definition) -> None:
+        self.d = definition
+        self.lines: list[str] = []
+        self.names: dict[Node, str] = {}
+        self.temporaries = 0
+
+    def line(self, depth: int, text: str) -> None:
+        self.lines.append("    " * depth + text)
+
+    def ref(self, n: Node) -> str:
+        if n.op is Op.CONST:
+            return number(float(n.value))
+        if isinstance(n.payload, Input):
+            return _ARRAYS[n.payload.array].format(n.payload.index)
+        return self.names[n]
+
+    def fresh(self, n: Node, letter: str = "v") -> str:
+        self.temporaries += 1
+        self.names[n] = f"{letter}{self.temporaries}"
+        return self.names[n]
+
+    def block(self, depth: int, statements: Iterable[Statement]) -> None:
+        for s in statements:
+            if isinstance(s, If):
+                self.branch(depth, s)
+            elif isinstance(s.payload, Routine):
+                self.call(depth, s, s.payload)
+            else:
+                right = self.expression(s)
+                kind = "int" if s.op in BOOLEAN else "double"
+                self.line(depth, f"const {kind} {self.fresh(s)} = {right};")
+
+    def call(self, depth: int, n: Node, routine: Routine) -> None:
+        """Run a routine on its operands; a failure is remembered."""
+        operands = ", ".join(self.ref(a) for a in n.args) or "0.0"
+        name = f"{abi.PREFIX}_{self.d.name}_{routine.name}"
+        self.line(depth, f"double {self.fresh(n)}[{routine.outputs}];")
+        self.line(depth, f"failed |= {name}((const double[]){{{operands}}}, {self.ref(n)});")
+
+    def expression(self, n: Node) -> str:
+        if isinstance(n.payload, Place):
+            return f"{self.ref(n.args[0])}[{n.payload.index}]"
+        if n.op is Op.POW:
+            return f"pow({self.ref(n.args[0])}, {number(float(n.payload))})"  # type: ignore[arg-type]
+        return _FORMATS[n.op].format(*(self.ref(a) for a in n.args))
+
+    def branch(self, depth: int, s: If) -> None:
+        names = [self.fresh(n) for n in s.merged]
+        self.line(depth, f"double {', '.join(names)};")
+        for head, k, inner in (
+            (f"if ({self.ref(s.condition)}) {{", 1, s.then),
+            ("} else {", 2, s.otherwise),
+        ):
+            self.line(depth, head)
+            self.block(depth + 1, inner)
+            for n, name in zip(s.merged, names, strict=True):
+                self.line(depth + 1, f"{name} = {self.ref(n.args[k])};")
+        self.line(depth, "}")
+
+
+def dofs_expression(d: Definition) -> str:
+    direct = len(d.unknowns)
+    return f"({direct} + modes)" if d.interpolated else str(direct)
+
+
+def data_expression(d: Definition) -> str:
+    """Data of one element, those of its points included."""
+    if not d.point_data:
+        return str(len(d.data))
+    return f"({len(d.data)} + {len(d.point_data)} * points)"
