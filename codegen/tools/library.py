@@ -18,7 +18,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from softehl.codegen import abi
-from softehl.codegen.tools import build, model_text, product
+from softehl.codegen.tools import build, model_text
 from softehl.codegen.tools import cache as store
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str,
     if files is not None:
         return files, {}
     from softehl.codegen import pipeline
+    from softehl.codegen.tools import product
 
     kernels, seconds = [], {}
     for d in definitions:
