@@ -28,10 +28,11 @@ from softehl.runtime.kernels import Kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate, meant
 from softehl.runtime.result import Result
-from softehl.runtime.solve.continuation import Continuation, StepRule
-from softehl.runtime.solve.linear import choose
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
+from softehl.runtime.solve.steps import StepRule
 
 Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"
 """A side or group by name, a predicate of places (n, dim), node numbers, or one place (a tuple)."""

@@ -23,7 +23,7 @@ from softehl.cases.harness.workers import solve_side_by_side
 from softehl.cases.seal import report
 from softehl.cases.seal.parameters import DENSITIES, ORing
 from softehl.runtime.kernels import MissingKernelsError, StaleKernelsError
-from softehl.runtime.solve.linear import Backend, MissingBackend, choose
+from softehl.runtime.solve.backends import Backend, MissingBackend, choose
 
 NOT_CONVERGED = 3
 """Exit code of a run that did not reach everything it was asked for."""

@@ -1,4 +1,4 @@
-"""Film stages by chord iterations: the section is factorised a few times for a whole curve.
+"""Film stages by modified Newton on a Schur complement: few factorisations for a whole curve.
 
 At a fixed sealed pressure the section moves by micrometres from state to state. It is the body of
 `modified_newton`; the film, the rod that fades out below it and the sealed pressure on the arc are
@@ -16,16 +16,15 @@ from softehl.cases.seal.section import OringSection, film_guard
 from softehl.cases.seal.stage import Stage
 from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.continuation import StepRule
 from softehl.runtime.solve.linear import Condenser
-from softehl.runtime.solve.modified_newton import Chord
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.schur import FrozenBody
+from softehl.runtime.solve.schur import SchurCorrector
+from softehl.runtime.solve.steps import StepRule
 
 LAYER = ("film", "rod", "sealed_arc", "facet", "upwind")
 """Blocks of the layer, as far as a section has them."""
 
-METHOD = "chord iterations on a frozen section"
+METHOD = "modified Newton on the Schur complement of the section"
 
 _NEAR = 0.3  # residual at which the section is in equilibrium well enough to be condensed
 _LOOSE = 1e-3  # of the states on the way from contact to film, which are no results
@@ -37,11 +36,11 @@ _SPEED_STEPS = StepRule(math.log(2.0), 0.004, math.log(2.0) + 1e-9, target_itera
 
 @dataclass(frozen=True, eq=False)
 class FastFilm:
-    """Turns the film stages of a section into ones that are solved by chord iterations."""
+    """Turns the film stages of a section into ones that are solved by modified Newton."""
 
     section: OringSection
     layer: Layer
-    corrector: FrozenBody
+    corrector: SchurCorrector
 
     @classmethod
     def of(cls, section: OringSection, linear: Condenser) -> FastFilm:
@@ -52,22 +51,22 @@ class FastFilm:
         present = [block.name for block in section.problem.assembler.blocks]
         names = [name for name in LAYER if name in present]
         layer = Layer.of(section.problem.assembler, names, shared, inner)
-        closing = Newton(max_iterations=1, linear=linear)
-        return cls(section, layer, FrozenBody(linear, Chord(), near=_NEAR, closing=closing))
+        finish = Newton(max_iterations=1, linear=linear)
+        return cls(section, layer, SchurCorrector(linear, near=_NEAR, finish=finish))
 
     def weight(self, stage: Stage) -> Stage:
         """The stage from contact to film, to a tolerance that is enough for a way."""
-        return self._stage(stage, self.corrector.loosely(_LOOSE), _WEIGHT_STEPS)
+        return self._stage(stage, self.corrector.with_tolerance(_LOOSE), _WEIGHT_STEPS)
 
     def shear(self, stage: Stage) -> Stage:
         """The stage in which the shear stress begins to act, to a smaller tolerance."""
-        return self._stage(stage, self.corrector.loosely(_FIRM), _SHEAR_STEPS)
+        return self._stage(stage, self.corrector.with_tolerance(_FIRM), _SHEAR_STEPS)
 
     def speed(self, stage: Stage) -> Stage:
         """The stage of falling speed, to the full tolerance."""
         return replace(self._stage(stage, self.corrector, _SPEED_STEPS), predictor="parabola")
 
-    def _stage(self, stage: Stage, corrector: FrozenBody, steps: StepRule) -> Stage:
+    def _stage(self, stage: Stage, corrector: SchurCorrector, steps: StepRule) -> Stage:
         guards = (film_guard(self.section),)
 
         def problem_at(parameter: float) -> Layered:

@@ -17,8 +17,9 @@ from softehl.cases.seal.section import OringSection, film_guard, flux_scales
 from softehl.cases.seal.stage import Stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.continuation import Point, StepRule
 from softehl.runtime.solve.newton import Corrector, NonlinearProblem
+from softehl.runtime.solve.solution import Point
+from softehl.runtime.solve.steps import StepRule
 
 Stroke = Literal["out", "in"]
 

@@ -16,7 +16,7 @@ from softehl.cases.seal.path import PathSettings, contact_problem, contact_stage
 from softehl.cases.seal.section import HOUSING, OringSection
 from softehl.cases.seal.stage import Stage
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.lagged_pressure import HeldPressure, element_pressures
+from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.prolongation import (
     prolong_chain,
@@ -86,7 +86,7 @@ def carried_contact(
     """
     carry, p = _carrier(old, new), new.parameters
     pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), "solid", x)
-    problem = HeldPressure.of(
+    problem = LaggedPressure.of(
         contact_problem(new, settings, p.sealed_pressure),
         "solid",
         load_kernel("follower_pressure"),

@@ -39,10 +39,10 @@ from softehl.cases.seal.stage import Stage, Walker
 from softehl.cases.seal.stopped import Stopped
 from softehl.cases.seal.verdict import Verdict, fewest_inlet_segments
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.continuation import Point
-from softehl.runtime.solve.linear import Condenser, choose
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import Status
+from softehl.runtime.solve.solution import Point, Status
 
 OnSpeed = Callable[[Film, Point], None]
 
@@ -145,7 +145,7 @@ class _Run:
         return Film(p.sealed_pressure, stroke, speed, multipliers, gap, shear=shear)
 
     def _fast_films(self, film: Film, x: Array, on_speed: OnSpeed) -> bool:
-        """Second and third stage by chord iterations; False where these do not apply."""
+        """Second and third stage by modified Newton; False where it does not apply."""
         section, settings, p = self.section, self.settings, self.section.parameters
         linear = self.walker.newton.linear
         fit = p.solver == "auto" and p.rotation == "fixed"

@@ -8,8 +8,11 @@ from dataclasses import dataclass, field, replace
 
 from softehl.cases.harness.observer import Observer, StageRecord
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.continuation import Branch, Continuation, Point, Predictor, StepRule
+from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
+from softehl.runtime.solve.predictor import Predictor
+from softehl.runtime.solve.solution import Branch, Point
+from softehl.runtime.solve.steps import StepRule
 
 
 def _nothing(point: Point) -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from softehl.cases.seal.stage import Stage
 from softehl.cases.seal.verdict import FilmNumbers
-from softehl.runtime.solve.continuation import Branch
-from softehl.runtime.solve.solution import Status
+from softehl.runtime.solve.solution import Branch, Status
 
 FOLD = (
     "the path ends or turns back there, as it does when the film collapses on a mesh that is too "

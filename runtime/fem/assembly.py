@@ -18,7 +18,7 @@ from softehl.runtime.fem.pattern import Pattern, build_pattern
 from softehl.runtime.kernels import Rule
 
 _PIECE = 1 << 18  # entries of the tangents that are evaluated before they are added up
-_CROSSES = 4  # sets of unknowns that are remembered
+_SETS = 4  # sets of prescribed unknowns that are remembered
 
 
 class ElementKernel(Protocol):
@@ -131,20 +131,37 @@ class ElementBlock:
         return {name: values[:, :, i] for i, name in enumerate(self.kernel.fields)}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
+class Memo:
+    """What assembly has computed before and may be asked for again: it saves time only.
+
+    tangents: block name -> the latest parameters of a constant tangent, the positions of its
+    entries and their values. crosses: prescribed unknowns -> see `Assembler.cross`.
+    """
+
+    tangents: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
+    crosses: dict[bytes, Integers] = field(default_factory=dict)
+
+    def keep_cross(self, key: bytes, places: Integers) -> None:
+        """Remember the positions of a set of unknowns; the oldest of too many is forgotten."""
+        while len(self.crosses) >= _SETS:
+            del self.crosses[next(iter(self.crosses))]
+        self.crosses[key] = places
+
+
+@dataclass(eq=False)
 class Assembler:
-    """Blocks of elements and the pattern they share; pure functions of x and parameters.
+    """Blocks of elements and the pattern they share.
 
     Parameters are given block by block, in the kernel's order; a block without parameters is
-    switched off, its place in the pattern stays. known: block name -> the latest parameters of a
-    constant tangent, where it has entries and which. crosses: see `cross`.
+    switched off, its place in the pattern stays. Results depend on the arguments alone; `memo` is
+    the one field that changes with calls.
     """
 
     size: int
     blocks: tuple[ElementBlock, ...]
     pattern: Pattern
-    known: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
-    crosses: dict[bytes, Integers] = field(default_factory=dict)
+    memo: Memo = field(default_factory=Memo)
 
     @classmethod
     def build(cls, size: int, blocks: Sequence[ElementBlock]) -> Assembler:
@@ -192,15 +209,13 @@ class Assembler:
     def cross(self, fixed: Integers) -> Integers:
         """Positions in the data of the rows and columns of these unknowns; kept for later calls."""
         key = fixed.tobytes()
-        places = self.crosses.get(key)
+        places = self.memo.crosses.get(key)
         if places is None:
             chosen = np.zeros(self.size, dtype=bool)
             chosen[fixed] = True
             columns = np.repeat(chosen, np.diff(self.pattern.indptr))
             places = np.flatnonzero(columns | chosen[self.pattern.indices])
-            while len(self.crosses) >= _CROSSES:
-                del self.crosses[next(iter(self.crosses))]
-            self.crosses[key] = places
+            self.memo.keep_cross(key, places)
         return places
 
     def _add_residual(self, total: Array, block: ElementBlock, x: Array, given: Array) -> None:
@@ -211,11 +226,11 @@ class Assembler:
         self, block: ElementBlock, scatter: Integers, parameters: Array
     ) -> tuple[Integers, Array]:
         """Places and values of the entries of a constant tangent."""
-        known = self.known.get(block.name)
+        known = self.memo.tangents.get(block.name)
         if known is None or not np.array_equal(known[0], parameters):
             data = np.zeros(self.pattern.nnz)
             np.add.at(data, scatter, block.tangent(np.zeros(self.size), parameters)[1].ravel())
             places = np.flatnonzero(data)
             known = parameters.copy(), places, data[places]
-            self.known[block.name] = known
+            self.memo.tangents[block.name] = known
         return known[1], known[2]

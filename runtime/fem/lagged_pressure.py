@@ -1,10 +1,11 @@
-"""Equations of a nearly incompressible solid whose tangent holds on to an element pressure.
+"""A tangent of a nearly incompressible solid that uses a lagged element pressure.
 
 A small error of the displacements, as interpolation makes it, gives a volume ratio times a large
-bulk modulus: pressures that are worthless, and with them the geometric part of the tangent. Here
-that part is taken at a pressure p_e of each element that is carried along, p_e <- p(u) + kappa dJ,
-as the linearisation of p_e = p(u) as an equation of its own would do it, with p_e eliminated. The
-residual is that of the problem itself; when it has converged, so has the tangent.
+bulk modulus: useless pressures, and with them a useless geometric part of the tangent. Here that
+part is taken at a pressure p_e of each element that follows from the step before,
+p_e <- p(u) + kappa dJ, as the linearisation of p_e = p(u) as an equation of its own would have it,
+with p_e eliminated. The residual is that of the problem itself; when it has converged, so has the
+tangent.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ def element_pressures(problem: Problem, solid: str, x: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class HeldPressure:
-    """A problem with element pressures; satisfies the solvers' EvolvingProblem.
+class LaggedPressure:
+    """A problem with lagged element pressures; satisfies the solvers' EvolvingProblem.
 
     solid: name of the block of 4-node elements. pressures: (Q,) p_e, tension positive. stiffness:
     bulk modulus. surface: a follower pressure on each edge of each element, whose virtual work at
@@ -49,7 +50,7 @@ class HeldPressure:
     @classmethod
     def of(
         cls, problem: Problem, solid: str, follower: ElementKernel, pressures: Array, kappa: float
-    ) -> HeldPressure:
+    ) -> LaggedPressure:
         """The problem with these pressures; `follower` is the kernel of a pressure on an edge."""
         block = problem.assembler.block(solid)
         number = problem.assembler.blocks.index(block)
@@ -84,7 +85,7 @@ class HeldPressure:
         addition = np.bincount(self.places.ravel(), weighted.ravel(), nnz)
         return self.problem.linearise_with(x, np.asarray(addition, dtype=np.float64))
 
-    def after(self, before: Array, x: Array) -> HeldPressure:
+    def after(self, before: Array, x: Array) -> LaggedPressure:
         """The problem with the pressures that a step from `before` to x asks for."""
         first = self.surface.residual(before, _UNIT)
         change = (first * (x - before)[self.surface.dofs]).sum(axis=1)

@@ -1,28 +1,20 @@
-"""Direct solution of the sparse linear systems of Newton's method.
+"""What the solvers ask of sparse linear algebra, and the check of every solution.
 
-`choose` names the backends: SuperLU comes with SciPy, PARDISO (`solve.pardiso`) is several times
-faster and optional. Both check every solution they hand out.
+The backends are `solve.superlu` and `solve.pardiso`; `solve.backends` chooses.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csc_matrix
-from scipy.sparse import linalg as sparse_linalg
 
-from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.arrays import Array, Integers
 
 SparseMatrix: TypeAlias = "csc_array[np.float64] | csc_matrix[np.float64]"
-Backend: TypeAlias = Literal["auto", "superlu", "pardiso"]
-Ordering: TypeAlias = Literal["NATURAL", "MMD_ATA", "MMD_AT_PLUS_A", "COLAMD"]
-
-
-_RIGHT_SIDES = 64  # at a time; all at once would need much memory
 
 
 class SingularMatrix(ArithmeticError):  # noqa: N818 (named after what it is)
@@ -84,10 +76,6 @@ class Condenser(LinearSolver, Protocol):
         ...
 
 
-class MissingBackend(ValueError):  # noqa: N818 (named after what it is)
-    """The linear solver that was asked for is not installed; the message says what to do."""
-
-
 @dataclass(frozen=True, eq=False)
 class Factorisation:
     """Factors of `matrix`, with iterative refinement and a check of each solution.
@@ -145,98 +133,3 @@ def checked_row_sums(K: SparseMatrix) -> Array:
         row = int(np.flatnonzero(sums == 0.0)[0])
         raise SingularMatrix(f"row {row} of the matrix is zero")
     return np.asarray(sums, dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class SuperLU:
-    """Sparse LU by SuperLU (Li and Demmel), set for a structurally symmetric matrix.
-
-    The tangents are unsymmetric in value but symmetric in pattern, so the minimum-degree ordering
-    of A' + A with mostly diagonal pivots makes several times less fill than COLAMD. The weak
-    pivoting (`pivot_threshold`) costs accuracy, which `refinement` steps give back; a solution
-    whose row-wise backward error still exceeds `accuracy` is refused.
-    """
-
-    ordering: Ordering = "MMD_AT_PLUS_A"
-    symmetric_mode: bool = True
-    pivot_threshold: float = 0.01
-    refinement: int = 1
-    accuracy: float = 1e-6
-    name: str = "superlu"
-
-    def factorise(self, K: SparseMatrix) -> Factorisation:
-        """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
-        row_sums = checked_row_sums(K)
-        return Factorisation(K, self.factors(K), row_sums, self.refinement, self.accuracy)
-
-    def factors(self, K: SparseMatrix) -> sparse_linalg.SuperLU:
-        """Factors of K, unchecked, with many right sides; raises SingularMatrix."""
-        try:
-            return sparse_linalg.splu(
-                K,
-                permc_spec=self.ordering,
-                diag_pivot_thresh=self.pivot_threshold,
-                options={"SymmetricMode": self.symmetric_mode},
-            )
-        except RuntimeError as error:  # SuperLU's word for an exactly singular matrix
-            raise SingularMatrix(f"no LU factors: {error}") from error
-
-    def condense(self, K: SparseMatrix, boundary: Integers) -> SchurBySolves:
-        """See `Condenser`; the Schur complement takes a solve for each boundary unknown."""
-        checked_row_sums(K)
-        inner: Flags = np.ones(K.shape[0], dtype=bool)
-        inner[boundary] = False
-        interior = np.flatnonzero(inner)
-        rows = csc_array(K[boundary, :])
-        columns = csc_array(K[interior, :][:, boundary])
-        factors = self.factors(csc_array(K[interior, :][:, interior]))
-        coupling = csc_array(rows[:, interior])
-        schur = rows[:, boundary].toarray()
-        for first in range(0, len(boundary), _RIGHT_SIDES):
-            part = slice(first, first + _RIGHT_SIDES)
-            schur[:, part] -= np.asarray(coupling @ factors.solve(columns[:, part].toarray()))
-        return SchurBySolves(boundary, schur, interior, factors, (coupling, columns))
-
-
-@dataclass(frozen=True, eq=False)
-class SchurBySolves:
-    """A condensation by SuperLU; satisfies `Condensed`.
-
-    interior: (n - m,) eliminated unknowns. couplings: K_BI and K_IB.
-    """
-
-    boundary: Integers
-    schur: Array
-    interior: NDArray[np.intp]
-    factors: sparse_linalg.SuperLU
-    couplings: tuple[SparseMatrix, SparseMatrix]
-
-    def reduce(self, r: Array) -> tuple[Array, Array]:
-        """See `Condensed`."""
-        y = np.zeros(len(r))
-        y[self.interior] = self.factors.solve(r[self.interior])
-        return np.asarray(r[self.boundary] - self.couplings[0] @ y[self.interior]), y
-
-    def extend(self, reduced: Array, x: Array) -> Array:
-        """See `Condensed`."""
-        full = reduced.copy()
-        full[self.interior] -= self.factors.solve(np.asarray(self.couplings[1] @ x))
-        full[self.boundary] = x
-        return full
-
-
-def choose(backend: Backend) -> Condenser:
-    """The solver of that name; "auto" is PARDISO where it is installed and SuperLU elsewhere.
-
-    Raises MissingBackend if "pardiso" is asked for and not installed.
-    """
-    from softehl.runtime.solve import pardiso  # late: it loads a large library
-
-    if backend == "superlu" or (backend == "auto" and not pardiso.available()):
-        return SuperLU()
-    if not pardiso.available():
-        raise MissingBackend(
-            'linear = "pardiso": it is not installed; allowed here: "auto" or "superlu", '
-            "or install the extra `fast` (pip install 'softehl[fast]')"
-        )
-    return pardiso.Pardiso()

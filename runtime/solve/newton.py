@@ -1,7 +1,7 @@
 """Newton's method for R(x) = 0, as a frozen record of settings over explicit state.
 
-The problem is pure: a residual never changes anything. Failure is a `Status` in the returned
-`Solution`, never an exception.
+A residual is a function of x: asking for one never changes the answer to the next. Failure is a
+`Status` in the returned `Solution`, never an exception.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from typing import Any, Protocol, Self, runtime_checkable
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix, SuperLU
+from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.solution import Solution, Status
+from softehl.runtime.solve.superlu import SuperLU
 
 _SUFFICIENT_DECREASE = 1e-4  # Armijo's constant on the norm, the customary value
 

@@ -207,23 +207,46 @@ class PartialFactors:
         return full
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
+class Idle:
+    """Analysed patterns that are free for the next matrix: changes with every matrix.
+
+    handles: the oldest first, at most `keep` of them.
+    """
+
+    keep: int = 2
+    handles: list[_Handle] = field(default_factory=list)
+
+    def take(self, K: SparseMatrix, boundary: Integers) -> _Handle | None:
+        """A handle that fits the pattern of K, no longer idle; None if there is none."""
+        for handle in self.handles:
+            if handle.structure.fits(K, boundary):
+                self.handles.remove(handle)
+                return handle
+        return None
+
+    def give_back(self, handle: _Handle) -> None:
+        """Make a handle idle."""
+        self.handles.append(handle)
+        del self.handles[: -self.keep]
+
+
+@dataclass
 class Pardiso:
     """MKL PARDISO with the symbolic analysis kept for the next matrix of the same pattern.
 
     perturbation: pivots below 10^-perturbation |K| are lifted to it, which multipliers with a zero
     diagonal need; `refinement` steps give the digits back. accuracy: as for SuperLU. settled:
     largest relative size of the last correction; a singular matrix is found out by it.
-    idle: analysed patterns that are free for the next matrix, at most `keep` of them.
+    All of these are settings; `idle` changes with every matrix.
     """
 
     perturbation: int = 8
     refinement: int = 2
     accuracy: float = 1e-6
     settled: float = 1e-3
-    keep: int = 2
     name: str = "pardiso"
-    idle: list[_Handle] = field(default_factory=list, compare=False, repr=False)
+    idle: Idle = field(default_factory=Idle, compare=False, repr=False)
 
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
@@ -231,7 +254,7 @@ class Pardiso:
         handle = self._handle(K, np.empty(0, dtype=np.int64))
         handle.factorise(K, np.empty(0))
         lent = _Lent(handle)
-        weakref.finalize(lent, _give_back, self.idle, handle, self.keep).atexit = False
+        weakref.finalize(lent, self.idle.give_back, handle).atexit = False
         return Factorisation(K, lent, row_sums, self.refinement, self.accuracy, self.settled)
 
     def condense(self, K: SparseMatrix, boundary: Integers) -> PartialFactors:
@@ -244,18 +267,10 @@ class Pardiso:
         schur = np.zeros((len(boundary), len(boundary)))
         handle.factorise(K, schur)
         partial = PartialFactors(handle, boundary, schur)
-        weakref.finalize(partial, _give_back, self.idle, handle, self.keep).atexit = False
+        weakref.finalize(partial, self.idle.give_back, handle).atexit = False
         return partial
 
     def _handle(self, K: SparseMatrix, boundary: Integers) -> _Handle:
         """A handle for this pattern that nobody uses; analysed already if there is one."""
-        for handle in self.idle:
-            if handle.structure.fits(K, boundary):
-                self.idle.remove(handle)
-                return handle
-        return _Handle(_Structure.of(K, boundary), self.perturbation)
-
-
-def _give_back(idle: list[_Handle], handle: _Handle, keep: int) -> None:
-    idle.append(handle)
-    del idle[:-keep]
+        handle = self.idle.take(K, boundary)
+        return handle or _Handle(_Structure.of(K, boundary), self.perturbation)

@@ -12,8 +12,8 @@ from softehl.cases.seal import fast as oring_fast
 from softehl.cases.seal.fast import METHOD
 from softehl.cases.seal.run import run
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import choose
-from softehl.runtime.solve.schur import FrozenBody
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
 from tests.cases.test_oring_path import Recorder
@@ -85,7 +85,7 @@ def test_the_discontinuous_film_is_condensed_too() -> None:
         assert a.pressure_jump_max_MPa == pytest.approx(b.pressure_jump_max_MPa, rel=1e-7)
 
 
-class Tired(FrozenBody):
+class Tired(SchurCorrector):
     """Gives up at films slower than 1000 mm/s, or at all."""
 
     slowest = 1000.0
@@ -108,7 +108,7 @@ class VeryTired(Tired):
 def test_where_it_gives_up_newton_goes_on(
     monkeypatch: pytest.MonkeyPatch, corrector: type[Tired], ended: str
 ) -> None:
-    monkeypatch.setattr(oring_fast, "FrozenBody", corrector)
+    monkeypatch.setattr(oring_fast, "SchurCorrector", corrector)
     parameters = oring(density=1, sealed_pressure=1.0, stroke="out", speeds=SPEEDS)
     outcome = run(parameters, Recorder())
     assert outcome.converged, outcome.message

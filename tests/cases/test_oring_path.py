@@ -23,8 +23,7 @@ from softehl.cases.seal.section import build_section
 from softehl.cases.seal.stopped import Stopped
 from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.fem.contact import tributary_areas
-from softehl.runtime.solve.continuation import Branch, Point
-from softehl.runtime.solve.solution import Solution, Status
+from softehl.runtime.solve.solution import Branch, Point, Solution, Status
 from tests.cases.oring_cases import oring
 
 ENDED = Branch(

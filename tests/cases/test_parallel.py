@@ -21,7 +21,8 @@ from softehl.cases.harness.sweep import Curve, Task, in_order, solve_cases
 from softehl.cases.harness.workers import solve_side_by_side
 from softehl.cases.seal.parameters import ORing
 from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
-from softehl.runtime.solve.linear import MissingBackend, SingularMatrix
+from softehl.runtime.solve.backends import MissingBackend
+from softehl.runtime.solve.linear import SingularMatrix
 from tests.cases.test_cli import outcome
 
 ERRORS = (

@@ -133,7 +133,7 @@ def test_rows_and_columns_of_some_unknowns(rng: np.random.Generator) -> None:
         assert np.array_equal(assembler.pattern.matrix(data).toarray(), expected)
     for number in range(SIZE):
         assembler.cross(np.array([number]))
-    assert len(assembler.crosses) <= 4
+    assert len(assembler.memo.crosses) <= 4
 
 
 def test_a_block_without_parameters_is_off_but_keeps_its_place(rng: np.random.Generator) -> None:

@@ -14,10 +14,13 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.continuation import Arclength, Continuation, Predictor, StepRule
+from softehl.runtime.solve.arclength import Arclength
+from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.linear import SparseMatrix
 from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.predictor import Predictor
 from softehl.runtime.solve.solution import Branch, NotConverged, Point, Status
+from softehl.runtime.solve.steps import StepRule
 
 
 def _full_step(x: Array, dx: Array) -> float:

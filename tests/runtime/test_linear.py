@@ -10,7 +10,8 @@ import pytest
 from scipy.sparse import csc_array, csc_matrix
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import SingularMatrix, SparseMatrix, SuperLU
+from softehl.runtime.solve.linear import SingularMatrix, SparseMatrix
+from softehl.runtime.solve.superlu import SuperLU
 
 
 def laplacian(n: int) -> Array:

@@ -12,17 +12,12 @@ from scipy.sparse import csc_array, random_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve import pardiso
-from softehl.runtime.solve.linear import (
-    Factorisation,
-    LinearSolver,
-    MissingBackend,
-    SingularMatrix,
-    SuperLU,
-    choose,
-)
+from softehl.runtime.solve.backends import MissingBackend, choose
+from softehl.runtime.solve.linear import Factorisation, LinearSolver, SingularMatrix
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.pardiso import Pardiso
+from softehl.runtime.solve.pardiso import Idle, Pardiso
 from softehl.runtime.solve.solution import Status
+from softehl.runtime.solve.superlu import SuperLU
 from tests.runtime.test_linear import grid, laplacian
 
 installed = pytest.mark.skipif(not pardiso.available(), reason="the extra `fast` is not installed")
@@ -127,7 +122,7 @@ def test_memory_of_forgotten_factors_is_freed() -> None:
     def megabytes() -> float:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
-    solver = Pardiso(keep=1)
+    solver = Pardiso(idle=Idle(keep=1))
     shapes = [25 + k % 3 for k in range(60)]  # patterns take turns: none is idle when it is needed
     grids = {n: grid(n) for n in set(shapes)}
     for n in shapes[:6]:
@@ -137,7 +132,7 @@ def test_memory_of_forgotten_factors_is_freed() -> None:
         solver.factorise(grids[n]).solve(np.ones(n * n))
     gc.collect()
     assert megabytes() < before + 10.0
-    assert len(solver.idle) == 1
+    assert len(solver.idle.handles) == 1
 
 
 @installed

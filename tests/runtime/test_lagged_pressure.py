@@ -1,4 +1,4 @@
-"""The tangent with a pressure that is held: consistency, the volume's derivatives, evolution."""
+"""The tangent with a lagged element pressure: consistency, the volume's derivatives, evolution."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from softehl.cases.seal.path import PathSettings, contact_problem
 from softehl.cases.seal.section import OringSection, build_section
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.lagged_pressure import HeldPressure, element_pressures
+from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
 from tests.cases.oring_cases import oring
@@ -34,8 +34,8 @@ def state(section: OringSection, rng: np.random.Generator) -> Array:
     return x
 
 
-def held(problem: Problem, pressures: Array) -> HeldPressure:
-    return HeldPressure.of(problem, "solid", load_kernel("follower_pressure"), pressures, KAPPA)
+def lagged(problem: Problem, pressures: Array) -> LaggedPressure:
+    return LaggedPressure.of(problem, "solid", load_kernel("follower_pressure"), pressures, KAPPA)
 
 
 def volumes(section: OringSection, x: Array) -> Array:
@@ -49,7 +49,7 @@ def volumes(section: OringSection, x: Array) -> Array:
 def test_with_the_true_pressures_the_tangent_is_the_problem_s(
     problem: Problem, state: Array
 ) -> None:
-    own = held(problem, element_pressures(problem, "solid", state))
+    own = lagged(problem, element_pressures(problem, "solid", state))
     r, K = own.linearise(state)
     r0, K0 = problem.linearise(state)
     assert np.array_equal(r, r0)
@@ -65,7 +65,7 @@ def test_an_excess_pressure_adds_the_second_derivative_of_the_volume(
     dx = np.zeros_like(state)
     part = section.layout.part("displacement")
     dx[part] = rng.normal(size=part.stop - part.start)
-    added = held(problem, pressures + excess).linearise(state)[1] @ dx
+    added = lagged(problem, pressures + excess).linearise(state)[1] @ dx
     added = added - problem.linearise(state)[1] @ dx
     h = 1e-3
     second = volumes(section, state + h * dx) - 2 * volumes(section, state)
@@ -76,7 +76,7 @@ def test_an_excess_pressure_adds_the_second_derivative_of_the_volume(
 def test_pressures_follow_the_linearised_volume(
     section: OringSection, problem: Problem, state: Array, rng: np.random.Generator
 ) -> None:
-    start = held(problem, np.zeros(len(section.mesh.quads)))
+    start = lagged(problem, np.zeros(len(section.mesh.quads)))
     assert start.volumes == pytest.approx(volumes(section, section.at_rest()), rel=1e-3)
     dx = np.zeros_like(state)
     part = section.layout.part("displacement")

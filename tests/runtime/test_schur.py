@@ -1,4 +1,4 @@
-"""Chord iterations on a small algebraic problem: an elastic chain with an exponential layer.
+"""Modified Newton on a Schur complement: an elastic chain with an exponential layer.
 
 The problem is built around a solution that is chosen, so that the answer is known exactly.
 """
@@ -15,13 +15,16 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve import pardiso
-from softehl.runtime.solve.continuation import Continuation, StepRule
-from softehl.runtime.solve.linear import Condenser, SingularMatrix, SuperLU
-from softehl.runtime.solve.modified_newton import Chord, solve_banded
+from softehl.runtime.solve.condensed import solve_banded
+from softehl.runtime.solve.continuation import Continuation
+from softehl.runtime.solve.linear import Condenser, SingularMatrix
+from softehl.runtime.solve.modified_newton import ModifiedNewton
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.pardiso import Pardiso
-from softehl.runtime.solve.schur import FrozenBody, Memory
+from softehl.runtime.solve.schur import SchurCorrector, StaleTangent
 from softehl.runtime.solve.solution import Status
+from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.solve.superlu import SuperLU
 
 N, M, K = 30, 4, 5
 SHARED, OWN = np.arange(10, 10 + M), np.arange(N - K, N)
@@ -43,7 +46,7 @@ def answer(load: float) -> Array:
 class Chain:
     """Body: a chain of springs with a cubic part; layer: exp of the shared and its own unknowns.
 
-    softening: size of the cubic part, by which the body differs from its frozen tangent.
+    softening: size of the cubic part, by which the body differs from its stale tangent.
     """
 
     load: float = 1.0
@@ -154,7 +157,7 @@ def test_a_singular_interior_is_refused(linear: Condenser) -> None:
 @pytest.mark.parametrize("linear", SOLVERS)
 def test_the_chosen_solution_is_found(linear: Condenser) -> None:
     problem = Chain()
-    solution = Chord().solve(problem, condensed(linear, problem, np.zeros(N)), np.zeros(N))
+    solution = ModifiedNewton().solve(problem, condensed(linear, problem, np.zeros(N)), np.zeros(N))
     assert solution.converged, solution.message
     assert solution.x == pytest.approx(answer(1.0), abs=1e-9)
     assert problem.norm(problem.residual(solution.x)) == solution.residual_norms[-1] <= 1e-9
@@ -163,7 +166,7 @@ def test_the_chosen_solution_is_found(linear: Condenser) -> None:
 
 def test_a_linear_body_needs_one_outer_iteration() -> None:
     problem = Chain(softening=0.0)
-    solution = Chord(inner_gain=0.0).solve(
+    solution = ModifiedNewton(inner_gain=0.0).solve(
         problem, condensed(SuperLU(), problem, np.zeros(N)), np.zeros(N)
     )
     assert solution.iterations == 1
@@ -174,7 +177,7 @@ def test_mixing_saves_iterations_and_age_costs_them() -> None:
     problem = Chain()
     far, near = (condensed(SuperLU(), problem, x) for x in (np.zeros(N), 0.9 * answer(1.0)))
     counts = {
-        (depth, name): Chord(depth=depth, max_outer=200, contraction=0.99)
+        (depth, name): ModifiedNewton(depth=depth, max_outer=200, contraction=0.99)
         .solve(problem, c, np.zeros(N))
         .iterations
         for depth in (0, 4)
@@ -188,7 +191,7 @@ def test_a_wrong_schur_complement_costs_iterations_only() -> None:
     problem = Chain()
     right = condensed(SuperLU(), problem, answer(1.0))
     wrong = replace(right, schur=1.2 * right.schur)
-    a, b = (Chord().solve(problem, c, np.zeros(N)) for c in (right, wrong))
+    a, b = (ModifiedNewton().solve(problem, c, np.zeros(N)) for c in (right, wrong))
     assert a.converged
     assert b.converged
     assert b.iterations > a.iterations
@@ -206,28 +209,30 @@ def test_a_layer_that_contradicts_the_residual_never_converges() -> None:
             r[BOTH[0]] += 0.01
             return r
 
-    solution = Chord().solve(Forged(), condensed(SuperLU(), Chain(), answer(1.0)), np.zeros(N))
+    solution = ModifiedNewton().solve(
+        Forged(), condensed(SuperLU(), Chain(), answer(1.0)), np.zeros(N)
+    )
     assert solution.x != pytest.approx(answer(1.0), abs=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("chord", "status"),
+    ("iteration", "status"),
     [
-        (Chord(max_outer=2), Status.MAX_ITERATIONS),
-        (Chord(contraction=1e-4, patience=1), Status.MAX_ITERATIONS),
-        (Chord(max_inner=1, stagnation=1.0), Status.DIVERGED),
+        (ModifiedNewton(max_outer=2), Status.MAX_ITERATIONS),
+        (ModifiedNewton(contraction=1e-4, window=1), Status.MAX_ITERATIONS),
+        (ModifiedNewton(max_inner=1, stagnation=1.0), Status.DIVERGED),
     ],
 )
-def test_failure_is_a_status(chord: Chord, status: Status) -> None:
+def test_failure_is_a_status(iteration: ModifiedNewton, status: Status) -> None:
     problem = Chain()
-    solution = chord.solve(problem, condensed(SuperLU(), problem, np.zeros(N)), np.zeros(N))
+    solution = iteration.solve(problem, condensed(SuperLU(), problem, np.zeros(N)), np.zeros(N))
     assert solution.status is status
 
 
 def test_a_start_that_is_not_finite_is_named() -> None:
     problem = Chain()
     c = condensed(SuperLU(), problem, np.zeros(N))
-    assert Chord().solve(problem, c, np.full(N, 1e200)).status is Status.NOT_FINITE
+    assert ModifiedNewton().solve(problem, c, np.full(N, 1e200)).status is Status.NOT_FINITE
 
 
 def test_banded_solve_against_a_dense_one(rng: np.random.Generator) -> None:
@@ -243,8 +248,8 @@ def test_banded_solve_against_a_dense_one(rng: np.random.Generator) -> None:
 
 def test_one_condensation_serves_a_path() -> None:
     points: list[float] = []
-    body = FrozenBody(SuperLU(), wear=0.9)
-    branch = Continuation(body, StepRule(0.2, 0.01, 0.2, target_iterations=20)).follow(
+    corrector = SchurCorrector(SuperLU(), stale=0.9)
+    branch = Continuation(corrector, StepRule(0.2, 0.01, 0.2, target_iterations=20)).follow(
         lambda load: Chain(load),
         0.2,
         1.0,
@@ -257,73 +262,75 @@ def test_one_condensation_serves_a_path() -> None:
     assert branch.last.x == pytest.approx(answer(1.0), abs=1e-9)
 
 
-def test_a_worn_condensation_is_renewed_where_the_last_solution_was() -> None:
-    body = FrozenBody(SuperLU(), wear=0.0)
-    first = body.solve(Chain(0.5), np.zeros(N))
-    second = body.solve(Chain(0.6), first.x)
+def test_an_outdated_condensation_is_renewed_where_the_last_solution_was() -> None:
+    corrector = SchurCorrector(SuperLU(), stale=0.0)
+    first = corrector.solve(Chain(0.5), np.zeros(N))
+    second = corrector.solve(Chain(0.6), first.x)
     assert (first.factorisations, second.factorisations) == (1, 1)
-    assert body.memory.place is first.x
+    assert corrector.tangent.state is first.x
 
 
 def test_a_slow_solve_is_tried_again_with_a_new_condensation() -> None:
-    body = FrozenBody(SuperLU(), Chord(max_outer=6, depth=0), wear=1.0)
-    near = body.solve(Chain(0.9), 0.9 * answer(1.0))
+    corrector = SchurCorrector(SuperLU(), ModifiedNewton(max_outer=6, depth=0), stale=1.0)
+    near = corrector.solve(Chain(0.9), 0.9 * answer(1.0))
     assert near.converged
-    body.memory.condensed = condensed(SuperLU(), Chain(), np.full(N, 3.0))  # a useless one
-    body.memory.place = np.full(N, 3.0)
-    again = body.solve(Chain(0.92), near.x)
+    corrector.tangent.condensed = condensed(SuperLU(), Chain(), np.full(N, 3.0))  # a useless one
+    corrector.tangent.state = np.full(N, 3.0)
+    again = corrector.solve(Chain(0.92), near.x)
     assert again.converged
     assert again.factorisations == 1
     assert again.iterations > 6
 
 
 def test_a_failure_with_a_new_condensation_is_handed_on() -> None:
-    body = FrozenBody(SuperLU(), Chord(max_outer=1))
-    solution = body.solve(Chain(), np.zeros(N))
+    corrector = SchurCorrector(SuperLU(), ModifiedNewton(max_outer=1))
+    solution = corrector.solve(Chain(), np.zeros(N))
     assert solution.status is Status.MAX_ITERATIONS
     assert solution.factorisations == 1
 
 
-def useless() -> Memory:
+def useless() -> StaleTangent:
     """A condensation made far from the solution, with which a solve takes long."""
     place = np.full(N, 3.0)
-    return Memory(condensed(SuperLU(), Chain(), place), place, 0.9 * answer(1.0))
+    return StaleTangent(condensed(SuperLU(), Chain(), place), place, 0.9 * answer(1.0))
 
 
 def test_a_slow_solve_that_is_near_goes_on_with_a_condensation_made_where_it_is() -> None:
-    chord, x0 = Chord(max_outer=6, depth=0), 0.9 * answer(1.0)
+    iteration, x0 = ModifiedNewton(max_outer=6, depth=0), 0.9 * answer(1.0)
     solved = {}
     for near in (0.0, 1e3):
-        body = FrozenBody(SuperLU(), chord, wear=1.0, near=near, memory=useless())
-        solved[near] = body.solve(Chain(0.92), x0)
+        corrector = SchurCorrector(SuperLU(), iteration, stale=1.0, near=near, tangent=useless())
+        solved[near] = corrector.solve(Chain(0.92), x0)
         assert solved[near].x == pytest.approx(answer(0.92), abs=1e-8)
-        assert body.memory.settled is solved[near].x
+        assert corrector.tangent.accepted is solved[near].x
     assert solved[1e3].residual_norms[0] < solved[0.0].residual_norms[0]  # it did not begin again
     assert solved[1e3].iterations < solved[0.0].iterations
     assert solved[1e3].factorisations == 1
 
 
 def test_a_condensation_made_on_the_way_to_nowhere_is_not_used_again() -> None:
-    body = FrozenBody(SuperLU(), Chord(max_outer=1), near=1e3, memory=useless())
-    failed = body.solve(Chain(), np.zeros(N))
+    corrector = SchurCorrector(SuperLU(), ModifiedNewton(max_outer=1), near=1e3, tangent=useless())
+    failed = corrector.solve(Chain(), np.zeros(N))
     assert failed.status is Status.MAX_ITERATIONS
     assert (failed.factorisations, failed.iterations) == (2, 3)
-    assert body.memory.worn
-    again = body.solve(Chain(0.1), np.zeros(N))
-    assert body.memory.place is not failed.x
+    assert corrector.tangent.outdated
+    again = corrector.solve(Chain(0.1), np.zeros(N))
+    assert corrector.tangent.state is not failed.x
     assert again.factorisations >= 1
 
 
-def test_a_held_up_residual_is_closed_by_newton() -> None:
+def test_a_residual_held_up_by_rounding_is_finished_by_newton() -> None:
     # a useless condensation makes it so slow that rounding seems to be reached
-    chord = Chord(tolerance=1e-10, stagnation=1e8, depth=0, contraction=0.999, max_outer=99)
-    memory = {"condensed": condensed(SuperLU(), Chain(), np.full(N, 6.0)), "settled": np.zeros(N)}
-    closing = Newton(tolerance=1e-12, max_iterations=6)
+    iteration = ModifiedNewton(
+        tolerance=1e-10, stagnation=1e8, depth=0, contraction=0.999, max_outer=99
+    )
+    tangent = {"condensed": condensed(SuperLU(), Chain(), np.full(N, 6.0)), "accepted": np.zeros(N)}
+    finish = Newton(tolerance=1e-12, max_iterations=6)
     held, closed = (
-        FrozenBody(SuperLU(), chord, closing=newton, memory=Memory(**memory)).solve(
+        SchurCorrector(SuperLU(), iteration, finish=newton, tangent=StaleTangent(**tangent)).solve(
             Chain(), np.zeros(N)
         )
-        for newton in (None, closing)
+        for newton in (None, finish)
     )
     assert held.converged
     assert closed.residual_norms[-1] <= 1e-12 < held.residual_norms[-1]
@@ -343,12 +350,14 @@ class Rough(Chain):
 
 @pytest.mark.parametrize(("error", "converged"), [(1e-8, True), (1e-4, False)])
 def test_newton_ends_what_rounding_holds_up(error: float, converged: bool) -> None:
-    problem, closing = Rough(), Newton(max_iterations=1)
+    problem, finish = Rough(), Newton(max_iterations=1)
     object.__setattr__(problem, "error", error)
-    chord = Chord(contraction=1e-3, patience=1)  # slow as soon as nothing is gained
+    iteration = ModifiedNewton(contraction=1e-3, window=1)  # slow as soon as nothing is gained
     without, solution = (
-        FrozenBody(SuperLU(), chord, near=1e3, closing=newton).solve(problem, 0.99 * answer(1.0))
-        for newton in (None, closing)
+        SchurCorrector(SuperLU(), iteration, near=1e3, finish=newton).solve(
+            problem, 0.99 * answer(1.0)
+        )
+        for newton in (None, finish)
     )
     assert not without.converged
     assert solution.converged is converged
@@ -358,13 +367,13 @@ def test_newton_ends_what_rounding_holds_up(error: float, converged: bool) -> No
         assert solution.residual_norms[-1] <= 1e-7
 
 
-def test_rounding_does_not_wear_a_condensation() -> None:
-    body = FrozenBody(SuperLU(), Chord(), closing=Newton(max_iterations=1))
-    first = body.solve(Rough(), np.zeros(N))
+def test_rounding_does_not_outdate_a_condensation() -> None:
+    corrector = SchurCorrector(SuperLU(), ModifiedNewton(), finish=Newton(max_iterations=1))
+    first = corrector.solve(Rough(), np.zeros(N))
     assert first.converged
-    again = body.solve(Rough(), first.x)
+    again = corrector.solve(Rough(), first.x)
     assert again.converged
-    assert not body.memory.worn
+    assert not corrector.tangent.outdated
 
 
 def test_a_singular_body_is_a_status() -> None:
@@ -374,13 +383,13 @@ def test_a_singular_body_is_a_status() -> None:
             A[3] = 0.0
             return csc_array(A)
 
-    assert FrozenBody(SuperLU()).solve(Loose(), np.zeros(N)).status is Status.SINGULAR
+    assert SchurCorrector(SuperLU()).solve(Loose(), np.zeros(N)).status is Status.SINGULAR
 
 
 def test_a_looser_view_shares_the_condensation() -> None:
-    body = FrozenBody(SuperLU())
-    loose = body.loosely(1e-2).solve(Chain(0.5), np.zeros(N))
-    tight = body.solve(Chain(0.5), loose.x)
+    corrector = SchurCorrector(SuperLU())
+    loose = corrector.with_tolerance(1e-2).solve(Chain(0.5), np.zeros(N))
+    tight = corrector.solve(Chain(0.5), loose.x)
     assert loose.residual_norms[-1] > 1e-6
     assert (loose.factorisations, tight.factorisations) == (1, 0)
     assert tight.x == pytest.approx(answer(0.5), abs=1e-9)

@@ -1,0 +1,30 @@
+"""The linear solver by name: SuperLU comes with SciPy, PARDISO is optional and much faster."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+from softehl.runtime.solve import pardiso
+from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.superlu import SuperLU
+
+Backend: TypeAlias = Literal["auto", "superlu", "pardiso"]
+
+
+class MissingBackend(ValueError):  # noqa: N818 (named after what it is)
+    """The linear solver that was asked for is not installed; the message says what to do."""
+
+
+def choose(backend: Backend) -> Condenser:
+    """The solver of that name; "auto" is PARDISO where it is installed and SuperLU elsewhere.
+
+    Raises MissingBackend if "pardiso" is asked for and not installed.
+    """
+    if backend == "superlu" or (backend == "auto" and not pardiso.available()):
+        return SuperLU()
+    if not pardiso.available():
+        raise MissingBackend(
+            'linear = "pardiso": it is not installed; allowed here: "auto" or "superlu", '
+            "or install the extra `fast` (pip install 'softehl[fast]')"
+        )
+    return pardiso.Pardiso()
