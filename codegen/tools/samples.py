@@ -20,24 +20,30 @@ from softehl.codegen.graph.evaluate import State, Walk
 from softehl.codegen.graph.graph import Node, Op, Routine
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import shapes
+from softehl.codegen.language.elements.cells import ELEMENTS
 
 ATTEMPTS = 40
 DIGITS = 30
 SPREAD = 0.05
 """Size of the random unknowns, and of the relative variation of what is given."""
 
-_TETRAHEDRON = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 CELLS: dict[tuple[int, int], tuple[tuple[float, ...], ...]] = {
     **{(1, k): ((0,) * k,) for k in (1, 2, 3)},
     **{(2, k): ((0,) * k, (1,) + (0,) * (k - 1)) for k in (1, 2, 3)},
     (3, 1): ((0,), (1,), (0.5,)),
-    (3, 2): ((0, 0), (1, 0), (0, 1)),
-    (4, 2): tuple(((a + 1) / 2, (b + 1) / 2) for a, b in shapes.QUAD_NODES),
-    (4, 3): _TETRAHEDRON,
-    (8, 3): tuple(((a + 1) / 2, (b + 1) / 2, (c + 1) / 2) for a, b, c in shapes.HEX_NODES),
 }
-"""Corners of the unit cells by number of nodes and of coordinate components."""
+"""Unit cells of elements without an integral, by number of nodes and of coordinates."""
+
+
+def unit_cell(d: Definition) -> tuple[tuple[float, ...], ...] | None:
+    """Places of the nodes of the element that a model is written for, between 0 and 1."""
+    width = len(d.coordinates)
+    for kind in ELEMENTS.values():
+        if (len(kind.nodes), kind.dimension) == (d.nodes, d.rule.dimension) and width:
+            low, size = min(min(p) for p in kind.nodes), max(map(max, kind.nodes))
+            places = [[float((c - low) / (size - low)) for c in place] for place in kind.nodes]
+            return tuple(tuple((p + [0.0] * width)[:width]) for p in places)
+    return CELLS.get((d.nodes, width))
 
 
 class NoStateError(ValueError):
@@ -96,9 +102,8 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
 
 
 def _coordinates(d: Definition, rng: random.Random, spread: float) -> list[float]:
-    width = len(d.coordinates)
     given = dict(d.example)
-    corners = CELLS.get((d.nodes, width))
+    corners = unit_cell(d)
     out = []
     for a in range(d.nodes):
         for c, name in enumerate(d.coordinates):
@@ -107,8 +112,8 @@ def _coordinates(d: Definition, rng: random.Random, spread: float) -> list[float
                 place = given[label]
             elif corners is None:
                 raise NoStateError(
-                    f"{d.name} cannot be checked: no cell of {d.nodes} nodes with {width} "
-                    f"coordinates is known; say where the nodes may be: m.example({label}=...)"
+                    f"{d.name} cannot be checked: no cell of {d.nodes} nodes in "
+                    f"{len(d.coordinates)} coordinates is known; say where the nodes may be: m.example({label}=...)"
                 )
             else:
                 place = 1 + corners[a][c]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from softehl.codegen.language import kinematics
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.elements import quadrature, shapes
+    from softehl.codegen.language.elements.cells import element
     from softehl.codegen.language.model import Model
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
     from softehl.runtime.fem.dofs import DofLayout
@@ -56,6 +57,7 @@ _PUBLIC = {
 _MODELLING = {
     "Definition": "softehl.codegen.language.definition",
     "Model": "softehl.codegen.language.model",
+    "element": "softehl.codegen.language.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
     "quadrature": "softehl.codegen.language.elements.quadrature:",
     "shapes": "softehl.codegen.language.elements.shapes:",
@@ -83,6 +85,7 @@ __all__ = [
     "Solution",
     "Status",
     "Study",
+    "element",
     "kinematics",
     "load_kernel",
     "main",

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
+from typing import Any
 
 import sympy as sp
+
+_DIGITS = 100
+"""Of the points that have no short exact form."""
 
 
 @dataclass(frozen=True)
@@ -23,16 +28,102 @@ def point_rule() -> QuadratureRule:
 
 
 def gauss(order: int, dimension: int) -> QuadratureRule:
-    """Gauss-Legendre product rule with `order` (1, 2 or 3) points in each direction on [-1, 1]."""
-    half = {
-        1: ((sp.Integer(0), sp.Integer(2)),),
-        2: ((-1 / sp.sqrt(3), sp.Integer(1)), (1 / sp.sqrt(3), sp.Integer(1))),
-        3: (
-            (-sp.sqrt(sp.Rational(3, 5)), sp.Rational(5, 9)),
-            (sp.Integer(0), sp.Rational(8, 9)),
-            (sp.sqrt(sp.Rational(3, 5)), sp.Rational(5, 9)),
-        ),
-    }[order]
-    grid = list(product(half, repeat=dimension))
+    """Gauss-Legendre product rule with `order` points in each direction on [-1, 1].
+
+    Any order of at least 1: points are exact up to 3, beyond that rational to 100 digits.
+    """
+    _require("gauss", "order", order)
+    if dimension not in (1, 2, 3):
+        raise ValueError(f"gauss({order}, {dimension}): the dimension is 1, 2 or 3")
+    grid = list(product(_line(order), repeat=dimension))
     points = tuple(tuple(x for x, _ in entry) for entry in grid)
     return QuadratureRule(dimension, points, tuple(sp.prod([w for _, w in e]) for e in grid))
+
+
+def triangle(degree: int) -> QuadratureRule:
+    """Rule on the unit triangle for polynomials of a degree, at least.
+
+    Symmetric of 1 and 3 points up to degree 2, beyond that Gauss and Jacobi with collapsed sides.
+    """
+    _require("triangle", "degree", degree)
+    third, sixth = sp.Rational(1, 3), sp.Rational(1, 6)
+    if degree == 1:
+        return QuadratureRule(2, ((third, third),), (sp.Rational(1, 2),))
+    if degree == 2:
+        far = sp.Rational(2, 3)
+        return QuadratureRule(2, ((sixth, sixth), (far, sixth), (sixth, far)), (sixth,) * 3)
+    return _collapsed(2, degree)
+
+
+def tetrahedron(degree: int) -> QuadratureRule:
+    """Rule on the unit tetrahedron for polynomials of a degree, at least.
+
+    Symmetric of 1 and 4 points up to degree 2, beyond that Gauss and Jacobi with collapsed sides.
+    """
+    _require("tetrahedron", "degree", degree)
+    if degree == 1:
+        return QuadratureRule(3, ((sp.Rational(1, 4),) * 3,), (sp.Rational(1, 6),))
+    if degree == 2:
+        near, far = (5 - sp.sqrt(5)) / 20, (5 + 3 * sp.sqrt(5)) / 20
+        points = ((near,) * 3, (far, near, near), (near, far, near), (near, near, far))
+        return QuadratureRule(3, points, (sp.Rational(1, 24),) * 4)
+    return _collapsed(3, degree)
+
+
+def wedge(degree: int) -> QuadratureRule:
+    """Rule on triangle x [-1, 1] for polynomials of a degree in each, at least."""
+    flat, line = triangle(degree), _line(degree // 2 + 1)
+    pairs = list(zip(flat.points, flat.weights, strict=True))
+    points = tuple((*p, x) for p, _ in pairs for x, _ in line)
+    return QuadratureRule(3, points, tuple(w * v for _, w in pairs for _, v in line))
+
+
+def _require(rule: str, what: str, value: object) -> None:
+    if type(value) is not int or value < 1:
+        raise ValueError(f"{rule}: {what} = {value!r}, must be a whole number of at least 1")
+
+
+def _line(order: int) -> tuple[tuple[Any, Any], ...]:
+    """Points and weights of Gauss and Legendre on [-1, 1]."""
+    if order == 1:
+        return ((sp.Integer(0), sp.Integer(2)),)
+    if order == 2:
+        return tuple((s / sp.sqrt(3), sp.Integer(1)) for s in (-1, 1))
+    if order == 3:
+        far, middle, side = sp.sqrt(sp.Rational(3, 5)), sp.Rational(8, 9), sp.Rational(5, 9)
+        return ((-far, side), (sp.Integer(0), middle), (far, side))
+    return _jacobi(order, 0)
+
+
+@cache
+def _jacobi(order: int, power: int) -> tuple[tuple[Any, Any], ...]:
+    """Points and weights for the weight (1 - x)^power on [-1, 1], as rational numbers."""
+    x = sp.Symbol("x")
+    polynomial = sp.Poly(sp.jacobi(order, power, 0, x), x)
+    slope = polynomial.diff(x)
+    pairs = []
+    for root in sorted(sp.nroots(polynomial, n=_DIGITS + 20, maxsteps=500)):
+        place = sp.Rational(str(root))
+        weight = 2 ** (power + 1) / ((1 - place**2) * slope.eval(place) ** 2)
+        pairs.append((place, _rounded(weight)))
+    return tuple((_rounded(place), weight) for place, weight in pairs)
+
+
+def _rounded(value: Any) -> Any:
+    return sp.Rational(round(value * 10**_DIGITS), 10**_DIGITS)
+
+
+def _collapsed(dimension: int, degree: int) -> QuadratureRule:
+    """A cube's rule of Gauss and Jacobi, collapsed to the unit simplex."""
+    order = degree // 2 + 1
+    factors = [
+        [((1 + x) / 2, w / 2 ** (power + 1)) for x, w in _jacobi(order, power)]
+        for power in range(dimension)
+    ]
+    points, weights = [], []
+    for entry in product(*factors):
+        place = [x for x, _ in entry]
+        shrunk = [x * sp.prod([1 - y for y in place[d + 1 :]]) for d, x in enumerate(place)]
+        points.append(tuple(shrunk))
+        weights.append(sp.prod([w for _, w in entry]))
+    return QuadratureRule(dimension, tuple(points), tuple(weights))

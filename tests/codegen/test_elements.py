@@ -1,0 +1,89 @@
+"""Elements of every kind: shape functions, rules, and agreement with the meshes of the runtime."""
+
+from __future__ import annotations
+
+from itertools import product
+from math import factorial
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.elements.cells import ELEMENTS, Element, element
+from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.runtime.mesh.cells import CELLS
+
+AT = (sp.Rational(1, 7), sp.Rational(2, 9), sp.Rational(-1, 5))
+
+
+@pytest.mark.parametrize("kind", ELEMENTS.values(), ids=ELEMENTS)
+def test_nodal_and_the_same_as_in_meshes(kind: Element) -> None:
+    values = [kind.shape(*place) for place in kind.nodes]
+    assert sp.Matrix(values) == sp.eye(len(kind.nodes))
+    cell, at = CELLS[kind.name], AT[: kind.dimension]
+    point = np.array([[float(x) for x in at]])
+    np.testing.assert_array_equal(cell.nodes, np.array(kind.nodes, dtype=float))
+    shape = np.array([float(N) for N in kind.shape(*at)])
+    slope = np.array([[float(s) for s in row] for row in kind.gradient(*at)])
+    np.testing.assert_allclose(cell.shape(point)[0], shape, atol=1e-14)
+    np.testing.assert_allclose(cell.gradient(point)[0], slope, atol=1e-14)
+
+
+def degree_of(rule: QuadratureRule, exact: dict[tuple[int, ...], sp.Rational]) -> float:
+    """Largest error over some monomials."""
+    worst = 0.0
+    for powers, value in exact.items():
+        terms = (
+            w * sp.prod([x**p for x, p in zip(place, powers, strict=True)])
+            for place, w in zip(rule.points, rule.weights, strict=True)
+        )
+        worst = max(worst, abs(float(sp.N(sum(terms) - value, 50))))
+    return worst
+
+
+def simplex(dimension: int, degree: int) -> dict[tuple[int, ...], sp.Rational]:
+    """Integrals of monomials over the unit simplex."""
+    found = {}
+    for p in product(range(degree + 1), repeat=dimension):
+        if sum(p) <= degree:
+            top = sp.prod([factorial(k) for k in p])
+            found[p] = sp.Rational(top, factorial(sum(p) + dimension))
+    return found
+
+
+def line(degree: int) -> dict[tuple[int, ...], sp.Rational]:
+    """Integrals of monomials over [-1, 1]."""
+    return {(k,): sp.Rational(2, k + 1) if k % 2 == 0 else sp.Integer(0) for k in range(degree + 1)}
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 5, 8])
+def test_simplex_rules(degree: int) -> None:
+    assert degree_of(quadrature.triangle(degree), simplex(2, degree)) < 1e-40
+    exact = simplex(3, degree)
+    chosen = {p: exact[p] for p in exact if degree < 8 or (sum(p) == degree and min(p) > 1)}
+    assert degree_of(quadrature.tetrahedron(degree), chosen) < 1e-40
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4, 5, 8])
+def test_gauss_rules_of_any_order(order: int) -> None:
+    rule = quadrature.gauss(order, 1)
+    assert degree_of(rule, line(2 * order - 1)) < 1e-40
+    assert degree_of(rule, line(2 * order)) > 1e-10, "no rule of so few points does more"
+
+
+def test_wedge_rule() -> None:
+    rule = quadrature.wedge(3)
+    exact = {(*p, *z): a * b for p, a in simplex(2, 3).items() for z, b in line(3).items()}
+    assert degree_of(rule, exact) < 1e-40
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(ValueError, match="no element 'quad5'; there are line2"):
+        element("quad5")
+    with pytest.raises(ValueError, match="order = 0, must be a whole number"):
+        quadrature.gauss(0, 2)
+    with pytest.raises(ValueError, match="the dimension is 1, 2 or 3"):
+        quadrature.gauss(2, 4)
+    with pytest.raises(ValueError, match=r"degree = 2\.5"):
+        quadrature.triangle(2.5)  # type: ignore[arg-type]
