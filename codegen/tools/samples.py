@@ -113,7 +113,8 @@ def _coordinates(d: Definition, rng: random.Random, spread: float) -> list[float
             elif corners is None:
                 raise NoStateError(
                     f"{d.name} cannot be checked: no cell of {d.nodes} nodes in "
-                    f"{len(d.coordinates)} coordinates is known; say where the nodes may be: m.example({label}=...)"
+                    f"{len(d.coordinates)} coordinates is known; say where the nodes may be: "
+                    f"m.example({label}=...)"
                 )
             else:
                 place = 1 + corners[a][c]

@@ -10,6 +10,7 @@ import pytest
 import sympy as sp
 
 from softehl import Definition, Mesh, Model, Study, element, kinematics
+from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.cells import CELLS
 
 SHAPES: dict[str, dict[str, Any]] = {
@@ -40,10 +41,10 @@ def unit_mesh(name: str, n: int) -> Mesh:
     return Mesh.box((1.0, 1.0, 1.0), cells=(n, n, n), **given)
 
 
-def bent(x: np.ndarray) -> np.ndarray:
+def bent(x: Array) -> Array:
     """Places of the nodes of a mesh whose inner nodes are moved, mildly and smoothly."""
     bump = np.prod(x * (1.0 - x), axis=1, keepdims=True) * 4.0 ** (x.shape[1] - 1)
-    return x + 0.08 * bump * np.sin(3.0 * x + np.arange(x.shape[1]))
+    return np.asarray(x + 0.08 * bump * np.sin(3.0 * x + np.arange(x.shape[1])))
 
 
 @cache
