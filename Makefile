@@ -12,13 +12,14 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 GENERATED := $(wildcard generated/*.c generated/*.h generated/manifest.json)
 BUILDER := $(wildcard codegen/tools/build.py codegen/abi.py)
 
-.PHONY: help oring test slow lint check format clean
+.PHONY: help oring test slow lint check format docs clean
 
 help:
 	@echo "make oring    solve the O-ring and write its film-thickness curve to $(OUT)"
 	@echo "make test     run the test suite"
 	@echo "make slow     the tests that take minutes"
 	@echo "make lint     ruff and mypy; make check: lint and test"
+	@echo "make docs     the pages of docs/ as a site, in build/docs"
 	@echo "make clean    remove the environment and everything built"
 
 oring: $(VENV)/.kernels
@@ -41,6 +42,9 @@ format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find codegen generated runtime cases tests -name __pycache__ -prune -exec rm -rf {} +
@@ -61,6 +65,10 @@ $(VENV)/.installed: pyproject.toml $(VENV)/.created
 
 $(VENV)/.dev: $(VENV)/.installed
 	$(PIP) install --editable '.[dev]'
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.installed
+	$(PIP) install --editable '.[docs]'
 	@touch $@
 
 $(VENV)/.kernels: $(GENERATED) $(BUILDER) $(VENV)/.installed

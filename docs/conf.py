@@ -1,0 +1,66 @@
+"""The pages of this folder as a site: `make docs` writes it to build/docs.
+
+Nothing comes from the network, neither while it is built nor when it is read.
+"""
+
+import re
+from itertools import groupby
+from typing import Any
+
+import softehl
+
+project = "softehl"
+author = "softehl developers"
+copyright = "softehl developers, BSD-3-Clause"
+version = release = softehl.__version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
+exclude_patterns = ["_build", "models"]
+default_role = "literal"
+nitpicky = True
+nitpick_ignore_regex = [("py:.*", ".*")]
+"""Types of other packages have no page here; links in the text are checked by MyST."""
+
+myst_heading_anchors = 3
+myst_links_external_new_tab = True
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autodoc_class_signature = "mixed"
+autodoc_preserve_defaults = True
+autodoc_type_aliases = {name: name for name in ("Array", "Integers", "Where", "Amount")}
+smartquotes = False
+
+html_theme = "furo"
+html_title = f"softehl {release}"
+html_static_path: list[str] = []
+html_copy_source = False
+html_theme_options = {"navigation_with_keys": True, "top_of_page_buttons": []}
+
+_MARKUP = re.compile(r"(``?[^`]*``?|:\w+:`[^`]*`)|([|*_\\])")
+
+
+def _plain(paragraph: list[str]) -> list[str]:
+    """The lines of a paragraph as reStructuredText: code, a list of `name: meaning`, or prose."""
+    if paragraph[0].startswith(" "):  # nothing but indented lines: a formula, code
+        return ["::", "", *("    " + line for line in paragraph)]
+    escaped = [_MARKUP.sub(lambda m: m[1] or "\\" + m[2], line) for line in paragraph]
+    if any(line.startswith(" ") for line in escaped) and not escaped[0].startswith("- "):
+        return [f"  {line.strip()}" if line.startswith(" ") else f"* {line}" for line in escaped]
+    return escaped
+
+
+def _as_plain_text(
+    app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]
+) -> None:
+    """Our docstrings are plain text with `code`: |U| and h* in them are no markup."""
+    result: list[str] = []
+    for blank, paragraph in groupby(lines, key=lambda line: not line.strip()):
+        result += [""] if blank else _plain(list(paragraph))
+    lines[:] = result
+
+
+def setup(app: Any) -> None:
+    """Sphinx calls this."""
+    app.connect("autodoc-process-docstring", _as_plain_text)

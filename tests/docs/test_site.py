@@ -1,0 +1,93 @@
+"""The pages as a whole: links that lead somewhere, public names that are described, the site."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+import softehl
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("benchmarks/*.md")])
+
+_FENCED = re.compile(r"^```.*?^```$|^ {4}.*?$|`[^`\n]*`", re.MULTILINE | re.DOTALL)
+_LINK = re.compile(r"\]\(([^)\s]+)\)|<img[^>]* src=\"([^\"]+)\"|<a[^>]* href=\"([^\"]+)\"")
+_HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
+
+
+def links(page: Path) -> Iterator[str]:
+    """Targets of the links and pictures of a page, without those in code."""
+    for found in _LINK.finditer(_FENCED.sub("", page.read_text(encoding="utf-8"))):
+        yield next(target for target in found.groups() if target)
+
+
+def anchors(page: Path) -> set[str]:
+    """What a link to a heading of the page may be called."""
+    words = [re.sub(r"[^\w\- ]", "", h.lower()) for h in _HEADING.findall(page.read_text())]
+    return {word.strip().replace(" ", "-") for word in words}
+
+
+def is_named(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=is_named)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in links(page):
+        path, _, anchor = target.partition("#")
+        if "://" in target or target.startswith("mailto:"):
+            continue
+        place = (page.parent / path).resolve() if path else page
+        assert place.exists(), f"{target} does not exist"
+        assert place.is_relative_to(ROOT), f"{target} leads out of the repository"
+        if anchor and place.suffix == ".md":
+            assert anchor in anchors(place), f"{target}: no such heading"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=is_named)
+def test_addresses_are_well_formed(page: Path) -> None:
+    """Whether they answer cannot be seen from here."""
+    for target in links(page):
+        if "://" in target:
+            address = urlsplit(target)
+            assert address.scheme == "https", target
+            assert re.fullmatch(r"[a-z0-9-]+(\.[a-z0-9-]+)+", address.netloc), target
+
+
+def test_links_are_found() -> None:
+    """The two tests above see something."""
+    found = {is_named(page): list(links(page)) for page in PAGES}
+    assert "docs/tutorial.md" in found["README.md"]
+    assert "https://distributed.dask.org" in found["docs/many-curves.md"]
+
+
+def test_every_page_is_on_the_front_page() -> None:
+    front = (ROOT / "docs" / "index.md").read_text()
+    trees = "\n".join(re.findall(r"```\{toctree\}(.*?)```", front, re.DOTALL))
+    listed = set(re.findall(r"^([\w-]+)$", trees, re.MULTILINE))
+    assert listed == {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"}
+
+
+def test_every_public_name_is_described() -> None:
+    page = (ROOT / "docs" / "api.md").read_text()
+    described = set(re.findall(r"^\.\. auto\w+:: softehl\.(?:[\w.]+\.)?(\w+)$", page, re.MULTILINE))
+    assert described == set(softehl.__all__), "docs/api.md lists what softehl.__all__ does not"
+
+
+@pytest.mark.slow
+def test_the_site_needs_nothing_from_elsewhere(tmp_path: Path) -> None:
+    pytest.importorskip("sphinx", reason="the extra `docs` is not installed")
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", "docs", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True, timeout=300)
+    for page in tmp_path.glob("*.html"):
+        loaded = re.findall(r"<(?:script|img|link)[^>]*(?:src|href)=\"([^\"]+)\"", page.read_text())
+        assert loaded
+        assert [name for name in loaded if "//" in name] == []
+    found = set(
+        re.findall(r'id="(?:module-)?softehl\.([\w.]+)"', (tmp_path / "api.html").read_text())
+    )
+    assert set(softehl.__all__) <= {name.rpartition(".")[2] for name in found}
