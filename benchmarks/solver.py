@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.solver_summary import difference, summary
-from softehl.cases.harness.observer import COLLAPSED, Silent
 from softehl.cases.paper.states import PAPER
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.run import run
+from softehl.cases.seal.state import COLLAPSED, Silent
 from softehl.runtime.io import write_json
 
 

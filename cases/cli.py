@@ -1,11 +1,22 @@
-"""`softehl run` and `softehl reproduce`.  What is heavy is imported when a command needs it."""
+"""`softehl run`, `keys` and `reproduce`.  What is heavy is imported when a command needs it."""
 
 from pathlib import Path
 
 import click
 
+from softehl.cases.shipped import SHIPPED
 
-@click.command()
+_NAMES = ", ".join(SHIPPED)
+
+
+@click.command(
+    help=f"""Run CASE, a TOML file or the name of a case that ships ({_NAMES}).
+
+    Writes curve.csv, the files of its rows, plots and run.json to DIR, each state as soon as it is
+    there. `softehl keys CASE` lists what can be set. Exit code: 0 done, 2 bad input, 3 not
+    converged (what was reached is saved).
+    """
+)
 @click.argument("case", metavar="CASE")
 @click.option(
     "--set",
@@ -26,13 +37,13 @@ import click
     metavar="PERCENT",
     help="Largest estimated error of h*, as in 1%: speeds that miss it run on finer meshes.",
 )
-@click.option("--resume", is_flag=True, help="Keep the speeds that DIR has and run the others.")
+@click.option("--resume", is_flag=True, help="Keep the rows that DIR has and run the others.")
 @click.option(
     "--jobs",
     metavar="N",
     type=click.IntRange(min=1),
     default=1,
-    help="With N > 1 the two strokes run side by side, in a process each.",
+    help="Up to N parts of the run (such as the two strokes) side by side, in a process each.",
 )
 @click.option("--quiet", is_flag=True, help="No progress and no table.")
 def run(
@@ -44,19 +55,31 @@ def run(
     jobs: int,
     quiet: bool,
 ) -> int:
-    """Run CASE, a TOML file or the name of a case that ships (oring).
-
-    Writes curve.csv, profiles, sections (.vtu), plots and run.json to DIR, each state as soon as it
-    is there. Exit code: 0 done, 2 bad input, 3 not converged (what was reached is saved).
-    """
+    """Run a case."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.session import run_case
 
     if tolerance is not None:
         assignments = (*assignments, f"tolerance={tolerance.strip().removesuffix('%')}")
-    read = read_case(case, assignments)
-    target = Path("results", read.name) if folder is None else folder
+    read = read_case(case, SHIPPED, assignments)
+    target = Path("results", read.case.name) if folder is None else folder
     return run_case(read, target, resume=resume, jobs=jobs, quiet=quiet)
+
+
+@click.command(
+    help=f"""Every key of CASE, a TOML file or one of {_NAMES}: default, unit, bounds, meaning.
+
+    A key is set by `softehl run CASE --set KEY=VALUE` or in a TOML file.
+    """
+)
+@click.argument("case", metavar="CASE")
+def keys(case: str) -> int:
+    """Print the keys of a case."""
+    from softehl.cases.harness.case_file import find_case
+    from softehl.cases.harness.table import print_keys
+
+    print_keys(find_case(case, SHIPPED)[0].parameters)
+    return 0
 
 
 @click.command()

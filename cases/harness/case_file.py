@@ -6,74 +6,48 @@ was given and what is allowed.
 """
 
 import difflib
-import importlib
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import click
 from pydantic import ValidationError
 
-from softehl.cases.harness.observer import Observer, Outcome
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.harness.case import AnyCase, Run, load_case
+from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.parameters import Parameters
 
-Solve = Callable[[ORing, Observer], Outcome]
-
-SHIPPED: Mapping[str, tuple[type[ORing], str]] = {"oring": (ORing, "softehl.cases.seal.run")}
-"""Case name -> its parameter class and the module that holds its `run`."""
+Shipped = Mapping[str, str]
+"""Name of a case that ships -> its module, which is imported when the case is needed."""
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _SHOWN = 60
 
 
-class BadInput(click.ClickException):
-    """What the user gave cannot be used; the message is one line.  Exit code 2."""
-
-    exit_code = 2
-
-    def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.split()))
-
-
-@dataclass(frozen=True)
-class Case:
-    """A named case with its checked parameters.
-
-    contacts: folder in which runs leave their contact states for each other, None for none.
-    """
-
-    name: str
-    parameters: ORing
-    contacts: Path | None = None
-
-    def load_solve(self) -> Solve:
-        """Import the module of the case (late: it is heavy) and return its `run`."""
-        run = importlib.import_module(SHIPPED[self.name][1]).run
-        solve: Solve = partial(run, contacts=self.contacts) if self.contacts else run
-        return solve
-
-
-def read_case(given: str, assignments: Iterable[str] = ()) -> Case:
+def read_case(given: str, shipped: Shipped, assignments: Iterable[str] = ()) -> Run:
     """Read the case `given` (a shipped name or a TOML file) and apply KEY=VALUE `assignments`.
 
     Raises BadInput.
     """
-    name, from_file = (given, {}) if given in SHIPPED else _read_file(given)
+    case, from_file = find_case(given, shipped)
     from_line = dict(read_assignment(text) for text in assignments)
     origins = dict.fromkeys(from_file, given) | dict.fromkeys(from_line, "--set")
-    return Case(name, _validate(SHIPPED[name][0], from_file | from_line, origins))
+    return Run(case, _validate(case.parameters, from_file | from_line, origins))
+
+
+def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:
+    """The case `given` (a shipped name or a TOML file), and what the file sets.  BadInput."""
+    name, table = (given, {}) if given in shipped else _read_file(given, shipped)
+    return load_case(shipped[name]), table
 
 
 def read_assignment(text: str) -> tuple[str, object]:
     """Split KEY=VALUE and read VALUE as a TOML value; a bare word is a string.  BadInput."""
     key, equals, value = (part.strip() for part in text.partition("="))
     if not key or not equals:
-        raise BadInput(f"--set {_shorten(text)}: allowed is KEY=VALUE, as in density=4")
+        raise BadInput(f"--set {_shorten(text)}: allowed is KEY=VALUE, as in length=4")
     try:
         table = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
@@ -88,28 +62,30 @@ def read_assignment(text: str) -> tuple[str, object]:
     )
 
 
-def _read_file(given: str) -> tuple[str, dict[str, Any]]:
+def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     """The case name and the remaining keys of a TOML file."""
     try:
         table = tomllib.loads(Path(given).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise BadInput(
-            f"no case or file {given!r}{_meant(given, SHIPPED)}; "
-            f"allowed: a TOML file or one of {', '.join(SHIPPED)}"
+            f"no case or file {given!r}{_meant(given, shipped)}; "
+            f"allowed: a TOML file or one of {', '.join(shipped)}"
         ) from None
     except OSError as error:
         raise BadInput(f"cannot read the case file {given!r}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
         raise BadInput(f"{given}: not a TOML file: {_shorten(str(error), 200)}") from None
     name = table.pop("case", None)
-    if not isinstance(name, str) or name not in SHIPPED:
+    if not isinstance(name, str) or name not in shipped:
         shown = "no case" if name is None else f"case = {_shown(name)}"
-        allowed = " or ".join(f'case = "{known}"' for known in SHIPPED)
-        raise BadInput(f"{given}: {shown}{_meant(str(name), SHIPPED)}; allowed: {allowed}")
+        allowed = " or ".join(f'case = "{known}"' for known in shipped)
+        raise BadInput(f"{given}: {shown}{_meant(str(name), shipped)}; allowed: {allowed}")
     return name, table
 
 
-def _validate(kind: type[ORing], values: Mapping[str, Any], origins: Mapping[str, str]) -> ORing:
+def _validate(
+    kind: type[Parameters], values: Mapping[str, Any], origins: Mapping[str, str]
+) -> Parameters:
     known = list(kind.model_fields)
     for key in values:
         if key not in kind.model_fields:
@@ -124,7 +100,10 @@ def _validate(kind: type[ORing], values: Mapping[str, Any], origins: Mapping[str
 
 
 def _one_line(
-    kind: type[ORing], values: Mapping[str, Any], origins: Mapping[str, str], error: ValidationError
+    kind: type[Parameters],
+    values: Mapping[str, Any],
+    origins: Mapping[str, str],
+    error: ValidationError,
 ) -> str:
     """The first complaint of pydantic in the user's words, and how many more there are."""
     complaints = error.errors(include_url=False, include_context=False)

@@ -7,11 +7,11 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from softehl.cases.harness.curve import CurveRow
+from softehl.cases.harness.row import Row
 
 
 class Display:
-    """Shows the stages of one or more lanes (runs side by side); this one shows nothing."""
+    """Shows the stages of one or more workers (runs side by side); this one shows nothing."""
 
     def __enter__(self) -> Self:
         """Start showing."""
@@ -25,30 +25,30 @@ class Display:
     ) -> None:
         """Stop showing."""
 
-    def stage(self, lane: str, title: str) -> None:
-        """A stage begins on a lane."""
+    def stage(self, worker: str, title: str) -> None:
+        """A stage begins in a worker."""
 
-    def step(self, lane: str, text: str, fraction: float | None) -> None:
+    def step(self, worker: str, text: str, fraction: float | None) -> None:
         """A step converged; fraction: share of the stage done in [0, 1], if known."""
 
-    def state(self, row: CurveRow) -> None:
-        """A film state was saved."""
+    def state(self, row: Row) -> None:
+        """A row was saved."""
 
 
 class Lines(Display):
-    """One line a stage and one a state, on stderr."""
+    """One line a stage and one a row, on stderr."""
 
-    def stage(self, lane: str, title: str) -> None:
+    def stage(self, worker: str, title: str) -> None:
         """See :class:`Display`."""
         click.echo(title, err=True)
 
-    def state(self, row: CurveRow) -> None:
+    def state(self, row: Row) -> None:
         """See :class:`Display`."""
-        click.echo(state_text(row), err=True)
+        click.echo(f"  {row.line}", err=True)
 
 
 class Bars(Display):
-    """A bar for each lane with stage, p_s, U and step, on stderr."""
+    """A bar for each worker with stage and step, on stderr."""
 
     def __init__(self, console: Console) -> None:
         self._progress = Progress(
@@ -75,29 +75,29 @@ class Bars(Display):
         """See :class:`Display`."""
         self._progress.stop()
 
-    def stage(self, lane: str, title: str) -> None:
+    def stage(self, worker: str, title: str) -> None:
         """See :class:`Display`."""
-        if lane in self._tasks:
-            self._progress.remove_task(self._tasks[lane])
-        self._tasks[lane] = self._progress.add_task(title, total=None, count=0, text="")
-        self._counts[lane] = 0
+        if worker in self._tasks:
+            self._progress.remove_task(self._tasks[worker])
+        self._tasks[worker] = self._progress.add_task(title, total=None, count=0, text="")
+        self._counts[worker] = 0
 
-    def step(self, lane: str, text: str, fraction: float | None) -> None:
+    def step(self, worker: str, text: str, fraction: float | None) -> None:
         """See :class:`Display`."""
-        if lane not in self._tasks:
+        if worker not in self._tasks:
             return
-        self._counts[lane] += 1
+        self._counts[worker] += 1
         self._progress.update(
-            self._tasks[lane],
+            self._tasks[worker],
             total=None if fraction is None else 1.0,
             completed=fraction or 0.0,
-            count=self._counts[lane],
+            count=self._counts[worker],
             text=text,
         )
 
-    def state(self, row: CurveRow) -> None:
+    def state(self, row: Row) -> None:
         """See :class:`Display`."""
-        self._progress.console.print(state_text(row), highlight=False, markup=False)
+        self._progress.console.print(f"  {row.line}", highlight=False, markup=False)
 
 
 def make_display(*, quiet: bool) -> Display:
@@ -106,10 +106,3 @@ def make_display(*, quiet: bool) -> Display:
         return Display()
     console = Console(stderr=True)
     return Bars(console) if console.is_terminal else Lines()
-
-
-def state_text(row: CurveRow) -> str:
-    """One line on a saved state."""
-    place = f"p_s = {row.sealed_pressure_MPa:g} MPa, U = {row.rod_speed_mm_s:+g} mm/s"
-    value = f"h* = {row.h_star_um:.4g} um" if row.usable else f"{row.verdict}: not a result"
-    return f"  {place}: {value}"

@@ -21,7 +21,7 @@ from softehl.cases.paper.item import (
     state_table,
 )
 from softehl.cases.paper.states import CURED, PAPER, Request, State, Store, ask, setup
-from softehl.cases.seal.leakage import LEAKAGE_COLUMNS, net_leakage
+from softehl.cases.seal.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.runtime.io import Cell
 
@@ -135,7 +135,7 @@ def leakage(store: Store, scope: Scope) -> Product:
     for p in setups:
         kept = [s.row for s in store.states(p, speeds) if s.usable and s.row is not None]
         rows += net_leakage(kept)
-    cells = [[getattr(row, name) for name in LEAKAGE_COLUMNS] for row in rows]
+    cells = [row.cells() for row in rows]
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
@@ -154,7 +154,7 @@ def leakage(store: Store, scope: Scope) -> Product:
 
     words = " What leaves in a cycle per unit of stroke and area; positive: the seal leaks."
     caption = density_words(scope.mesh(16), 16) + words + " Hollow: no plain result."
-    return Product({"leakage": Table(LEAKAGE_COLUMNS, cells)}, caption, draw, (4.6, 3.2))
+    return Product({"leakage": Table(LeakageRow.header(), cells)}, caption, draw, (4.6, 3.2))
 
 
 # --- the shear traction -------------------------------------------------------------------------
@@ -211,9 +211,10 @@ def _movement(a: State, b: State) -> tuple[float, float]:
 
 
 def _section(state: State) -> str:
-    assert state.path is not None
-    name = state.path.name.replace("profile_", "section_").replace(".csv", ".vtu")
-    return str(state.path.with_name(name))
+    assert state.row is not None
+    assert state.place is not None
+    _, section = state.row.file_names()
+    return str(state.place / section)
 
 
 ITEMS = (

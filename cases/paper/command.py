@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from softehl.cases.harness.case_file import BadInput
+from softehl.cases.harness.errors import BadInput
 from softehl.cases.paper.catalogue import ITEMS
 from softehl.cases.paper.compute import compute
 from softehl.cases.paper.drawing import write_picture

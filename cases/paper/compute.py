@@ -8,12 +8,13 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from softehl.cases.harness.case_file import Case
+from softehl.cases.harness.case import Run
 from softehl.cases.harness.processes import processes
-from softehl.cases.harness.record import strokes_of
-from softehl.cases.harness.sweep import CONTACTS, Curve, Task, solved
+from softehl.cases.harness.sweep import Curve, Task, shared_folder, solved
+from softehl.cases.oring import CASE
 from softehl.cases.paper.states import ENDED, Request, Store
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.plan import rod_speeds, strokes_of
 from softehl.runtime.io import read_json
 
 
@@ -25,7 +26,7 @@ def compute(requests: Sequence[Request], store: Store, *, resume: bool, jobs: in
     """
     waiting = [r for r in requests if not (resume and is_complete(r, store))]
     tasks = [
-        Task(_case(request, store, resume), store.run_folder(request.setup), resume)
+        Task(_run(request, store, resume), store.run_folder(request.setup), resume)
         for request in waiting
     ]
     with _progress(len(tasks)) as advance, _executor(jobs) as executor:
@@ -48,15 +49,14 @@ def is_complete(request: Request, store: Store) -> bool:
     )
 
 
-def _case(request: Request, store: Store, resume: bool) -> Case:
-    """The case to run: what is asked for, and what an earlier run was asked for if it is kept."""
+def _run(request: Request, store: Store, resume: bool) -> Run:
+    """What to run: what is asked for, and what an earlier run was asked for if it is kept."""
     speeds = set(request.speeds)
     earlier = _earlier(request, store) if resume else None
     if earlier:
-        signs = {"out": (1.0,), "in": (-1.0,), "both": (1.0, -1.0)}[earlier[1].stroke]
-        speeds |= {sign * u for sign in signs for u in earlier[1].speeds}
+        speeds |= set(rod_speeds(earlier[1]))
     parameters = Request(request.setup, frozenset(speeds)).parameters
-    return Case("oring", parameters, store.folder / CONTACTS)
+    return Run(CASE, parameters, shared_folder(CASE, store.folder))
 
 
 def _earlier(request: Request, store: Store) -> tuple[str, ORing] | None:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softehl.cases.harness.observer import Profile
 from softehl.cases.paper.item import Product
 from softehl.cases.paper.states import State
+from softehl.cases.seal.state import Profile
 from softehl.runtime.io import replacing
 
 if TYPE_CHECKING:

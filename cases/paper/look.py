@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.harness.curve import CurveRow
 from softehl.cases.paper.item import Scope
 from softehl.cases.paper.states import State, Store, setup
+from softehl.cases.seal.state import FilmRow
 from softehl.runtime.arrays import Array
 
 
@@ -50,7 +50,7 @@ class Look:
         u = self.scope.speed(abs(speed)) * (1.0 if speed > 0 else -1.0)
         return self.store.state(setup(density, self.scope.pressure(p_s), **others), u)
 
-    def row(self, density: int, p_s: float, speed: float, **others: Any) -> CurveRow:
+    def row(self, density: int, p_s: float, speed: float, **others: Any) -> FilmRow:
         """Its numbers.  Raises ValueError where there are none, or the film collapsed."""
         state = self.state(density, p_s, speed, **others)
         if state.row is None or not state.usable:

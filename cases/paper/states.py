@@ -10,11 +10,14 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.harness.curve import PROFILE_COLUMNS, CurveFolder, CurveRow
-from softehl.cases.harness.observer import COLLAPSED, OK, Profile
-from softehl.cases.harness.record import SELECTION, SIGNS
+from softehl.cases.harness.curve import CurveFolder
+from softehl.cases.harness.row import OK
 from softehl.cases.harness.sweep import differences
+from softehl.cases.oring import CASE
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.plan import SIGNS
+from softehl.cases.seal.state import COLLAPSED, FilmRow, Profile
+from softehl.cases.seal.telling import read_profile
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text, read_columns, read_json
 
@@ -52,7 +55,7 @@ class Request:
     @property
     def name(self) -> str:
         """The folder of the run: density, p_s and what is not as in the paper's default."""
-        others = differences(self.setup, ORing(**PAPER), (*SELECTION, *_IN_NAME))
+        others = differences(self.setup, ORing(**PAPER), (*CASE.selection, *_IN_NAME))
         first = [f"d{self.setup.density}", f"ps{number_text(self.setup.sealed_pressure)}"]
         return "-".join([*first, *others])
 
@@ -84,16 +87,19 @@ def merged(requests: Iterable[Request]) -> list[Request]:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A requested state: its row and profile if there are any, and its verdict in any case."""
+    """A requested state: its row and files if there are any, and its verdict in any case.
+
+    place: the folder of its files.
+    """
 
     setup: ORing
     rod_speed: float
-    row: CurveRow | None = None
-    path: Path | None = None
+    row: FilmRow | None = None
+    place: Path | None = None
 
     @property
     def verdict(self) -> str:
-        """One of `cases.harness.observer`, or :data:`NOT_REACHED`."""
+        """One of `cases.seal.state`, or :data:`NOT_REACHED`."""
         return self.row.verdict if self.row else NOT_REACHED
 
     @property
@@ -114,9 +120,9 @@ class State:
     @property
     def profile(self) -> Profile:
         """The fields along the film.  Raises ValueError for a state that was not reached."""
-        if self.path is None:
+        if self.row is None or self.place is None:
             raise ValueError(f"no profile at U = {self.rod_speed:g} mm/s: {self.verdict}")
-        return Profile(**read_columns(self.path, PROFILE_COLUMNS))
+        return read_profile(self.place, self.row)
 
     @property
     def title(self) -> str:
@@ -130,7 +136,7 @@ class Store:
     """The states in a folder of runs.  Raises OSError, ValueError where a file is damaged."""
 
     folder: Path
-    _rows: dict[Path, list[CurveRow]] = field(default_factory=dict, repr=False)
+    _rows: dict[Path, list[FilmRow]] = field(default_factory=dict, repr=False)
 
     def run_folder(self, parameters: ORing) -> Path:
         """Where the run of these parameters is or would be."""
@@ -147,8 +153,7 @@ class Store:
         for place in (run, run / "rejected"):
             for row in self._read(place):
                 if row.rod_speed_mm_s == rod_speed:
-                    path = place / f"profile_{row.name}.csv"
-                    return State(parameters, rod_speed, row, path)
+                    return State(parameters, rod_speed, row, place)
         return State(parameters, rod_speed)
 
     def states(self, parameters: ORing, speeds: Sequence[float]) -> list[State]:
@@ -164,9 +169,9 @@ class Store:
         columns = read_columns(path, ("x_mm", "p_MPa"))
         return columns["x_mm"], columns["p_MPa"]
 
-    def _read(self, place: Path) -> list[CurveRow]:
+    def _read(self, place: Path) -> list[FilmRow]:
         if place not in self._rows:
-            folder = CurveFolder(place)
+            folder = CurveFolder(place, FilmRow)
             folder.load()
             self._rows[place] = folder.rows
         return self._rows[place]

@@ -1,37 +1,34 @@
 """Net leakage of a cycle: what the outstroke carries out minus what the instroke takes back."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from softehl.cases.harness.curve import CurveRow
-from softehl.cases.harness.observer import COLLAPSED, OK, OSCILLATING, UNDER_RESOLVED
+from softehl.cases.harness.row import OK, Record, column
+from softehl.cases.seal.state import COLLAPSED, OSCILLATING, UNDER_RESOLVED, FilmRow
 
 _WORST_LAST = (OK, OSCILLATING, UNDER_RESOLVED, COLLAPSED)
 
 
 @dataclass(frozen=True)
-class LeakageRow:
-    """One row of `leakage.csv`: both strokes at one sealed pressure and one speed |U|.
+class LeakageRow(Record):
+    """One row of `leakage.csv`: both strokes at one sealed pressure and one speed |U|."""
 
-    leak_out_mm3_s, leak_in_mm3_s: 2 pi R q, positive towards the air side.  net_mm3_per_mm: net
-    volume that leaves in a cycle for each mm of stroke, pi R (h*_out - h*_in) by (16); negative
-    where the instroke could take back more than there is, so that the seal is dry on balance.
-    net_film_um: h*_out - h*_in.  verdict: the worse one of the two states.
-    """
-
-    sealed_pressure_MPa: float
-    speed_mm_s: float
-    leak_out_mm3_s: float
-    leak_in_mm3_s: float
-    net_mm3_per_mm: float
-    net_film_um: float
-    verdict: str
-
-
-LEAKAGE_COLUMNS = tuple(column.name for column in fields(LeakageRow))
+    sealed_pressure_MPa: float = column("MPa", "sealed pressure p_s")
+    speed_mm_s: float = column("mm/s", "rod speed |U|")
+    leak_out_mm3_s: float = column(
+        "mm3/s", "leak rate 2 pi R q of the outstroke, + = to the air side"
+    )
+    leak_in_mm3_s: float = column("mm3/s", "the same of the instroke")
+    net_mm3_per_mm: float = column(
+        "mm3/mm",
+        "net volume that leaves in a cycle for each mm of stroke, pi R (h*_out - h*_in) by (16); "
+        "negative where the instroke could take back more than there is: dry on balance",
+    )
+    net_film_um: float = column("um", "h*_out - h*_in")
+    verdict: str = column("", "the worse one of the two states")
 
 
-def net_leakage(rows: Sequence[CurveRow]) -> list[LeakageRow]:
+def net_leakage(rows: Sequence[FilmRow]) -> list[LeakageRow]:
     """A row for each sealed pressure and speed that has both strokes, fast ones first."""
     found = {(row.sealed_pressure_MPa, row.rod_speed_mm_s): row for row in rows}
     pairs = [
@@ -43,7 +40,7 @@ def net_leakage(rows: Sequence[CurveRow]) -> list[LeakageRow]:
     return [_cycle(out, back) for out, back in pairs]
 
 
-def _cycle(out: CurveRow, back: CurveRow) -> LeakageRow:
+def _cycle(out: FilmRow, back: FilmRow) -> LeakageRow:
     return LeakageRow(
         sealed_pressure_MPa=out.sealed_pressure_MPa,
         speed_mm_s=out.rod_speed_mm_s,

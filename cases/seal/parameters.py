@@ -1,142 +1,125 @@
 """Parameters of the reciprocating O-ring (section 5.1 and Table 1 of the paper), with their limits.
 
-A parameter set is data: frozen, checked on construction, of strict types (an integer is accepted
-where a real number is meant, nothing else is converted).  Units are mm, MPa, N, s.
+Units are mm, MPa, N, s.
 """
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from softehl.cases.harness.parameters import Parameters, key
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 # strict again on the item: the list itself is lax so that a TOML array becomes a tuple
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 
 
-class ORing(BaseModel):
+class ORing(Parameters):
     """Everything that defines one run of the O-ring case.
 
-    Raises pydantic.ValidationError where a value is of the wrong type, out of its range or not
-    finite, for an unknown key, and for a geometry in which the seal is not squeezed.
+    Raises pydantic.ValidationError also for a geometry in which the seal is not squeezed.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-    density: Literal[1, 2, 4, 8, 16] = Field(
-        default=2,
-        description="mesh density d: 27 d segments on the lubricated arc; 1, 2, 4, 8 or 16",
+    density: Literal[1, 2, 4, 8, 16] = key(
+        2, "mesh density d: 27 d segments on the lubricated arc", bounds="1, 2, 4, 8 or 16"
     )
-    mesh: Literal["graded", "uniform"] = Field(
-        default="graded",
-        description='segments of the arc; "graded" (fine at the contact edges) or "uniform"',
+    mesh: Literal["graded", "uniform"] = key(
+        "graded", "segments of the arc", bounds='"graded" (fine at the contact edges) or "uniform"'
     )
-    pressure_order: int = Field(
-        default=4, ge=1, le=64, description="order m_p of the film pressure on a segment; 1 to 64"
+    pressure_order: int = key(
+        4, "order m_p of the film pressure on a segment", bounds="1 to 64", ge=1, le=64
     )
-    reynolds: Literal["fe", "dg"] = Field(
-        default="fe",
-        description='treatment of the Reynolds equation; "fe" (continuous pressure) or "dg"',
+    reynolds: Literal["fe", "dg"] = key(
+        "fe", "treatment of the Reynolds equation", bounds='"fe" (continuous pressure) or "dg"'
     )
-    quadrature: Literal["gauss", "lobatto"] = Field(
-        default="gauss", description='quadrature rule of the film; "gauss" or "lobatto"'
+    quadrature: Literal["gauss", "lobatto"] = key(
+        "gauss", "quadrature rule of the film", bounds='"gauss" or "lobatto"'
     )
-    quadrature_points: int | None = Field(
-        default=None,
-        ge=2,
-        le=128,
-        description="points of the film rule; 2 to 128, left out = automatic",
+    quadrature_points: int | None = key(
+        None, "points of the film rule", bounds="2 to 128, left out = automatic", ge=2, le=128
     )
-    upwinding: NonNegative = Field(
-        default=1.0,
-        description="strength c of the bubble-load upwinding; >= 0, 0 = the paper's scheme",
+    upwinding: float = key(
+        1.0, "strength c of the bubble-load upwinding", bounds=">= 0, 0 = the paper's scheme", ge=0
     )
-    error_estimate: bool = Field(
-        default=True,
-        description="whether the error of h* is estimated, on a graded mesh; true or false",
+    error_estimate: bool = key(
+        True, "whether the error of h* is estimated, on a graded mesh", bounds="true or false"
     )
-    tolerance: float | None = Field(
-        default=None,
+    tolerance: float | None = key(
+        None,
+        "largest estimated error of h*, reached by finer meshes",
+        unit="%",
+        bounds="left out = any",
         gt=0,
-        description="largest estimated error of h* [%], reached by finer meshes; left out = any",
     )
-    solid: Literal["fbar", "taylor", "q4"] = Field(
-        default="taylor", description='solid element; "fbar", "taylor" or "q4"'
+    solid: Literal["fbar", "taylor", "q4"] = key(
+        "taylor", "solid element", bounds='"fbar", "taylor" or "q4"'
     )
-    sealed_pressure: NonNegative = Field(default=1.0, description="sealed pressure p_s [MPa]; >= 0")
-    stroke: Literal["out", "in", "both"] = Field(
-        default="both", description='direction of the rod; "out" (to the air side), "in" or "both"'
+    sealed_pressure: float = key(1.0, "sealed pressure p_s", unit="MPa", ge=0)
+    stroke: Literal["out", "in", "both"] = key(
+        "both", "direction of the rod", bounds='"out" (to the air side), "in" or "both"'
     )
-    speeds: tuple[Speed, ...] = Field(
-        default=(1600.0, 800.0, 400.0, 200.0, 100.0),
+    speeds: tuple[Speed, ...] = key(
+        (1600.0, 800.0, 400.0, 200.0, 100.0),
+        "rod speeds |U|",
+        unit="mm/s",
+        bounds="a list of different numbers > 0, in any order",
         min_length=1,
         strict=False,
-        description="rod speeds |U| [mm/s]; a list of different numbers > 0, in any order",
     )
-    pressure_viscosity: NonNegative = Field(
-        default=0.02, description="pressure-viscosity coefficient alpha of (13) [1/MPa]; >= 0"
+    pressure_viscosity: float = key(
+        0.02, "pressure-viscosity coefficient alpha of (13)", unit="1/MPa", ge=0
     )
-    shear_traction: bool = Field(
-        default=True, description="whether the shear stress (17) acts on the seal; true or false"
+    shear_traction: bool = key(
+        True, "whether the shear stress (17) acts on the seal", bounds="true or false"
     )
-    rotation: Literal["fixed", "free"] = Field(
-        default="fixed",
-        description='mean rotation of the section; "fixed" (held at zero) or "free"',
+    rotation: Literal["fixed", "free"] = key(
+        "fixed", "mean rotation of the section", bounds='"fixed" (held at zero) or "free"'
     )
-    solver: Literal["auto", "monolithic"] = Field(
-        default="auto",
-        description='way to the solution; "auto" (fast, checks itself) or "monolithic" (reference)',
+    solver: Literal["auto", "monolithic"] = key(
+        "auto",
+        "way to the solution",
+        bounds='"auto" (fast, checks itself) or "monolithic" (reference)',
     )
-    linear: Literal["auto", "superlu", "pardiso"] = Field(
-        default="auto",
-        description='linear solver; "superlu", "pardiso" or "auto" (pardiso where installed)',
+    linear: Literal["auto", "superlu", "pardiso"] = key(
+        "auto", "linear solver", bounds='"superlu", "pardiso" or "auto" (pardiso where installed)'
     )
 
-    inner_diameter: Positive = Field(
-        default=50.39, description="inner diameter of the seal D_inner [mm]; > 0"
-    )
-    section_diameter: Positive = Field(
-        default=3.53, description="diameter of the section D_seal [mm]; > 0"
-    )
-    rod_diameter: Positive = Field(default=50.0, description="rod diameter D_rod [mm]; > 0")
-    housing_diameter: Positive = Field(
-        default=56.30, description="inner diameter of the housing D_housing [mm]; > 0"
-    )
-    mu_1: Positive = Field(
-        default=3.04, description="Mooney-Rivlin parameter mu_1 of (3) [MPa]; > 0"
-    )
-    mu_2: NonNegative = Field(
-        default=0.62, description="Mooney-Rivlin parameter mu_2 of (3) [MPa]; >= 0"
-    )
-    bulk_modulus: Positive = Field(
-        default=500.0, description="bulk modulus kappa of (6) [MPa]; > 0"
-    )
-    viscosity: Positive = Field(
-        default=6.59e-8, description="viscosity eta_0 at zero pressure of (13) [MPa s]; > 0"
-    )
-    cavitation_penalty: Positive = Field(
-        default=1.0e4, description="cavitation penalty epsilon of (25) [mm/(MPa s)]; > 0"
+    inner_diameter: float = key(50.39, "inner diameter of the seal D_inner", unit="mm", gt=0)
+    section_diameter: float = key(3.53, "diameter of the section D_seal", unit="mm", gt=0)
+    rod_diameter: float = key(50.0, "rod diameter D_rod", unit="mm", gt=0)
+    housing_diameter: float = key(56.30, "inner diameter of the housing D_housing", unit="mm", gt=0)
+    mu_1: float = key(3.04, "Mooney-Rivlin parameter mu_1 of (3)", unit="MPa", gt=0)
+    mu_2: float = key(0.62, "Mooney-Rivlin parameter mu_2 of (3)", unit="MPa", ge=0)
+    bulk_modulus: float = key(500.0, "bulk modulus kappa of (6)", unit="MPa", gt=0)
+    viscosity: float = key(6.59e-8, "viscosity eta_0 at zero pressure of (13)", unit="MPa s", gt=0)
+    cavitation_penalty: float = key(
+        1.0e4, "cavitation penalty epsilon of (25)", unit="mm/(MPa s)", gt=0
     )
 
-    groove_width: Positive = Field(default=3.74, description="axial width of the groove [mm]; > 0")
-    groove_centre: float = Field(
-        default=0.0,
-        description="axial position of the middle of the groove, section centre = 0 [mm]",
+    groove_width: float = key(3.74, "axial width of the groove", unit="mm", gt=0)
+    groove_centre: float = key(
+        0.0,
+        "axial position of the middle of the groove, section centre = 0",
+        unit="mm",
+        bounds="such that the section is between the walls",
     )
-    arc_start: float = Field(
-        default=-34.0,
+    arc_start: float = key(
+        -34.0,
+        "sealed end of the lubricated arc, from the bottom",
+        unit="degrees",
+        bounds="-120 to < 0",
         ge=-120.0,
         lt=0.0,
-        description="sealed end of the lubricated arc, from the bottom [degrees]; -120 to < 0",
     )
-    arc_end: float = Field(
-        default=43.0,
+    arc_end: float = key(
+        43.0,
+        "air end of the lubricated arc, from the bottom",
+        unit="degrees",
+        bounds="> 0 to 120",
         gt=0.0,
         le=120.0,
-        description="air end of the lubricated arc, from the bottom [degrees]; > 0 to 120",
     )
 
     @property

@@ -7,9 +7,9 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.harness.observer import ContactState, FilmState, Profile, Section
 from softehl.cases.seal.path import Film
 from softehl.cases.seal.section import HOUSING, OringSection, sealed_side
+from softehl.cases.seal.state import ContactState, FilmState, Profile, Section
 from softehl.cases.seal.verdict import FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
@@ -156,8 +156,8 @@ def film_state(
     numbers = verdict.last or film_numbers(section, problem, film, x)
     limits = interval_below(*section.arc_film(x), CONTACT_FILM)
     return FilmState(
-        sealed_pressure=film.sealed_pressure,
-        rod_speed=film.rod_speed,
+        sealed_pressure_MPa=film.sealed_pressure,
+        rod_speed_mm_s=film.rod_speed,
         h_star_um=numbers.h_star / MICROMETRE,
         density=section.parameters.density,
         h_min_um=numbers.h_min / MICROMETRE,

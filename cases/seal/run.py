@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 
-from softehl.cases.harness.observer import FilmState, Observer, Outcome, StageRecord
 from softehl.cases.seal.contact import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
 from softehl.cases.seal.estimate import coarser_section, h_star_error
@@ -36,6 +35,7 @@ from softehl.cases.seal.results import (
 )
 from softehl.cases.seal.section import OringSection, build_section
 from softehl.cases.seal.stage import Stage, Walker
+from softehl.cases.seal.state import FilmState, Observer, Outcome, StageRecord
 from softehl.cases.seal.stopped import Stopped
 from softehl.cases.seal.verdict import Verdict, fewest_inlet_segments
 from softehl.runtime.arrays import Array
@@ -268,8 +268,7 @@ def _outcome(progress: _Run) -> Outcome:
         states=tuple(progress.states),
         status=stopped[0][0] if stopped else Status.CONVERGED,
         message="; ".join(message for _, message in stopped) or "all requested states converged",
-        unknowns_total=section.layout.total,
-        unknowns_pressure=section.layout.count("pressure"),
+        unknowns={"total": section.layout.total, "pressure": section.layout.count("pressure")},
         kernel_signatures={b.kernel.name: b.kernel.signature for b in blocks},
         stages=tuple(progress.records),
         solvers={

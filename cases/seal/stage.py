@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from softehl.cases.harness.observer import Observer, StageRecord
+from softehl.cases.seal.state import Observer, StageRecord, place
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
@@ -109,7 +109,6 @@ def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -
         iterations=branch.iterations,
         residual_histories=tuple(p.solution.residual_norms for p in points),
         parameters=tuple(stage.shown(p.parameter) for p in points),
-        sealed_pressure=stage.sealed_pressure,
-        stroke=stage.stroke,
+        where=place(stage.sealed_pressure, stage.stroke),
         method=stage.method if branch.converged else f"{stage.method}; ended: {branch.message}",
     )

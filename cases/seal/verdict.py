@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import inf
 
-from softehl.cases.harness.observer import COLLAPSED, OK, OSCILLATING, UNDER_RESOLVED
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.state import COLLAPSED, OSCILLATING, UNDER_RESOLVED
 from softehl.runtime.fem.postprocess import local_exponent
 
 EXCESS_PRESSURE = 0.1

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from softehl.__main__ import main
-    from softehl.cases.harness.observer import FilmState, Observer, Outcome, Silent
-    from softehl.cases.harness.sweep import Curve, solve_cases
+    from softehl.cases.harness.sweep import Curve
     from softehl.cases.seal.parameters import ORing
     from softehl.cases.seal.run import run as run_oring
+    from softehl.cases.seal.state import FilmState, Observer, Outcome, Silent
+    from softehl.cases.shipped import solve_cases
     from softehl.codegen.language import kinematics
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.elements import quadrature, shapes
@@ -38,21 +39,21 @@ _PUBLIC = {
     "Curve": "softehl.cases.harness.sweep",
     "DofLayout": "softehl.runtime.fem.dofs",
     "ElementBlock": "softehl.runtime.fem.assembly",
-    "FilmState": "softehl.cases.harness.observer",
+    "FilmState": "softehl.cases.seal.state",
     "Kernel": "softehl.runtime.kernels",
     "Mesh": "softehl.runtime.mesh.mesh",
     "Newton": "softehl.runtime.solve.newton",
     "ORing": "softehl.cases.seal.parameters",
-    "Observer": "softehl.cases.harness.observer",
-    "Outcome": "softehl.cases.harness.observer",
+    "Observer": "softehl.cases.seal.state",
+    "Outcome": "softehl.cases.seal.state",
     "Problem": "softehl.runtime.fem.problem",
-    "Silent": "softehl.cases.harness.observer",
+    "Silent": "softehl.cases.seal.state",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
     "Study": "softehl.runtime.study",
     "main": "softehl.__main__",
     "run_oring": "softehl.cases.seal.run:run",
-    "solve_cases": "softehl.cases.harness.sweep",
+    "solve_cases": "softehl.cases.shipped",
 }
 _MODELLING = {
     "Definition": "softehl.codegen.language.definition",

@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _commands() -> "click.Group":
     import click
 
-    from softehl.cases.cli import reproduce, run
+    from softehl.cases.cli import keys, reproduce, run
 
     @click.group(no_args_is_help=False)
     @click.version_option(__version__, prog_name="softehl")
@@ -80,6 +80,7 @@ def _commands() -> "click.Group":
         return kernels()
 
     commands.add_command(run)
+    commands.add_command(keys)
     commands.add_command(reproduce)
     return commands
 

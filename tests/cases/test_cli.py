@@ -15,10 +15,17 @@ import numpy as np
 import pytest
 
 import softehl
-from softehl.cases.harness.case_file import Case, Solve
-from softehl.cases.harness.observer import (
+from softehl.cases import oring
+from softehl.cases.harness import observer as harness
+from softehl.cases.harness.record import RunRecord
+from softehl.cases.harness.row import OK
+from softehl.cases.harness.session import NOT_CONVERGED
+from softehl.cases.oring import ORingCase
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.report import PICTURES
+from softehl.cases.seal.run import run as solve_really
+from softehl.cases.seal.state import (
     COLLAPSED,
-    OK,
     ContactState,
     FilmState,
     Observer,
@@ -26,11 +33,9 @@ from softehl.cases.harness.observer import (
     Profile,
     Section,
     StageRecord,
+    place,
 )
-from softehl.cases.harness.record import RunRecord
-from softehl.cases.harness.session import NOT_CONVERGED
-from softehl.cases.seal import report
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.telling import Teller
 from softehl.runtime.kernels import MissingKernelsError
 from softehl.runtime.solve.solution import Status
 
@@ -41,13 +46,28 @@ HEADER = (
     "inlet_segments,density,verdict"
 )
 FAST = ("--set", "speeds=[400, 100]")
-PLOTS = {f"{name}.{kind}" for name in report.PICTURES for kind in ("png", "svg")}
+PLOTS = {f"{name}.{kind}" for name in PICTURES for kind in ("png", "svg")}
 FILES = {
     *("run.json", "curve.csv", "leakage.csv"),
     *("contact_1.csv", "contact_1.vtu"),
     *(f"profile_1_{u}.csv" for u in (400, 100, -400, -100)),
     *(f"section_1_{u}.vtu" for u in (400, 100, -400, -100)),
 }
+
+
+Solve = Callable[[ORing, Observer], harness.Outcome]
+
+
+class Fake(ORingCase):
+    """The O-ring with another way to solve it."""
+
+    def __init__(self, solver: Solve) -> None:
+        self.solver = solver
+
+    def solve(
+        self, parameters: ORing, observer: harness.Observer, shared: Path | None
+    ) -> harness.Outcome:
+        return self.solver(parameters, Teller(observer))
 
 
 # --- a case that answers at once ---------------------------------------------------------------
@@ -65,8 +85,8 @@ def film_state(parameters: ORing, speed: float, verdict: str = OK) -> FilmState:
     x = np.linspace(-1.0, 1.0, 5)
     h_star = abs(speed) ** 0.5 / 10
     return FilmState(
-        sealed_pressure=parameters.sealed_pressure,
-        rod_speed=speed,
+        sealed_pressure_MPa=parameters.sealed_pressure,
+        rod_speed_mm_s=speed,
         h_star_um=h_star,
         h_min_um=0.8 * h_star,
         p_max_MPa=4.0,
@@ -109,8 +129,9 @@ def solve(parameters: ORing, observer: Observer) -> Outcome:
 
 
 def outcome(*states: FilmState, status: Status = Status.CONVERGED, message: str = "") -> Outcome:
-    stage = StageRecord("contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), 1.0, "out")
-    return Outcome(states, status, message, 1234, 109, {"film": "abc"}, (stage,))
+    stage = StageRecord("contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), place(1.0, "out"))
+    unknowns = {"total": 1234, "pressure": 109}
+    return Outcome(states, status, message, unknowns, {"film": "abc"}, (stage,))
 
 
 def solve_roughly(parameters: ORing, observer: Observer) -> Outcome:
@@ -187,9 +208,9 @@ def invoke(
     """
 
     def run(*arguments: str, solver: Solve = solve, plots: bool = False) -> Result:
-        monkeypatch.setattr(Case, "load_solve", lambda _: solver)
+        monkeypatch.setattr(oring, "CASE", Fake(solver))
         if not plots:
-            monkeypatch.setattr(report, "write_plots", lambda *_: None)
+            monkeypatch.setattr(oring, "write_plots", lambda *_: None)
         code = softehl.main(arguments)
         captured = capfd.readouterr()
         return code, captured.out.splitlines(), captured.err.splitlines()
@@ -454,7 +475,7 @@ def test_an_error_leaves_what_was_reached(here: Path, invoke: Invoke) -> None:
 
 def run_and_die(folder: str) -> None:
     """Body of a process that is ended in the middle of a run."""
-    Case.load_solve = lambda self: solve_and_die  # type: ignore[method-assign]
+    oring.CASE = Fake(solve_and_die)
     softehl.main(["run", "oring", *FAST, "--out", folder])
 
 
@@ -547,7 +568,7 @@ def test_a_full_disk_is_one_line(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(RunRecord, "film", full)
+    monkeypatch.setattr(RunRecord, "state", full)
     code, _, err = invoke("run", "oring", *FAST, "--quiet")
     assert (code, len(err)) == (2, 1)
     assert "cannot write 'results/oring': No space left on device" in err[0]
@@ -558,7 +579,7 @@ def test_a_linear_solver_that_is_missing_is_bad_input(
     here: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("softehl.runtime.solve.pardiso.available", lambda: False)
-    code, out, err = invoke("run", "oring", *FAST, "--set", "linear=pardiso")
+    code, out, err = invoke("run", "oring", *FAST, "--set", "linear=pardiso", solver=solve_really)
     assert (code, out, len(err)) == (2, [], 1)
     assert 'allowed here: "auto" or "superlu"' in err[0]
     assert list(here.iterdir()) == []

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.harness.observer import Outcome, Silent
 from softehl.cases.seal.contact_store import (
     WITHOUT_INFLUENCE,
     ContactStore,
@@ -22,6 +21,7 @@ from softehl.cases.seal.path import PathSettings, contact_problem
 from softehl.cases.seal.run import run
 from softehl.cases.seal.section import build_section
 from softehl.cases.seal.stage import Walker
+from softehl.cases.seal.state import Outcome, Silent
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.solve.newton import Newton
 

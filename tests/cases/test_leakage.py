@@ -1,30 +1,32 @@
 """Net leakage of a cycle from the rows of a curve."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from softehl.cases.harness.case_file import Case
-from softehl.cases.harness.curve import CurveRow
-from softehl.cases.harness.observer import OK, OSCILLATING, UNDER_RESOLVED
+from softehl.cases.harness.case import Run
+from softehl.cases.harness.progress import Display
 from softehl.cases.harness.record import RunRecord
-from softehl.cases.seal.leakage import LEAKAGE_COLUMNS, net_leakage
+from softehl.cases.harness.row import OK
+from softehl.cases.harness.session import Reporter
+from softehl.cases.oring import CASE
+from softehl.cases.seal.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.state import OSCILLATING, UNDER_RESOLVED, FilmRow
+from softehl.cases.seal.telling import Teller
 from softehl.runtime.io import read_csv, read_json
 from tests.cases.test_cli import film_state
 
 RADIUS = 25.0
 
 
-def row(speed: float, film: float, verdict: str = OK, sealed_pressure: float = 1.0) -> CurveRow:
+def row(speed: float, film: float, verdict: str = OK, sealed_pressure: float = 1.0) -> FilmRow:
     """A row with the leak rate that goes with h* in micrometres, (16)."""
     state = film_state(ORing(sealed_pressure=sealed_pressure), speed, verdict)
-    base = CurveRow.of(state)
     leak = math.pi * RADIUS * speed * film * 1e-3
-    changes = {"h_star_um": film, "leak_rate_mm3_s": leak}
-    values = {name: getattr(base, name) for name in base.__dataclass_fields__}
-    return CurveRow(**{**values, **changes})
+    return replace(FilmRow.part_of(state), h_star_um=film, leak_rate_mm3_s=leak)
 
 
 def test_net_leakage_is_the_difference_of_the_two_films() -> None:
@@ -49,12 +51,13 @@ def test_the_worse_verdict_of_the_two_is_kept() -> None:
 
 
 def test_a_run_of_both_strokes_writes_the_table(tmp_path: Path) -> None:
-    case = Case("oring", ORing(speeds=(400.0, 100.0)))
-    record = RunRecord(tmp_path / "both", case, resume=False)
+    run = Run(CASE, ORing(speeds=(400.0, 100.0)))
+    record = RunRecord(tmp_path / "both", run, resume=False)
+    observer = Teller(Reporter(record, Display(), "both"))
     for speed in (400.0, -400.0, 100.0):
-        record.film(film_state(case.parameters, speed))
+        observer.film_state(film_state(run.parameters, speed))
         assert (record.folder / "leakage.csv").exists() == (speed != 400.0)
-    (only,) = read_csv(record.folder / "leakage.csv", LEAKAGE_COLUMNS)
+    (only,) = read_csv(record.folder / "leakage.csv", LeakageRow.header())
     assert only[1] == "400"
     (entry,) = read_json(record.folder / "run.json")["leakage"]
     assert entry["net_film_um"] == 0.0

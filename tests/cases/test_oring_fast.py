@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from softehl.cases.harness.observer import Outcome
 from softehl.cases.seal import fast as oring_fast
 from softehl.cases.seal.fast import METHOD
 from softehl.cases.seal.run import run
+from softehl.cases.seal.state import Outcome
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.schur import SchurCorrector

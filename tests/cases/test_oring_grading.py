@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softehl.cases.harness.observer import Outcome, Silent
 from softehl.cases.seal.contact import ContactRoute
 from softehl.cases.seal.grading import arc_positions, contact_edges, graded_disc
 from softehl.cases.seal.order import OrderPair
@@ -15,6 +14,7 @@ from softehl.cases.seal.path import PathSettings
 from softehl.cases.seal.run import run
 from softehl.cases.seal.section import OringSection, build_section
 from softehl.cases.seal.stage import Stage, Walker
+from softehl.cases.seal.state import Outcome, Silent
 from softehl.cases.seal.stopped import Stopped
 from softehl.runtime.mesh.sections import corner_jacobians
 from tests.cases.oring_cases import oring

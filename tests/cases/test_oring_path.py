@@ -6,9 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from softehl.cases.harness.observer import (
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.path import PathSettings, squeeze_stage
+from softehl.cases.seal.report.section import boundary_edges
+from softehl.cases.seal.run import run
+from softehl.cases.seal.section import build_section
+from softehl.cases.seal.state import (
     COLLAPSED,
-    OK,
     OSCILLATING,
     UNDER_RESOLVED,
     ContactState,
@@ -16,10 +20,6 @@ from softehl.cases.harness.observer import (
     Outcome,
     Silent,
 )
-from softehl.cases.seal.path import PathSettings, squeeze_stage
-from softehl.cases.seal.report.section import boundary_edges
-from softehl.cases.seal.run import run
-from softehl.cases.seal.section import build_section
 from softehl.cases.seal.stopped import Stopped
 from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.fem.contact import tributary_areas

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softehl.cases.harness.observer import COLLAPSED, OK, OSCILLATING, UNDER_RESOLVED
+from softehl.cases.harness.row import OK
 from softehl.cases.seal.path import Film, PathSettings, contact_problem, film_problem
 from softehl.cases.seal.results import (
     contact_pressure,
@@ -15,6 +15,7 @@ from softehl.cases.seal.results import (
     oscillation,
 )
 from softehl.cases.seal.section import build_section
+from softehl.cases.seal.state import COLLAPSED, OSCILLATING, UNDER_RESOLVED
 from softehl.cases.seal.verdict import FilmNumbers, Verdict, fewest_inlet_segments
 from tests.cases.oring_cases import oring
 

@@ -14,12 +14,16 @@ from typing import Any
 import pytest
 
 import softehl
-from softehl.cases.harness.case_file import BadInput, Case
-from softehl.cases.harness.observer import Observer, Outcome, Silent
+from softehl.cases.harness import observer as harness
+from softehl.cases.harness.case import Run
+from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.observer import Observer
 from softehl.cases.harness.processes import completed, processes
-from softehl.cases.harness.sweep import Curve, Task, in_order, solve_cases
+from softehl.cases.harness.sweep import Curve, Task, in_order
 from softehl.cases.harness.workers import solve_side_by_side
+from softehl.cases.oring import CASE
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.shipped import solve_cases
 from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
 from softehl.runtime.solve.backends import MissingBackend
 from softehl.runtime.solve.linear import SingularMatrix
@@ -128,7 +132,7 @@ def alive(pid: int) -> bool:
 # --- strokes side by side -------------------------------------------------------------------------
 
 
-def step_for_ever(parameters: ORing, observer: Observer) -> Outcome:
+def step_for_ever(parameters: ORing, observer: Observer) -> harness.Outcome:
     """Takes a minute unless nobody listens any more."""
     for number in range(6000):
         observer.step(label="U", parameter=number, iterations=1, residuals=(), fraction=None)
@@ -136,13 +140,13 @@ def step_for_ever(parameters: ORing, observer: Observer) -> Outcome:
     return outcome()
 
 
-def tell_and_end(parameters: ORing, observer: Observer) -> Outcome:
+def tell_and_end(parameters: ORing, observer: Observer) -> harness.Outcome:
     for number in range(500):
-        observer.stage(str(number), sealed_pressure=1.0, stroke="out", steps=None)
+        observer.stage(str(number), title="", where={})
     return outcome()
 
 
-class Counter(Silent):
+class Counter(Observer):
     """Keeps what it is told; may have no room for more."""
 
     def __init__(self, room: int) -> None:
@@ -160,7 +164,7 @@ class Counter(Silent):
 def test_every_call_arrives_in_order() -> None:
     counters = [Counter(1), Counter(1)]
     outcomes = solve_side_by_side(tell_and_end, [case(), case()], counters)
-    assert [o.unknowns_total for o in outcomes] == [1234, 1234]
+    assert [o.unknowns["total"] for o in outcomes] == [1234, 1234]
     assert [c.stages for c in counters] == [[str(n) for n in range(500)]] * 2
 
 
@@ -236,7 +240,7 @@ def test_a_sweep_on_dask(serial: list[Curve], tmp_path: Path) -> None:
 
 def test_one_curve_of_each_section_comes_first() -> None:
     cases = [*SWEEP, case(density=2, stroke="in"), case(density=2, mu_1=3.0)]
-    tasks = [Task(Case("oring", c), Path(str(n)), False) for n, c in enumerate(cases)]
+    tasks = [Task(Run(CASE, c), Path(str(n)), False) for n, c in enumerate(cases)]
     assert [task.folder.name for task in in_order(tasks)] == ["4", "5", "0", "2", "1", "3"]
 
 

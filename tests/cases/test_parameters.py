@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from softehl.cases.harness.case_file import BadInput, read_assignment, read_case
+from softehl.cases.harness.case_file import read_assignment, read_case
+from softehl.cases.harness.errors import BadInput
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.shipped import SHIPPED
 
 TABLE_1 = {
     "inner_diameter": 50.39,
@@ -45,7 +47,7 @@ def test_parameters_are_frozen() -> None:
 
 @pytest.mark.parametrize("density", [1, 2, 4, 8, 16])
 def test_every_density_of_the_list(density: int) -> None:
-    assert read_case("oring", [f"density={density}"]).parameters.density == density
+    assert read_case("oring", SHIPPED, [f"density={density}"]).parameters.density == density
 
 
 @pytest.mark.parametrize(
@@ -124,14 +126,14 @@ def test_assignment(text: str, value: object) -> None:
 def test_case_file_and_set(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text('case = "oring"\ndensity = 4\nspeeds = [800, 25]\nstroke = "in"\n')
-    case = read_case(str(path), ["stroke=out", "stroke=both"])
-    assert case.name == "oring"
-    assert case.parameters == ORing(density=4, speeds=(800.0, 25.0), stroke="both")
+    run = read_case(str(path), SHIPPED, ["stroke=out", "stroke=both"])
+    assert run.case.name == "oring"
+    assert run.parameters == ORing(density=4, speeds=(800.0, 25.0), stroke="both")
 
 
 def test_several_complaints_are_counted() -> None:
     with pytest.raises(BadInput, match=r"density = 3: .* \(and 1 more\); allowed: .*1, 2, 4, 8"):
-        read_case("oring", ["density=3", "sealed_pressure=-1", "speeds=[1]"])
+        read_case("oring", SHIPPED, ["density=3", "sealed_pressure=-1", "speeds=[1]"])
 
 
 def test_the_readme_has_the_table_of_keys() -> None:

@@ -14,20 +14,20 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from softehl.cases.harness.curve import CurveRow
-from softehl.cases.harness.observer import COLLAPSED, OK, OSCILLATING, Profile, Section
+from softehl.cases.harness.row import OK
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure, fitted_exponent, plain_ticks
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import View, boundary_edges, section_figure, von_mises
+from softehl.cases.seal.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
 
 SEAL = ORing()
 SPEEDS = (100.0, 400.0, 1600.0)
 
 
-def row(speed: float, h_star: float, error: float = 0.5, verdict: str = OK) -> CurveRow:
-    return CurveRow(
+def row(speed: float, h_star: float, error: float = 0.5, verdict: str = OK) -> FilmRow:
+    return FilmRow(
         sealed_pressure_MPa=1.0,
         rod_speed_mm_s=speed,
         h_star_um=h_star,
@@ -50,7 +50,7 @@ def row(speed: float, h_star: float, error: float = 0.5, verdict: str = OK) -> C
     )
 
 
-def power_law(exponent: float) -> list[CurveRow]:
+def power_law(exponent: float) -> list[FilmRow]:
     """Both strokes with one exponent and other factors."""
     factors = ((1.0, 0.05), (-1.0, 0.04))
     return [row(sign * u, a * u**exponent) for sign, a in factors for u in SPEEDS]

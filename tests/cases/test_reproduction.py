@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 import softehl
 from softehl.cases.harness import sweep
-from softehl.cases.harness.case_file import BadInput
-from softehl.cases.harness.curve import CURVE_COLUMNS
+from softehl.cases.harness.errors import BadInput
 from softehl.cases.paper import compute as computing
 from softehl.cases.paper import page
 from softehl.cases.paper.catalogue import ITEMS
@@ -26,6 +25,7 @@ from softehl.cases.paper.item import Scope
 from softehl.cases.paper.look import angle, ripple
 from softehl.cases.paper.states import NOT_REACHED, Store, ask, merged, setup
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.state import FilmRow
 from softehl.runtime.io import write_csv, write_json
 
 SMALL = Scope(density=1, speeds=(1600.0,), pressures=(1.0,))
@@ -163,14 +163,14 @@ def write_state(
     folder = store.run_folder(parameters)
     folder = folder / "rejected" if verdict == "collapsed" else folder
     folder.mkdir(parents=True, exist_ok=True)
-    values = dict.fromkeys(CURVE_COLUMNS, 1.0) | {
+    values = dict.fromkeys(FilmRow.header(), 1.0) | {
         "sealed_pressure_MPa": parameters.sealed_pressure,
         "rod_speed_mm_s": speed,
         "h_star_um": 2.0,
         "contact_start_mm": -1.0,
         "newton_iterations": 3,
     }
-    write_csv(folder / "curve.csv", CURVE_COLUMNS, [[*list(values.values())[:-1], verdict]])
+    write_csv(folder / "curve.csv", FilmRow.header(), [[*list(values.values())[:-1], verdict]])
     header = ("x_mm", "h_um", "p_MPa", "tau_MPa", "flux_mm2_s")
     name = f"profile_{parameters.sealed_pressure:g}_{speed:g}.csv"
     places = np.linspace(-1.0, 1.0, len(h)).tolist()

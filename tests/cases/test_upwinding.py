@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from softehl.cases.harness.observer import Outcome
 from softehl.cases.seal.fast import METHOD
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Film, PathSettings, film_problem
 from softehl.cases.seal.run import run
 from softehl.cases.seal.section import build_section
+from softehl.cases.seal.state import Outcome
 from softehl.runtime.fem.problem import Problem
 from tests.cases.oring_cases import oring
 from tests.cases.test_oring_path import Recorder

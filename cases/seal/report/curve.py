@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softehl.cases.harness.curve import CurveRow
-from softehl.cases.harness.observer import OK
+from softehl.cases.harness.row import OK
 from softehl.cases.seal.report import style
+from softehl.cases.seal.state import FilmRow
 from softehl.runtime.arrays import Array
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ _PLAIN = ((1.0,), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0))
 _ENOUGH, _MANY = 3, 7
 
 
-def curve_figure(p: ORing, rows: Sequence[CurveRow], rejected: Sequence[CurveRow] = ()) -> Figure:
+def curve_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()) -> Figure:
     """h* over |U|, both logarithmic, a line a stroke; rejected states are marked on the axis."""
     from matplotlib.figure import Figure
 
@@ -47,7 +47,7 @@ def curve_figure(p: ORing, rows: Sequence[CurveRow], rejected: Sequence[CurveRow
     return figure
 
 
-def fitted_exponent(rows: Sequence[CurveRow]) -> float | None:
+def fitted_exponent(rows: Sequence[FilmRow]) -> float | None:
     """n of h* ~ |U|^n, one for both strokes, by least squares of the logarithms.
 
     Only plain results count. None where no stroke has two of them.
@@ -76,7 +76,7 @@ def plain_ticks(low: float, high: float) -> list[float]:
     return [float(v) for v in MaxNLocator(4).tick_values(low, high) if low <= v <= high]
 
 
-def _draw_stroke(axes: Axes, stroke: str, rows: Sequence[CurveRow]) -> None:
+def _draw_stroke(axes: Axes, stroke: str, rows: Sequence[FilmRow]) -> None:
     """A line with the bars of the estimated error; hollow markers with a word where not ok."""
     speed, film, error = _columns(rows)
     colour, marker = style.COLOURS[stroke], style.MARKERS[stroke]
@@ -104,7 +104,7 @@ def _draw_stroke(axes: Axes, stroke: str, rows: Sequence[CurveRow]) -> None:
             )
 
 
-def _draw_slope(axes: Axes, rows: Sequence[CurveRow]) -> None:
+def _draw_slope(axes: Axes, rows: Sequence[FilmRow]) -> None:
     """A line above the curve at the slope that was measured."""
     exponent = fitted_exponent(rows)
     if exponent is None:
@@ -117,7 +117,7 @@ def _draw_slope(axes: Axes, rows: Sequence[CurveRow]) -> None:
     axes.plot(ends, line, color="0.45", linestyle="--", linewidth=1.0, label=label)
 
 
-def _draw_rejected(axes: Axes, rejected: Sequence[CurveRow]) -> None:
+def _draw_rejected(axes: Axes, rejected: Sequence[FilmRow]) -> None:
     """Crosses on the lower axis: at these speeds there is no result."""
     for stroke in style.STROKES:
         speeds = [abs(row.rod_speed_mm_s) for row in rejected if row.stroke == stroke]
@@ -133,7 +133,7 @@ def _draw_rejected(axes: Axes, rejected: Sequence[CurveRow]) -> None:
             )
 
 
-def _set_limits(axes: Axes, rows: Sequence[CurveRow], rejected: Sequence[CurveRow]) -> None:
+def _set_limits(axes: Axes, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> None:
     """Logarithmic axes around every speed and thickness, with room for the legend above."""
     speeds = [abs(row.rod_speed_mm_s) for row in (*rows, *rejected)]
     films = [row.h_star_um for row in rows]
@@ -151,11 +151,11 @@ def _tick_plainly(axis: Axis, limits: tuple[float, float]) -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def _by_speed(rows: Sequence[CurveRow]) -> list[CurveRow]:
+def _by_speed(rows: Sequence[FilmRow]) -> list[FilmRow]:
     return sorted(rows, key=lambda row: abs(row.rod_speed_mm_s))
 
 
-def _columns(rows: Sequence[CurveRow]) -> tuple[Array, Array, Array]:
+def _columns(rows: Sequence[FilmRow]) -> tuple[Array, Array, Array]:
     """|U|, h* and its error (per cent, nan where not known), by rising speed: arrays (n,)."""
     table = [
         (abs(row.rod_speed_mm_s), row.h_star_um, row.h_star_error_percent)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softehl.cases.harness.curve import CurveFolder, CurveRow
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import View, section_figure
+from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.telling import read_profile, read_section
 
 if TYPE_CHECKING:
     from softehl.cases.seal.parameters import ORing
@@ -18,27 +20,27 @@ PICTURES = ("curve", "profiles", "section")
 """Names of the files, each .png and .svg."""
 
 
-def write_plots(p: ORing, curve: CurveFolder, rejected: Sequence[CurveRow] = ()) -> None:
-    """Draw every picture of a run into its folder; none where it has no results.
+def write_plots(
+    p: ORing, folder: Path, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()
+) -> None:
+    """Draw every picture of a run, whose rows have their files in its folder, into the folder.
 
     Raises OSError, and ValueError where a profile or a section cannot be read back.
     """
-    if not curve.rows:
-        return
     import matplotlib
 
-    results = curve.profiles()
-    fastest = _fastest(curve.rows)
-    views = [View(row, at, curve.section(row)) for row, at in results if row in fastest]
+    results = [(row, read_profile(folder, row)) for row in rows]
+    fastest = _fastest(rows)
+    views = [View(row, at, read_section(folder, row)) for row, at in results if row in fastest]
     views = [view for view in views if view.complete]
     with matplotlib.rc_context(style.STYLE):
-        style.save(curve_figure(p, curve.rows, rejected), curve.path / "curve")
-        style.save(profiles_figure(p, results), curve.path / "profiles")
+        style.save(curve_figure(p, rows, rejected), folder / "curve")
+        style.save(profiles_figure(p, results), folder / "profiles")
         if views:
-            style.save(section_figure(p, views), curve.path / "section")
+            style.save(section_figure(p, views), folder / "section")
 
 
-def _fastest(rows: Sequence[CurveRow]) -> list[CurveRow]:
+def _fastest(rows: Sequence[FilmRow]) -> list[FilmRow]:
     """Of each stroke the row of the highest speed: there the film changes the contact most."""
     return [
         max((row for row in rows if row.stroke == stroke), key=lambda row: abs(row.rod_speed_mm_s))

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softehl.cases.harness.curve import CurveRow
-from softehl.cases.harness.observer import OK, Profile
+from softehl.cases.harness.row import OK
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import plain_ticks
+from softehl.cases.seal.state import FilmRow, Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from softehl.cases.seal.parameters import ORing
 
-Results = Sequence[tuple[CurveRow, Profile]]
+Results = Sequence[tuple[FilmRow, Profile]]
 Colour = tuple[float, float, float, float]
 
 _MARGIN_MM = 0.3
@@ -51,7 +51,7 @@ def profiles_figure(p: ORing, results: Results) -> Figure:
     return figure
 
 
-def _coloured(results: Results, stroke: str) -> Iterator[tuple[CurveRow, Profile, Colour]]:
+def _coloured(results: Results, stroke: str) -> Iterator[tuple[FilmRow, Profile, Colour]]:
     """The states of a stroke; a speed has one colour for both strokes, dark fast, light slow."""
     from matplotlib import colormaps
 
@@ -62,7 +62,7 @@ def _coloured(results: Results, stroke: str) -> Iterator[tuple[CurveRow, Profile
             yield row, profile, colormaps["viridis"](shades[abs(row.rod_speed_mm_s)])
 
 
-def _show_contact(film: Axes, rows: Sequence[CurveRow]) -> None:
+def _show_contact(film: Axes, rows: Sequence[FilmRow]) -> None:
     """Show the contact and the thin film only: beside it h is a hundred times larger."""
     from matplotlib.ticker import NullLocator
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softehl.cases.harness.curve import CurveRow
-from softehl.cases.harness.observer import Profile, Section
 from softehl.cases.seal.report import style
+from softehl.cases.seal.state import FilmRow, Profile, Section
 from softehl.runtime.arrays import Array, Integers
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ _AROUND = (0.33, 0.44, 0.4)
 class View:
     """A state to be drawn: its row of the curve, the profile of its film and its section."""
 
-    row: CurveRow
+    row: FilmRow
     profile: Profile
     section: Section
 
@@ -172,7 +171,7 @@ def _normals(points: Array, edges: Integers) -> Array:
     return np.asarray(np.divide(total, length, out=total, where=length > 0.0))
 
 
-def _draw_rod(axes: Axes, p: ORing, row: CurveRow) -> None:
+def _draw_rod(axes: Axes, p: ORing, row: FilmRow) -> None:
     """Which way the rod goes, and what the film is."""
     speed = f"{row.rod_speed_mm_s:+g}".replace("-", "\N{MINUS SIGN}")
     name = style.STROKES[row.stroke]

@@ -1,0 +1,134 @@
+"""A case: one declared record of what the harness must know of it; a run: a case with parameters.
+
+A case is what its parameters, its rows and its `solve` make it.  Everything else has a default that
+fits a case whose rows follow the values of one key, a list.
+"""
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.harness.parameters import Parameters
+from softehl.cases.harness.row import Record, Row
+
+P = TypeVar("P", bound=Parameters)
+R = TypeVar("R", bound=Row)
+
+
+class Case(Generic[P, R]):
+    """Base of the declaration of a case; one instance of it, `CASE`, is in the module of the case.
+
+    name, title: what it is called, and what it is in one line.  parameters, row: their classes.
+    list_key: the key whose values the rows follow.  selection: keys that only select rows, which a
+    resumed run may change.  ways: keys that choose a way to the same rows.  files: patterns of the
+    files that it writes beside those of its rows.  shared: name of the folder in which the runs of
+    a sweep leave something for each other, empty for none.
+    """
+
+    name: str
+    title: str
+    parameters: type[P]
+    row: type[R]
+    list_key: str = ""
+    selection: tuple[str, ...] = ()
+    ways: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    shared: str = ""
+
+    def solve(self, parameters: P, observer: Observer, shared: Path | None) -> Outcome:
+        """Compute all rows that are asked for; failure is in the outcome's status.
+
+        shared: folder of what runs leave for each other, None for none.  Imports what is heavy when
+        it is called.
+        """
+        raise NotImplementedError
+
+    def requested(self, parameters: P) -> list[float]:
+        """The keys of all rows that are asked for."""
+        return list(getattr(parameters, self.list_key))
+
+    def rounds(self, parameters: P) -> Sequence[P]:
+        """Parameter sets to be run one after the other; later ones may improve on earlier rows."""
+        return [parameters]
+
+    def pieces(self, parameters: P, rows: Sequence[R], jobs: int) -> list[P]:
+        """What is still to be run, given the rows that are there: up to `jobs` sets side by side,
+        or any number one after the other."""
+        there = {row.key for row in rows}
+        missing = [key for key in self.requested(parameters) if key not in there]
+        shares = [missing[start::jobs] for start in range(jobs)]
+        chosen = [{self.list_key: tuple(share)} for share in shares if share]
+        return [parameters.model_copy(update=update) for update in chosen]
+
+    def label(self, key: float) -> str:
+        """A row of which nothing is known but its key, in words."""
+        return f"{self.list_key} {key:g}"
+
+    def piece_name(self, piece: P) -> str:
+        """What tells a piece from those that run beside it."""
+        return str(self.requested(piece))
+
+    def tables(self, rows: Sequence[R]) -> Mapping[str, Sequence[Record]]:
+        """Further tables that follow from the rows: file name without .csv -> records."""
+        return {}
+
+    def caption(self, rows: Sequence[R]) -> str:
+        """Title of the table on the terminal."""
+        return self.title
+
+    def named(self, rows: Sequence[R]) -> str:
+        """Some rows in words."""
+        return ", ".join(self.label(row.key) for row in rows)
+
+    def complaints(
+        self, parameters: P, rows: Sequence[R], rejected: Sequence[R], advice: str
+    ) -> list[str]:
+        """What is wrong with the rows that are there, in words; empty if nothing.
+
+        advice: what the rejected ones came with.
+        """
+        return [f"not a result: {self.named(rejected)}. {advice}"] if rejected else []
+
+    def notes(self, rows: Sequence[R]) -> list[str]:
+        """What is to be known of rows that are results, but not plain ones."""
+        return []
+
+    def draw(self, parameters: P, folder: Path, rows: Sequence[R], rejected: Sequence[R]) -> None:
+        """Write pictures of a run; the files of its rows can be read from the folder.
+
+        Raises OSError, and ValueError where a file cannot be read back.
+        """
+
+    def share(self, parameters: P) -> tuple[float, str]:
+        """How long a run takes compared with others, and a name that is equal for those which can
+        use what the other leaves in the shared folder."""
+        return 0.0, ""
+
+
+AnyCase = Case[Any, Any]
+Solve = Callable[[Any, Observer], Outcome]
+
+
+def load_case(module: str) -> AnyCase:
+    """The case that a module declares as `CASE`."""
+    case: AnyCase = importlib.import_module(module).CASE
+    return case
+
+
+@dataclass(frozen=True)
+class Run:
+    """A case with its checked parameters.
+
+    shared: folder in which runs leave something for each other, None for none.
+    """
+
+    case: AnyCase
+    parameters: Any
+    shared: Path | None = None
+
+    def solve(self, parameters: Any, observer: Observer) -> Outcome:
+        """Run the case with these parameters."""
+        return self.case.solve(parameters, observer, self.shared)

@@ -1,0 +1,12 @@
+"""What the user gave cannot be used."""
+
+import click
+
+
+class BadInput(click.ClickException):
+    """What the user gave cannot be used; the message is one line.  Exit code 2."""
+
+    exit_code = 2
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.split()))

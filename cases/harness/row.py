@@ -1,0 +1,131 @@
+"""Rows of a table on disk: each column is declared once, with its unit and its meaning.
+
+From the declaration come the columns of a file and their text, what is read back, the entries of
+run.json, the heads of the table on the terminal and the table in the documentation.
+"""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import isnan
+from typing import Any, ClassVar, Self, get_type_hints
+
+from softehl.runtime.io import Cell, number_text
+
+OK = "ok"
+"""Verdict of a row that may be used as a result."""
+
+_MARK = "column"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: its name there, the type of its cells, its unit and its meaning.
+
+    head: what it is called on the terminal, empty if it is not shown there; neighbours with the
+    same head share a column. shown: format of its numbers there.
+    """
+
+    name: str
+    kind: type
+    unit: str
+    meaning: str
+    head: str = ""
+    shown: str = ""
+
+    def read(self, text: str) -> Cell:
+        """The value of a cell.  Raises ValueError."""
+        value: Cell = text if self.kind is str else self.kind(float(text))
+        return value
+
+    def show(self, value: Cell) -> str:
+        """The text of a cell on the terminal; a number that is not known leaves it empty."""
+        return "" if isinstance(value, float) and isnan(value) else format(value, self.shown)
+
+
+def column(unit: str, meaning: str, *, head: str = "", shown: str = "", **default: Any) -> Any:
+    """Declare a field of a :class:`Record` to be a column; see :class:`Column`."""
+    return dataclasses.field(metadata={_MARK: (unit, meaning, head, shown)}, **default)
+
+
+class Record:
+    """Base of a frozen dataclass whose fields by :func:`column` are the columns of a table."""
+
+    @classmethod
+    def columns(cls) -> tuple[Column, ...]:
+        """The columns in order."""
+        hints = get_type_hints(cls)
+        fields: Iterable[Any] = dataclasses.fields(cls)  # type: ignore[arg-type]
+        return tuple(
+            Column(field.name, hints[field.name], *field.metadata[_MARK])
+            for field in fields
+            if _MARK in field.metadata
+        )
+
+    @classmethod
+    def header(cls) -> tuple[str, ...]:
+        """The names of the columns: the first line of the file."""
+        return tuple(column.name for column in cls.columns())
+
+    @classmethod
+    def parse(cls, cells: Sequence[str]) -> Self:
+        """The record from the text of its cells.  Raises ValueError."""
+        given = zip(cls.columns(), cells, strict=True)
+        return cls(**{column.name: column.read(text) for column, text in given})
+
+    @classmethod
+    def part_of(cls, other: Any) -> Self:
+        """The record with the values of the same names of another object."""
+        return cls(**{name: getattr(other, name) for name in cls.header()})
+
+    def cells(self) -> tuple[Cell, ...]:
+        """The values of the columns."""
+        return tuple(getattr(self, name) for name in self.header())
+
+    def as_dict(self) -> dict[str, Cell]:
+        """Column -> value."""
+        return dict(zip(self.header(), self.cells(), strict=True))
+
+
+class Row(Record):
+    """A row of curve.csv.  A case derives its own, with `verdict` as the last column.
+
+    files: names of the files that belong to a row, with {} for :attr:`name`.
+    """
+
+    verdict: str
+    files: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def key(self) -> float:
+        """What tells this row from the others of its run: one of the values asked for."""
+        raise NotImplementedError
+
+    @property
+    def name(self) -> str:
+        """The part of a file name that tells this row from the others of its folder."""
+        return number_text(self.key)
+
+    @property
+    def order(self) -> tuple[Any, ...]:
+        """Sort key of the table."""
+        return (self.key,)
+
+    @property
+    def usable(self) -> bool:
+        """Whether this is a result; what is none goes to the folder `rejected`."""
+        return True
+
+    @property
+    def line(self) -> str:
+        """The row in one line, as it is shown when it is there."""
+        return f"{self.name}: {self.verdict}"
+
+    @classmethod
+    def file_patterns(cls) -> tuple[str, ...]:
+        """Patterns that the files of every row match."""
+        return tuple(file.format("*") for file in cls.files)
+
+    def file_names(self) -> tuple[str, ...]:
+        """The files of this row, in the folder of the table."""
+        return tuple(file.format(self.name) for file in self.files)

@@ -1,0 +1,95 @@
+"""Tables on the terminal and in the documentation, from the declarations of columns and keys."""
+
+import json
+from collections.abc import Sequence
+from itertools import groupby
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from softehl.cases.harness.case import AnyCase
+from softehl.cases.harness.parameters import Key, Parameters, keys_of
+from softehl.cases.harness.row import OK, Column, Record, Row
+
+_WIDTH = 110
+"""Width where stdout is no terminal."""
+
+
+def print_rows(case: AnyCase, rows: Sequence[Row], rejected: Sequence[Row] = ()) -> None:
+    """Print the rows to stdout, at full width where stdout is not a terminal."""
+    _print(rows_table(case, rows, rejected), _WIDTH)
+
+
+def rows_table(case: AnyCase, rows: Sequence[Row], rejected: Sequence[Row] = ()) -> Table:
+    """The rows as a table; a rejected one is flagged and shows no number but the first."""
+    ordered = sorted([*rows, *rejected], key=lambda row: row.order)
+    heads = _heads(case.row)
+    table = Table(
+        title=Text(case.caption(ordered)), box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False
+    )
+    for columns in heads:
+        head = f"{columns[0].head}\n{columns[0].unit}"
+        table.add_column(Text(head), justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    for row in ordered:
+        texts = [_shown(row, columns) for columns in heads]
+        if not row.usable:
+            texts = [texts[0], *("-" for _ in texts[1:])]
+        verdict = row.verdict if row.usable else row.verdict.upper()
+        style = None if row.verdict == OK else ("yellow" if row.usable else "bold red")
+        table.add_row(*(Text(text) for text in [*texts, verdict]), style=style)
+    return table
+
+
+def print_keys(kind: type[Parameters]) -> None:
+    """Print every key with its default, unit, bounds and meaning to stdout."""
+    table = Table(box=SIMPLE, padding=(0, 2, 0, 0), pad_edge=False)
+    for name in ("key", "default", "unit", "allowed", "meaning"):
+        table.add_column(name, no_wrap=name in ("key", "unit"), overflow="fold")
+    for key in keys_of(kind):
+        cells = (key.name, default_text(key), key.unit, key.bounds, key.meaning)
+        table.add_row(*(Text(cell) for cell in cells))
+    _print(table, 2 * _WIDTH)
+
+
+def default_text(key: Key) -> str:
+    """The default as it would be typed, "-" for none."""
+    return "-" if key.default is None else json.dumps(key.default)
+
+
+def key_lines(kind: type[Parameters]) -> list[str]:
+    """The keys of a case as a table for the documentation."""
+    lines = ["| key | default | unit | allowed | meaning |", "|---|---|---|---|---|"]
+    for key in keys_of(kind):
+        default = "-" if key.default is None else f"`{default_text(key)}`"
+        lines.append(_line(f"`{key.name}`", default, key.unit, key.bounds, key.meaning))
+    return lines
+
+
+def column_lines(kind: type[Record]) -> list[str]:
+    """The columns of a table as a table for the documentation."""
+    lines = ["| column | unit | meaning |", "|---|---|---|"]
+    return [*lines, *(_line(f"`{c.name}`", c.unit, c.meaning) for c in kind.columns())]
+
+
+def _line(*cells: str) -> str:
+    return f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
+
+
+def _heads(kind: type[Record]) -> list[list[Column]]:
+    """The columns that are shown; neighbours under one head together."""
+    shown = [column for column in kind.columns() if column.head]
+    return [list(group) for _, group in groupby(shown, key=lambda column: column.head)]
+
+
+def _shown(row: Row, columns: Sequence[Column]) -> str:
+    return " ".join(column.show(getattr(row, column.name)) for column in columns).strip()
+
+
+def _print(table: Table, width: int) -> None:
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=width)
+    console.print(table)

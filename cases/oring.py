@@ -1,0 +1,99 @@
+"""The reciprocating O-ring of section 5.1: Table 1 as one seal."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from softehl.cases.harness.case import Case
+from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.harness.row import Record
+from softehl.cases.seal import plan
+from softehl.cases.seal.leakage import net_leakage
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.report import PICTURES, write_plots
+from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.telling import Teller
+
+
+class ORingCase(Case[ORing, FilmRow]):
+    """One curve: h* over the rod speed, of both strokes, at one sealed pressure."""
+
+    name = "oring"
+    title = "reciprocating O-ring seal: film thickness, friction and leakage over the rod speed"
+    parameters = ORing
+    row = FilmRow
+    selection = ("speeds", "stroke", "solver", "linear", "tolerance")
+    ways = ("solver", "linear")
+    files = (
+        *("leakage.csv", "contact_*.csv", "contact_*.vtu"),
+        *(f"{name}.{kind}" for name in PICTURES for kind in ("png", "svg")),
+    )
+    shared = "contacts"
+
+    def solve(self, parameters: ORing, observer: Observer, shared: Path | None) -> Outcome:
+        """See :class:`Case`; runs of one section share their contact states."""
+        from softehl.cases.seal.run import run
+
+        return run(parameters, Teller(observer), contacts=shared)
+
+    def requested(self, parameters: ORing) -> list[float]:
+        """See :class:`Case`."""
+        return plan.rod_speeds(parameters)
+
+    def rounds(self, parameters: ORing) -> Sequence[ORing]:
+        """See :class:`Case`."""
+        return plan.refinements(parameters)
+
+    def pieces(self, parameters: ORing, rows: Sequence[FilmRow], jobs: int) -> list[ORing]:
+        """See :class:`Case`."""
+        return plan.pieces(parameters, rows, jobs)
+
+    def piece_name(self, piece: ORing) -> str:
+        """See :class:`Case`."""
+        return piece.stroke
+
+    def label(self, key: float) -> str:
+        """See :class:`Case`."""
+        return f"U = {key:+g} mm/s"
+
+    def tables(self, rows: Sequence[FilmRow]) -> Mapping[str, Sequence[Record]]:
+        """See :class:`Case`."""
+        return {"leakage": net_leakage(rows)}
+
+    def caption(self, rows: Sequence[FilmRow]) -> str:
+        """See :class:`Case`."""
+        return f"Film thickness, p_s = {rows[0].sealed_pressure_MPa:g} MPa"
+
+    def complaints(
+        self, parameters: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow], advice: str
+    ) -> list[str]:
+        """See :class:`Case`."""
+        collapsed = super().complaints(parameters, rows, rejected, advice)
+        outside = plan.outside_tolerance(parameters, rows)
+        words = [f"collapsed film, {complaint}" for complaint in collapsed]
+        if outside:
+            words.append(f"h* not known to {parameters.tolerance:g} %: {self.named(outside)}")
+        return words
+
+    def notes(self, rows: Sequence[FilmRow]) -> list[str]:
+        """See :class:`Case`."""
+        chosen = {word: [row for row in rows if row.verdict == word] for word in plan.DOUBTS}
+        return [
+            f"{word}: {plan.DOUBTS[word]}: {self.named(some)}; use a finer mesh (larger density)"
+            for word, some in chosen.items()
+            if some
+        ]
+
+    def draw(
+        self, parameters: ORing, folder: Path, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]
+    ) -> None:
+        """See :class:`Case`."""
+        write_plots(parameters, folder, rows, rejected)
+
+    def share(self, parameters: ORing) -> tuple[float, str]:
+        """See :class:`Case`."""
+        from softehl.cases.seal.contact_store import contact_key
+
+        return parameters.density, contact_key(parameters)
+
+
+CASE = ORingCase()

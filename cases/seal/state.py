@@ -1,0 +1,258 @@
+"""The states of a seal: what one is, and what a run tells of it while it runs.
+
+Units are mm, MPa, N, s; film thicknesses are in micrometres.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from math import nan
+from typing import Any, Protocol
+
+from softehl.cases.harness import observer as harness
+from softehl.cases.harness.files import Cells
+from softehl.cases.harness.row import OK, Row, column
+from softehl.runtime.arrays import Array
+from softehl.runtime.io import number_text
+
+COLLAPSED = "collapsed"
+"""Verdict of a state on the spurious collapsed branch of a too coarse mesh: never a result."""
+UNDER_RESOLVED = "under-resolved"
+"""Verdict of a state whose inlet is shorter than the mesh can show: h* may be far off."""
+OSCILLATING = "oscillating"
+"""Verdict of a state whose film zigzags from node to node: h* is sound, the profile is not."""
+
+Section = Cells
+"""A deformed section: points are (z, r)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Fields along the film, sealed side first; five arrays of one length (n,)."""
+
+    x_mm: Array
+    h_um: Array
+    p_MPa: Array
+    tau_MPa: Array
+    flux_mm2_s: Array
+
+
+PROFILE_COLUMNS = tuple(field.name for field in fields(Profile))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilmRow(Row):
+    """The numbers of one converged soft-EHL state: a row of `curve.csv`."""
+
+    files = ("profile_{}.csv", "section_{}.vtu")
+
+    sealed_pressure_MPa: float = column("MPa", "sealed pressure p_s")
+    rod_speed_mm_s: float = column(
+        "mm/s", "rod speed U, + = outstroke (to the air side)", head="U", shown="+g"
+    )
+    h_star_um: float = column(
+        "um", "film thickness h* = q / u of (16), u = U / 2", head="h*", shown=".4g"
+    )
+    h_star_error_percent: float = column(
+        "%",
+        "estimated error of h*, + where it is too large; nan where not known",
+        head="error",
+        shown="+.2f",
+        default=nan,
+    )
+    h_min_um: float = column("um", "least film thickness at a node", head="h min", shown=".4g")
+    p_max_MPa: float = column("MPa", "largest film pressure", head="p max", shown=".4f")
+    pressure_jump_max_MPa: float = column(
+        "MPa", "largest jump of the pressure at a facet; 0 for continuous pressure"
+    )
+    rod_friction_N: float = column(
+        "N", "friction force of the film on the rod", head="friction", shown=".4g"
+    )
+    leak_rate_mm3_s: float = column(
+        "mm3/s", "leak rate 2 pi R q, + = to the air side", head="leak", shown=".4g"
+    )
+    contact_start_mm: float = column(
+        "mm", "sealed end of the contact, where h is 20 um", head="contact", shown=".2f"
+    )
+    contact_end_mm: float = column(
+        "mm", "air end of the contact, where h is 20 um", head="contact", shown="+.2f"
+    )
+    newton_iterations: int = column(
+        "", "iterations of Newton's method for this state", head="Newton"
+    )
+    flux_variation: float = column(
+        "", "relative spread of the element-mean flux outside cavitation; 0 in exact arithmetic"
+    )
+    moment_N_mm: float = column("N mm", "torque that holds the mean rotation of the section")
+    contact_p_max_MPa: float = column("MPa", "largest pressure of the frictionless contact")
+    oscillation_index: float = column(
+        "", "largest zigzag of h over the mid contact, relative; a zigzag of amplitude a has 4 a/h"
+    )
+    inlet_segments: float = column(
+        "", "segments over which the film narrows from 10 to 1.5 times h* at its inlet"
+    )
+    density: int = column("", "density of the mesh that the state was solved on")
+    verdict: str = column("", "`ok`, `oscillating` or `under-resolved`; `collapsed` is no result")
+
+    @property
+    def key(self) -> float:
+        """The rod speed U."""
+        return self.rod_speed_mm_s
+
+    @property
+    def name(self) -> str:
+        """Sealed pressure and rod speed."""
+        return f"{number_text(self.sealed_pressure_MPa)}_{number_text(self.rod_speed_mm_s)}"
+
+    @property
+    def order(self) -> tuple[float, bool, float]:
+        """Sealed pressure, outstroke first, falling |U|."""
+        return self.sealed_pressure_MPa, self.rod_speed_mm_s < 0, -abs(self.rod_speed_mm_s)
+
+    @property
+    def usable(self) -> bool:
+        """Whether this is a result (a collapsed film never is)."""
+        return self.verdict != COLLAPSED
+
+    @property
+    def line(self) -> str:
+        """Place and film thickness."""
+        place = f"p_s = {self.sealed_pressure_MPa:g} MPa, U = {self.rod_speed_mm_s:+g} mm/s"
+        value = f"h* = {self.h_star_um:.4g} um" if self.usable else f"{self.verdict}: not a result"
+        return f"{place}: {value}"
+
+    @property
+    def stroke(self) -> str:
+        """ "out" or "in"."""
+        return "out" if self.rod_speed_mm_s > 0 else "in"
+
+    def within(self, tolerance: float) -> bool:
+        """Whether h* is a plain result whose error is known to be at most so many per cent."""
+        return self.verdict == OK and abs(self.h_star_error_percent) <= tolerance
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FilmState(FilmRow):
+    """One converged soft-EHL state: its row, and the fields that it comes from.
+
+    advice: what to do about a verdict that is not "ok".
+    """
+
+    advice: str
+    profile: Profile
+    section: Section
+
+    @property
+    def sealed_pressure(self) -> float:
+        """Sealed pressure p_s, MPa."""
+        return self.sealed_pressure_MPa
+
+    @property
+    def rod_speed(self) -> float:
+        """U in mm/s, + = outstroke."""
+        return self.rod_speed_mm_s
+
+
+@dataclass(frozen=True, eq=False)
+class ContactState:
+    """The frictionless contact solution (9)-(10) at one sealed pressure, before any film.
+
+    x_mm, p_MPa: (n,), contact pressure along the lubricated arc, sealed side first.
+    """
+
+    sealed_pressure: float
+    p_max_MPa: float
+    contact_start_mm: float
+    contact_end_mm: float
+    x_mm: Array
+    p_MPa: Array
+    section: Section
+
+
+def place(sealed_pressure: float, stroke: str) -> dict[str, Any]:
+    """What tells a stage from others of its name, as run.json has it."""
+    return {"sealed_pressure_MPa": sealed_pressure, "stroke": stroke}
+
+
+@dataclass(frozen=True)
+class StageRecord(harness.StageRecord):
+    """What one stage of the path cost; its parameter is a load, a weighting factor or a speed."""
+
+    @property
+    def stroke(self) -> str:
+        """ "out", "in" or, before the strokes part, "both"."""
+        return str(self.where["stroke"])
+
+
+@dataclass(frozen=True)
+class Outcome(harness.Outcome):
+    """What a run reached: its film states, and the cost of its stages."""
+
+    states: tuple[FilmState, ...]
+    stages: tuple[StageRecord, ...] = ()
+
+    @property
+    def unknowns_total(self) -> int:
+        """Number of all unknowns."""
+        return self.unknowns["total"]
+
+    @property
+    def unknowns_pressure(self) -> int:
+        """Number of those that are film pressures."""
+        return self.unknowns["pressure"]
+
+
+class Observer(Protocol):
+    """The listener a run of a seal reports to.  Calls come in order, from one thread."""
+
+    def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
+        """A stage begins.  steps: how many are expected, None if the path decides."""
+        return None
+
+    def step(
+        self,
+        *,
+        label: str,
+        parameter: float,
+        iterations: int,
+        residuals: Sequence[float],
+        fraction: float | None,
+    ) -> None:
+        """A step of the path converged.
+
+        label: name of the path parameter as it is shown, for instance "U [mm/s]" or "load".
+        parameter: its value.  residuals: norms of Newton's iterates.  fraction: share of the stage
+        done in [0, 1], if known.
+        """
+        return None
+
+    def contact_state(self, state: ContactState) -> None:
+        """The contact stage is done."""
+        return None
+
+    def film_state(self, state: FilmState) -> None:
+        """A requested speed converged: keep it now."""
+        return None
+
+
+class Silent(Observer):
+    """The observer that does nothing (for tests and scripts)."""
+
+    def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
+        """See :class:`Observer`."""
+
+    def step(
+        self,
+        *,
+        label: str,
+        parameter: float,
+        iterations: int,
+        residuals: Sequence[float],
+        fraction: float | None,
+    ) -> None:
+        """See :class:`Observer`."""
+
+    def contact_state(self, state: ContactState) -> None:
+        """See :class:`Observer`."""
+
+    def film_state(self, state: FilmState) -> None:
+        """See :class:`Observer`."""

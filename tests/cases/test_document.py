@@ -1,0 +1,40 @@
+"""Tables of the documentation that follow from declarations."""
+
+from pathlib import Path
+
+import pytest
+
+from softehl.cases.document import DOCS, renewed
+from softehl.cases.harness.case import load_case
+from softehl.cases.harness.parameters import keys_of
+from softehl.cases.shipped import SHIPPED
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_tables_are_current(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert renewed(text) == text, "run `python -m softehl.cases.document`"
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_columns_of_every_case_are_documented(name: str) -> None:
+    text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    assert f"<!-- columns {name} -->" in text
+    for column in load_case(SHIPPED[name]).row.columns():
+        assert text.count(f"| `{column.name}` |") == 1
+        assert column.meaning
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_key_has_a_meaning_and_bounds(name: str) -> None:
+    case = load_case(SHIPPED[name])
+    assert case.parameters()  # every key has a default
+    for key in keys_of(case.parameters):
+        assert key.meaning
+        assert key.bounds
+
+
+def test_an_old_table_is_noticed() -> None:
+    stale = "# O-ring\n\n<!-- columns oring -->\n| column |\n<!-- end -->\n"
+    assert "| `h_star_um` | um |" in renewed(stale)
+    assert renewed(renewed(stale)) == renewed(stale)
