@@ -16,12 +16,17 @@ from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 
 
-def _element(name: str, doc: str) -> tuple[Model, Any, Any, Any]:
+Terms = tuple[materials.Energy, materials.Energy]
+"""Isochoric and volumetric term of an energy."""
+PAPER = (materials.MOONEY_RIVLIN, materials.VOLUMETRIC)
+
+
+def _element(name: str, doc: str, terms: Terms) -> tuple[Model, Any, Any, Any]:
     """Arguments that the three solids share: coordinates, displacements, terms of the energy."""
     m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), unroll=True, doc=doc)
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
-    return m, X, u, (materials.MOONEY_RIVLIN.declared(m), materials.VOLUMETRIC.declared(m))
+    return m, X, u, [term.declared(m) for term in terms]
 
 
 def _energy(m: Model, label: str, F: kin.Gradient, material: Any) -> Any:
@@ -38,9 +43,9 @@ def _fields(m: Model, X: Any, u: Any, N: Any, F: kin.Gradient, material: Any) ->
     m.fields(z=z, r=r, J=J, sigma_zz=zz, sigma_rr=rr, sigma_tt=tt, sigma_zr=zr)
 
 
-def plain() -> Definition:
+def plain(name: str = "solid_q4", terms: Terms = PAPER) -> Definition:
     """Displacement element, 2x2 points: Pi = integral of W(F) 2 pi R dA, (1)-(6)."""
-    m, X, u, material = _element("solid_q4", plain.__doc__ or "")
+    m, X, u, material = _element(name, plain.__doc__ or "", terms)
     xi, eta = m.point()
     e = kin.quad4(m, "", X, xi, eta)
     F = kin.gradient(m, "", e.dN, [n / e.R for n in e.N], u)
@@ -49,13 +54,13 @@ def plain() -> Definition:
     return m.finish()
 
 
-def fbar() -> Definition:
+def fbar(name: str = "solid_fbar", terms: Terms = PAPER) -> Definition:
     """F-bar element of de Souza Neto et al. (1996): Fbar = a F, a = (J0/J)^(1/3), J0 at centroid.
 
     P_eff = (J/J0)^(2/3) P(Fbar) is the derivative of the pseudo-potential W(a F) / a^3 with a
     frozen; the tangent differentiates a as well and is exact and unsymmetric.
     """
-    m, X, u, material = _element("solid_fbar", fbar.__doc__ or "")
+    m, X, u, material = _element(name, fbar.__doc__ or "", terms)
     xi, eta = m.point()
     e = kin.quad4(m, "", X, xi, eta)
     centre = kin.quad4(m, "0", X, sp.Integer(0), sp.Integer(0))
@@ -70,7 +75,7 @@ def fbar() -> Definition:
     return m.finish()
 
 
-def taylor() -> Definition:
+def taylor(name: str = "solid_taylor", terms: Terms = PAPER) -> Definition:
     """Under-integrated element with Taylor-expanded gradients, after Korelc and Wriggers (1997).
 
     The gradients of the shape functions are expanded about the centre to first order in xi and
@@ -78,7 +83,7 @@ def taylor() -> Definition:
     of the centre: their mean is then that of the exact ones, as the patch test asks.
     The isochoric energy is taken at the 2x2 points, the volumetric one at the centre only.
     """
-    m, X, u, material = _element("solid_taylor", taylor.__doc__ or "")
+    m, X, u, material = _element(name, taylor.__doc__ or "", terms)
     xi, eta = m.point()
     centre = kin.quad4(m, "0", X, sp.Integer(0), sp.Integer(0))
     R = m.define("R", shapes.interpolate(shapes.quad4(xi, eta), X[1]))
