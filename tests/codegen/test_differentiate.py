@@ -35,6 +35,7 @@ from tests.codegen.workshop import (
     unknowns,
     value,
 )
+from tests.shipped import ENERGIES
 
 AT = inputs("1.3", "0.7", "2.9")
 
@@ -509,4 +510,4 @@ def test_a_wrong_tangent_graph_is_detected() -> None:
 
 def test_shipped_conservative_models_are_those_with_an_energy() -> None:
     found = {name for name, make in ALL.items() if make().conservative}
-    assert found == {"solid_q4", "solid_taylor", "mean_rotation", "axial_spring"}
+    assert found == set(ENERGIES)

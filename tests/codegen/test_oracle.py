@@ -25,11 +25,10 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.kernels import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases
 from tests.codegen.workshop import compiled
+from tests.shipped import ENERGIES, FIELDS
 
 LIMIT = 1e-12
 CASES = {f"{c.family}: {c.label}": c for c in all_cases()}
-ENERGIES = ("solid_q4", "solid_taylor", "mean_rotation", "axial_spring")
-FIELDS = ("solid_q4", "solid_fbar", "solid_taylor", "film", "film_facet")
 
 
 @cache

@@ -1,0 +1,54 @@
+"""What the shipped kernels promise, and typical parameters: one line for each that is added."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Shipped:
+    """Numbers of nodes and of direct unknowns; is there an energy, are there fields?"""
+
+    nodes: int
+    unknowns: int
+    energy: bool = False
+    fields: bool = False
+
+
+SHIPPED = {
+    "solid_q4": Shipped(4, 8, energy=True, fields=True),
+    "solid_fbar": Shipped(4, 8, fields=True),
+    "solid_taylor": Shipped(4, 8, energy=True, fields=True),
+    "follower_pressure": Shipped(2, 4),
+    "contact": Shipped(1, 3),
+    "film": Shipped(2, 4, fields=True),
+    "film_upwind": Shipped(2, 4),
+    "film_facet": Shipped(3, 6, fields=True),
+    "mean_rotation": Shipped(4, 9, energy=True),
+    "axial_spring": Shipped(4, 8, energy=True),
+}
+ENERGIES = tuple(name for name, s in SHIPPED.items() if s.energy)
+FIELDS = tuple(name for name, s in SHIPPED.items() if s.fields)
+
+VALUES = {
+    "mu_1": 3.04,
+    "mu_2": 0.62,
+    "kappa": 500.0,
+    "pressure": 2.5,
+    "offset": 0.01,
+    "force_weight": 0.7,
+    "rod_radius": 25.0,
+    "rod_speed": 400.0,
+    "viscosity": 6.6e-8,
+    "pressure_viscosity": 0.02,
+    "cavitation_penalty": 1e4,
+    "shear_weight": 0.9,
+    "centre_z": 0.1,
+    "centre_r": 25.4,
+    "polar_moment": 7.6,
+    "angle": 0.05,
+    "stiffness": 0.4,
+    "shear_modulus": 3.66,
+    "upwinding": 1.0,
+}
+"""A value of every parameter (mm, MPa, N, s)."""
