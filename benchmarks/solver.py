@@ -24,8 +24,8 @@ from typing import Any
 
 from benchmarks.solver_summary import difference, summary
 from softehl.cases.paper.states import PAPER
+from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.run import run
 from softehl.cases.seal.state import COLLAPSED, Silent
 from softehl.runtime.io import write_json
 

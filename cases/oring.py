@@ -31,7 +31,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def solve(self, parameters: ORing, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`; runs of one section share their contact states."""
-        from softehl.cases.seal.run import run
+        from softehl.cases.seal.method import run
 
         return run(parameters, Teller(observer), contacts=shared)
 

@@ -61,7 +61,7 @@ def test_rooms_import_only_what_they_may(room: str) -> None:
         ("cases", "import softehl.codegen.tools.build"),
         ("cases", "def f():\n    from codegen import graph"),
         ("runtime", "from softehl.codegen.graph.graph import Graph"),
-        ("runtime", "import softehl.cases.seal.run"),
+        ("runtime", "import softehl.cases.seal.method"),
         ("codegen", "from softehl.runtime.fem.rules import gauss"),
     ],
 )

@@ -10,7 +10,7 @@ import numpy as np
 from softehl.cases.paper.item import Item, Product, Scope, Table, density_words
 from softehl.cases.paper.states import SPEEDS, Request, Store, ask, setup
 from softehl.cases.seal.parameters import DENSITIES, ORing
-from softehl.cases.seal.section import build_section
+from softehl.cases.seal.system import build_system
 from softehl.runtime.io import number_text
 
 if TYPE_CHECKING:
@@ -60,8 +60,8 @@ def table_2_densities(scope: Scope) -> tuple[int, ...]:
 @cache
 def unknowns(density: int) -> tuple[int, int]:
     """Numbers of all unknowns and of those of pressure of a mesh, m_p = 4."""
-    layout = build_section(setup(density, 1.0)).layout
-    return layout.total, layout.count("pressure")
+    system = build_system(setup(density, 1.0))
+    return system.layout.total, system.pressure_count
 
 
 def table_2(_: Store, scope: Scope) -> Product:

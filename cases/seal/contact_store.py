@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
+from softehl.cases.seal.contact import contact_problem, contact_stage
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathSettings, contact_problem, contact_stage
-from softehl.cases.seal.section import OringSection
-from softehl.cases.seal.stage import Stage
+from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.system import SealSystem, contact_kernels
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.kernels import load_kernel
@@ -33,13 +33,12 @@ WITHOUT_INFLUENCE = (
 )
 """Parameters that the contact stage does not know."""
 
-_KERNELS = ("contact", "follower_pressure", "mean_rotation")
 _ITERATIONS = 10  # a state of another section is not worth more
 
 
 def contact_key(parameters: ORing) -> str:
     """Name of a contact state: all parameters but those without influence, and the kernels."""
-    kernels = (f"solid_{parameters.solid}", *_KERNELS)
+    kernels = contact_kernels(parameters)
     given = parameters.model_dump(exclude=set(WITHOUT_INFLUENCE))
     given["kernels"] = {name: load_kernel(name).signature for name in kernels}
     return hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()[:32]
@@ -58,40 +57,40 @@ class ContactStore:
         sections = [parameters.model_copy(update={"density": d}) for d in among]
         return sorted((p.density for p in sections if self._path(p).exists()), reverse=True)
 
-    def read(self, section: OringSection) -> Array:
-        """Unknowns to start from; nan, a start that is refused, where no file fits the section."""
-        stored = read_arrays(self._path(section.parameters)) or {}
-        x, layout = section.at_rest(), section.layout
-        for name in _fields(section):
+    def read(self, system: SealSystem) -> Array:
+        """Unknowns to start from; nan, which Newton's method rejects, where no file fits."""
+        stored = read_arrays(self._path(system.parameters)) or {}
+        x, layout = system.at_rest(), system.layout
+        for name in _fields(system):
             part = stored.get(name)
             fits = part is not None and part.shape == (layout.count(name),)
             x[layout.part(name)] = part if fits else np.nan
         return x
 
-    def keep(self, section: OringSection, x: Array) -> None:
-        """Leave the contact state x for others; one that cannot be written is not missed."""
+    def keep(self, system: SealSystem, x: Array) -> None:
+        """Leave the contact state x for others; a folder that cannot be written to is no error."""
         if self.folder is None:
             return
-        parts = {name: x[section.layout.part(name)] for name in _fields(section)}
+        parts = {name: x[system.layout.part(name)] for name in _fields(system)}
         with suppress(OSError):
             self.folder.mkdir(parents=True, exist_ok=True)
-            write_arrays(self._path(section.parameters), parts)
+            write_arrays(self._path(system.parameters), parts)
 
     def _path(self, parameters: ORing) -> Path:
         assert self.folder is not None
         return self.folder / f"{contact_key(parameters)}.npz"
 
 
-def _fields(section: OringSection) -> tuple[str, ...]:
+def _fields(system: SealSystem) -> tuple[str, ...]:
     """Fields of a contact state: film pressures, whose number depends on m_p, are all zero."""
-    return tuple(name for name in section.layout.names if name != "pressure")
+    return tuple(field.name for field in system.contact_fields())
 
 
-def stored_contact(section: OringSection, settings: PathSettings, newton: Newton) -> Stage:
+def stored_contact(system: SealSystem, settings: PathSettings, newton: Newton) -> Stage:
     """A stage of one step that verifies a stored state, or corrects it in a few iterations."""
     return contact_stage(
-        section,
-        contact_problem(section, settings, section.parameters.sealed_pressure),
+        system,
+        contact_problem(system, settings, system.parameters.sealed_pressure),
         method="newton, from a stored contact state",
         corrector=replace(newton, max_iterations=_ITERATIONS),
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from softehl.cases.seal.section import OringSection, build_section
+from softehl.cases.seal.system import SealSystem, build_system
 
 ORDER = 2.5
 """Order of convergence of h*: 2 in theory, 2.1 to 3.2 were measured between densities 2 and 4."""
@@ -21,10 +21,10 @@ def coarser_density(density: int) -> Fraction:
     return Fraction(density, 2) if density >= 4 else Fraction(5 * density // 2, 3)
 
 
-def coarser_section(section: OringSection) -> OringSection:
-    """The section on a coarser mesh of the same spacing."""
-    parameters = section.parameters
-    return build_section(parameters, section.disc, coarser_density(parameters.density))
+def coarser_system(system: SealSystem) -> SealSystem:
+    """The system on a coarser mesh of the same spacing."""
+    parameters = system.parameters
+    return build_system(parameters, system.section.disc, coarser_density(parameters.density))
 
 
 def h_star_error(density: int, h_star: float, coarser: float) -> float:

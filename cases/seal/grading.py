@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from softehl.cases.seal.section import OringSection, uniform_disc
+from softehl.cases.seal.section import SealSection, uniform_disc
+from softehl.cases.seal.system import SealSystem
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG, Disc
 from softehl.runtime.mesh.spacing import Spot, graded
@@ -32,14 +33,14 @@ _DENSITY = 2  # for which the sizes are chosen; other densities divide or join i
 _CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
 
 
-def graded_disc(section: OringSection, x: Array) -> Disc:
-    """The disc whose mesh is fine at the contact edges of the contact state x of the section.
+def graded_disc(system: SealSystem, x: Array) -> Disc:
+    """The disc whose mesh is fine at the contact edges of the contact state x.
 
     Segments stay equal where the contact is too small to have edges.
     """
-    disc = uniform_disc(section.parameters)
-    length = arc_positions(section)[-1]
-    edges = contact_edges(section, x)
+    disc = uniform_disc(system.parameters)
+    length = arc_positions(system.section)[-1]
+    edges = contact_edges(system, x)
     if not edges:
         return disc
     steepest = max(edge.rise for edge in edges)
@@ -57,7 +58,7 @@ def graded_disc(section: OringSection, x: Array) -> Disc:
     )
 
 
-def arc_positions(section: OringSection) -> Array:
+def arc_positions(section: SealSection) -> Array:
     """Lengths (arc nodes,) along the undeformed arc from its sealed end, mm."""
     disc, nodes = section.disc, section.mesh.arc_nodes
     z, r = (section.mesh.points[nodes] - disc.centre).T
@@ -73,13 +74,13 @@ class Edge:
     rise: float
 
 
-def contact_edges(section: OringSection, x: Array) -> list[Edge]:
+def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
     """Where and how steeply the contact of the state x begins and ends along the arc.
 
     The square of the pressure is a straight line there, taken from the second and third node that
     touch; none where fewer than three do.
     """
-    s, pressure = arc_positions(section), -x[section.layout.part("rod")]
+    s, pressure = arc_positions(system.section), -system.rod_multipliers(x)
     touching = np.flatnonzero(pressure > 0.0)
     if len(touching) < 3:
         return []

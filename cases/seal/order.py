@@ -6,99 +6,63 @@ the common film thickness, and the force on the seal passes from the higher to t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from softehl.cases.seal.path import Film, PathSettings, film_problem
-from softehl.cases.seal.section import OringSection, build_section, flux_scales
-from softehl.cases.seal.stage import Stage
+from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.system import PRESSURE, SealSystem
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.assembly import Assembler
-from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.rules import lagrange, pressure_nodes
 
 REFERENCE_ORDER = 4
 """Order from which lower ones are reached."""
 
-_DISPLACEMENTS = {"film": 4, "facet": 6, "upwind": 4}  # columns of a dof map that are no pressures
+_HIGHER = "higher"  # the field of its pressures beside those of the lower order
 
 
 @dataclass(frozen=True, eq=False)
 class OrderPair:
-    """A section of low pressure order, the same of higher order, and both in one.
+    """A system of low pressure order, the same of higher order, and both in one.
 
-    both: the low one with the pressures of the high one as a further field, "higher".
+    both: the low one with the pressures of the high one as a further field, the last.
     """
 
-    low: OringSection
-    high: OringSection
-    both: OringSection
+    low: SealSystem
+    high: SealSystem
+    both: SealSystem
 
     @classmethod
-    def of(cls, low: OringSection) -> OrderPair:
-        """The pair for a section of an order below REFERENCE_ORDER."""
+    def of(cls, low: SealSystem) -> OrderPair:
+        """The pair for a system of an order below REFERENCE_ORDER."""
         parameters = low.parameters.model_copy(update={"pressure_order": REFERENCE_ORDER})
-        high = build_section(parameters, low.disc)
-        before, count = low.layout.total, high.layout.count("pressure")
-        layout = DofLayout((*low.layout.names, "higher"), (*low.layout.counts, count))
-        blocks = list(low.problem.assembler.blocks)
-        for block in high.problem.assembler.blocks:
-            if block.name in _DISPLACEMENTS:
-                dofs = block.dofs.copy()
-                dofs[:, _DISPLACEMENTS[block.name] :] += before - high.layout.part("pressure").start
-                blocks.append(replace(block, name=f"higher_{block.name}", dofs=dofs))
-        assembler = Assembler.build(layout.total, blocks)
-        problem = replace(low.problem, assembler=assembler, layout=layout)
-        return cls(low, high, replace(low, layout=layout, problem=problem))
+        high = SealSystem.of(parameters, low.section)
+        return cls(low, high, low.with_pressure(_HIGHER, REFERENCE_ORDER))
 
-    def problem(self, settings: PathSettings, film: Film, share: float) -> Problem:
+    def problem(self, film: FilmLoads, share: float) -> Problem:
         """The film whose forces come from the low order by `share`, from the high one by the rest.
 
         At share = 1 the high pressures are without influence: the low order's own equations.
         """
-        alone = film_problem(self.both, settings, film)
-        given = alone.parameters
-        both = {}
-        for name in _DISPLACEMENTS:
-            if name in given:
-                names = alone.assembler.block(name).kernel.parameters
-                both[f"higher_{name}"] = dict(zip(names, given[name].tolist(), strict=True))
-        low = {}
-        for name in {"film", "upwind"} & given.keys():
-            both[f"higher_{name}"]["force_weight"] = 1.0 - share
-            low[name] = {"force_weight": share}
-        shared = alone.with_parameters(**low, **both)
-        ends = self.both.layout.dofs("higher")[[0, -1]]
-        return replace(
-            shared,
-            fixed=np.concatenate([shared.fixed, ends]),
-            values=np.concatenate([shared.values, [film.sealed_pressure, 0.0]]),
-            scales={
-                **shared.scales,
-                "higher": flux_scales(self.both, film.speed, film.gap, "higher"),
-            },
-        )
+        return self.both.film_problem(film, {PRESSURE: share, _HIGHER: 1.0 - share})
 
     def start(self, high: Array) -> Array:
         """Unknowns of both from those of the higher order: its pressures, sampled for the lower."""
-        x = np.concatenate([transferred(high, self.high, self.low), self._pressures(high)])
-        return np.asarray(x)
-
-    def _pressures(self, high: Array) -> Array:
-        return high[self.high.layout.part("pressure")]
+        low = transferred(high, self.high, self.low)
+        return np.concatenate([low, self.high.pressures(high)])
 
     def low_part(self, x: Array) -> Array:
         """Unknowns of the low order among those of both."""
         return x[: self.low.layout.total].copy()
 
-    def stage(self, settings: PathSettings, film: Film) -> Stage:
+    def stage(self, settings: PathSettings, film: FilmLoads) -> Stage:
         """The forces pass from the higher to the lower order at one rod speed."""
         orders = (s.parameters.pressure_order for s in (self.high, self.low))
         return Stage(
             name="order {} to {}".format(*orders),
-            problem_at=lambda share: self.problem(settings, film, share),
+            problem_at=lambda share: self.problem(film, share),
             start=0.0,
             stop=1.0,
             steps=settings.order_steps,
@@ -107,13 +71,11 @@ class OrderPair:
         )
 
 
-def transferred(x: Array, source: OringSection, target: OringSection) -> Array:
+def transferred(x: Array, source: SealSystem, target: SealSystem) -> Array:
     """Unknowns of `target` that say what x says of `source`; pressures are sampled at its nodes."""
     y = target.at_rest()
-    for name in source.layout.names:
-        if name != "pressure":
-            y[target.layout.part(name)] = x[source.layout.part(name)]
+    for field in source.contact_fields():
+        y[target.layout.part(field.name)] = x[source.layout.part(field.name)]
     nodes = [pressure_nodes(s.parameters.pressure_order) for s in (source, target)]
-    given, wanted = (s.problem.assembler.block("film").dofs[:, 4:] for s in (source, target))
-    y[wanted] = x[given] @ lagrange(*nodes)[:, :, 0].T
+    y[target.pressure_dofs()] = x[source.pressure_dofs()] @ lagrange(*nodes)[:, :, 0].T
     return y

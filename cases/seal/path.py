@@ -1,27 +1,42 @@
-"""The solution path of section 4 of the paper: contact, from contact to film, falling speed.
+"""Following a solution path stage by stage (section 4 of the paper): contact, film, falling speed.
 
-A stage is a family of problems in one parameter. During contact the rod is held 10 micrometres
-off; the film starts at high speed and without shear, where its equations are mild.
+A stage is a family of problems in one parameter. A stage that does not reach its end is a value,
+`StageFailed`, that says how far it came and what may help.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import TypeAlias
 
-import numpy as np
-
-from softehl.cases.seal.section import OringSection, film_guard, flux_scales
-from softehl.cases.seal.stage import Stage
+from softehl.cases.seal.state import Observer, StageRecord, place
+from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.newton import Corrector, NonlinearProblem
-from softehl.runtime.solve.solution import Point
+from softehl.runtime.solve.continuation import Continuation
+from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
+from softehl.runtime.solve.predictor import Predictor
+from softehl.runtime.solve.solution import Branch, Point, Status
 from softehl.runtime.solve.steps import StepRule
 
-Stroke = Literal["out", "in"]
+FOLD = (
+    "the path ends or turns back there, as it does when the film collapses on a mesh that is too "
+    "coarse: use a finer mesh (larger density)"
+)
+
+CLOSED = 0.05
+"""Least film thickness, in h*, below which a path ends because the film closes."""
+
+CLOSING = (
+    "the film closes: at a node it is only {:.2g} um thick there, and would be negative beyond; "
+    "use a finer mesh (larger density) or a higher pressure_order"
+)
+
+ROLLING = (
+    'with rotation = "free" hardly anything but the film turns or holds the section: use "fixed"'
+)
 
 
 @dataclass(frozen=True)
@@ -49,231 +64,152 @@ class PathSettings:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Film:
-    """Loads of the film stages.
+def _nothing(point: Point) -> None:
+    """Default of Stage.on_point."""
 
-    speed: |U|, mm/s. weight: of the film forces, 1 - weight of the contact forces. shear: weight of
-    the shear stress. multipliers, gap: (arc nodes,) rod multipliers, MPa, and distance of the rod,
-    mm, of the contact stage.
-    moment: moment on the section (N mm) if it is free to roll, None if its rotation is held.
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A family of problems in one parameter, to be followed from `start` to `stop`.
+
+    name, sealed_pressure, stroke: what observers and records call it. waypoints: parameters
+    hit exactly. shown: the parameter as it is reported (mm/s for a path in log |U|). method: how
+    it is solved, for the record. corrector: what solves it, None for the path driver's Newton.
+    predictor: how it is guessed.
     """
 
+    name: str
+    problem_at: Callable[[float], NonlinearProblem]
+    start: float
+    stop: float
+    steps: StepRule
     sealed_pressure: float
-    stroke: Stroke
-    speed: float
-    multipliers: Array
-    gap: Array
-    weight: float = 1.0
-    shear: float = 1.0
-    moment: float | None = None
+    stroke: str
+    waypoints: tuple[float, ...] = ()
+    method: str = "newton"
+    corrector: Corrector | None = None
+    predictor: Predictor = "secant"
+    on_point: Callable[[Point], None] = _nothing
+    shown: Callable[[float], float] = float
+
+    def fraction(self, parameter: float) -> float:
+        """Share of the way, 0 to 1."""
+        way = self.stop - self.start
+        return (parameter - self.start) / way if way else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class StageFailed:
+    """A stage that did not reach its end. last: the last film that was solved, if there was one."""
+
+    stage: Stage
+    branch: Branch
+    last: FilmNumbers | None = None
 
     @property
-    def rod_speed(self) -> float:
-        """U, positive for outstroke, mm/s."""
-        return self.speed if self.stroke == "out" else -self.speed
+    def message(self) -> str:
+        """How far the stage came, in its own units."""
+        stage, branch = self.stage, self.branch
+        goal = f"{stage.name} {stage.shown(stage.stop):.5g}"
+        if not branch.points:
+            return f"{goal} was not reached, not even the start: {branch.message}"
+        reached = stage.shown(branch.points[-1].parameter)
+        return f"{goal} was not reached, only {reached:.5g}"
+
+    @property
+    def advice(self) -> str:
+        """Why a path ends on the way, and what may help."""
+        if self.last is not None and self.last.h_min < CLOSED * self.last.h_star:
+            return CLOSING.format(1e3 * self.last.h_min)
+        return FOLD if self.branch.points else self.branch.status.advice
+
+    def explain(self, where: str, rotation: str) -> tuple[Status, str]:
+        """Status and message of a run that ends here."""
+        advice = ROLLING if rotation == "free" else self.advice
+        return self.branch.status, f"{where}: {self.message}; {advice}"
 
 
-def squeeze_problem(section: OringSection, settings: PathSettings, closed: float) -> Problem:
-    """Rod and housing on their way from touching the free section (0) to their radii (1), p_s = 0.
+Followed: TypeAlias = Array | StageFailed
+"""Unknowns at the end of a stage, or why it was not reached."""
 
-    A weak axial spring holds the section until the walls do; it is gone at 1.
+
+@dataclass
+class PathDriver:
+    """Follows stages, reports every step and keeps a record of each stage.
+
+    newton: corrector of every step. start_iterations: iterations allowed at the start of a stage,
+    which has no predictor; a step that needs as many is better cut. prefix: of the names of its
+    stages. Only `records` changes, by one with each stage.
     """
-    p = section.parameters
-    rod_gap = 0.5 * (p.inner_diameter - p.rod_diameter)
-    housing_gap = 0.5 * (p.housing_diameter - p.inner_diameter) - p.section_diameter
-    return section.problem.with_parameters(
-        rod={"offset": closed * settings.offset + (1.0 - closed) * max(rod_gap, 0.0)},
-        housing={"offset": (1.0 - closed) * min(housing_gap, 0.0)},
-        spring={"stiffness": settings.spring} if closed < 1.0 else None,
-    )
+
+    observer: Observer
+    newton: Newton = field(default_factory=lambda: Newton(max_iterations=10))
+    start_iterations: int = 40
+    prefix: str = ""
+    records: list[StageRecord] = field(default_factory=list)
+
+    def named(self, prefix: str) -> PathDriver:
+        """One that keeps its records with ours, under a prefix."""
+        return replace(self, prefix=prefix)
+
+    def follow(self, stage: Stage, x0: Array) -> Followed:
+        """Solve at the start of a stage from x0 (n,), then follow it to its end."""
+        stage = replace(stage, name=self.prefix + stage.name)
+        begin = time.perf_counter()
+        self.observer.stage(
+            stage.name, sealed_pressure=stage.sealed_pressure, stroke=stage.stroke, steps=None
+        )
+        points: list[Point] = []
+
+        def report(point: Point) -> None:
+            points.append(replace(point, solution=point.solution.forget()))
+            self.observer.step(
+                label=stage.name,
+                parameter=stage.shown(point.parameter),
+                iterations=point.solution.iterations,
+                residuals=point.solution.residual_norms,
+                fraction=stage.fraction(point.parameter),
+            )
+            stage.on_point(point)
+
+        branch = self._continuation(stage).follow(
+            stage.problem_at,
+            stage.start,
+            stage.stop,
+            x0,
+            waypoints=stage.waypoints,
+            on_point=report,
+        )
+        self.records.append(_record(stage, branch, points, time.perf_counter() - begin))
+        return branch.last.x if branch.converged else StageFailed(stage, branch)
+
+    def follow_all(self, stages: Iterable[Stage], x: Array) -> Followed:
+        """Follow stages one after the other, each from the end of the one before."""
+        for stage in stages:
+            end = self.follow(stage, x)
+            if isinstance(end, StageFailed):
+                return end
+            x = end
+        return x
+
+    def _continuation(self, stage: Stage) -> Continuation:
+        return Continuation(
+            stage.corrector or self.newton,
+            stage.steps,
+            stage.predictor,
+            name=stage.name,
+            starter=stage.corrector or replace(self.newton, max_iterations=self.start_iterations),
+        )
 
 
-def contact_problem(
-    section: OringSection, settings: PathSettings, sealed_pressure: float
-) -> Problem:
-    """Frictionless contact (9)-(10) under a sealed pressure (8).
-
-    The pressure also acts on the arc up to its lowest node, as the film will carry it there; the
-    rod multipliers of that part are the contact pressure in excess of it.
-    """
-    load = {"pressure": sealed_pressure}
-    return section.problem.with_parameters(
-        rod={"offset": settings.offset}, sealed_side=load, sealed_arc=load
-    )
-
-
-def film_problem(section: OringSection, settings: PathSettings, film: Film) -> Problem:
-    """Film forces (18) weighted by w, contact forces by 1 - w; Reynolds equation (25) in full.
-
-    The rod multipliers are frozen, so their contact elements are springs of stiffness rho about
-    the contact pressure: forces that fade without a constraint that would outlive them.
-    """
-    p, p_s, w = section.parameters, film.sealed_pressure, film.weight
-    flow = {
-        "rod_radius": section.rod_radius,
-        "rod_speed": film.rod_speed,
-        "viscosity": p.viscosity,
-        "pressure_viscosity": p.pressure_viscosity,
-    }
-    problem = contact_problem(section, settings, p_s).with_parameters(
-        rod={"force_weight": 1.0 - w} if w < 1.0 else None,
-        sealed_arc={"pressure": p_s * (1.0 - w)},
-        film={
-            **flow,
-            "cavitation_penalty": p.cavitation_penalty,
-            "force_weight": w,
-            "shear_weight": film.shear,
-        },
-        **({"facet": flow} if p.reynolds == "dg" else {}),
-        **({"upwind": _upwinding(section, film)} if p.upwinding else {}),
-    )
-    fixed = [section.film_ends, section.layout.dofs("rod")]
-    values: list[Array | float] = [np.array([p_s, 0.0]), film.multipliers]
-    if film.moment is not None:
-        fixed.append(section.layout.dofs("rotation"))
-        values.append(film.moment)
-    return replace(
-        problem.with_fixed(fixed, values),
-        scales={**problem.scales, "pressure": flux_scales(section, film.speed, film.gap)},
-        guards=(*problem.guards, film_guard(section)),
-    )
-
-
-def _upwinding(section: OringSection, film: Film) -> dict[str, float]:
-    """Parameters of the term that moves the load of the pressure bubbles downstream."""
-    p = section.parameters
-    return {
-        "rod_radius": section.rod_radius,
-        "rod_speed": film.rod_speed,
-        "viscosity": p.viscosity,
-        "shear_modulus": p.shear_modulus,
-        "upwinding": p.upwinding * math.copysign(1.0, film.rod_speed),
-        "force_weight": film.weight,
-    }
-
-
-def squeeze_stage(section: OringSection, settings: PathSettings) -> Stage:
-    """First stage, without pressure: from the undeformed section into the groove."""
-    first = min(settings.first_contact / section.parameters.density**2, 0.05)
-    return Stage(
-        name="squeeze",
-        problem_at=lambda closed: squeeze_problem(section, settings, closed),
-        start=first,
-        stop=1.0,
-        steps=StepRule(first, 0.01 * first, settings.longest_squeeze),
-        sealed_pressure=0.0,
-        stroke="both",
-    )
-
-
-def load_stage(section: OringSection, settings: PathSettings, sealed_pressure: float) -> Stage:
-    """First stage, continued: the sealed pressure rises from 0."""
-    return Stage(
-        name="sealed pressure",
-        problem_at=lambda p_s: contact_problem(section, settings, p_s),
-        start=0.0,
-        stop=sealed_pressure,
-        steps=settings.load_steps,
-        sealed_pressure=sealed_pressure,
-        stroke="both",
-    )
-
-
-def contact_stage(
-    section: OringSection,
-    problem: NonlinearProblem,
-    *,
-    method: str,
-    name: str = "",
-    corrector: Corrector | None = None,
-) -> Stage:
-    """First stage in one step, from a state that is near; its name is by the density if left out.
-
-    problem: the contact problem of the section at its sealed pressure, in whatever form.
-    """
-    p = section.parameters
-    return Stage(
-        name=name or f"contact at density {p.density}",
-        problem_at=lambda _: problem,
-        start=p.sealed_pressure,
-        stop=p.sealed_pressure,
-        steps=StepRule(1.0, 1.0),
-        sealed_pressure=p.sealed_pressure,
-        stroke="both",
-        method=method,
-        corrector=corrector,
-    )
-
-
-def weight_stage(section: OringSection, settings: PathSettings, film: Film) -> Stage:
-    """Second stage: the film takes over from the contact at film.speed, without shear."""
-    return Stage(
-        name="contact to film",
-        problem_at=lambda w: film_problem(section, settings, replace(film, weight=w, shear=0.0)),
-        start=0.0,
-        stop=1.0,
-        steps=settings.weight_steps,
-        sealed_pressure=film.sealed_pressure,
-        stroke=film.stroke,
-    )
-
-
-def release_stage(section: OringSection, settings: PathSettings, film: Film, x: Array) -> Stage:
-    """Second stage, rotation = "free": the moment that held the section fades, without shear."""
-    held = float(x[section.layout.part("rotation")][0])
-    return Stage(
-        name="release",
-        problem_at=lambda s: film_problem(
-            section, settings, replace(film, shear=0.0, moment=(1.0 - s) * held)
-        ),
-        start=0.0,
-        stop=1.0,
-        steps=settings.release_steps,
-        sealed_pressure=film.sealed_pressure,
-        stroke=film.stroke,
-    )
-
-
-def shear_stage(section: OringSection, settings: PathSettings, film: Film) -> Stage:
-    """Second stage, continued: the shear stress of the film begins to act on the section."""
-    return Stage(
-        name="shear",
-        problem_at=lambda s: film_problem(section, settings, replace(film, shear=s)),
-        start=0.0,
-        stop=1.0,
-        steps=settings.shear_steps,
-        sealed_pressure=film.sealed_pressure,
-        stroke=film.stroke,
-    )
-
-
-def speed_stage(
-    section: OringSection,
-    settings: PathSettings,
-    film: Film,
-    speeds: Sequence[float],
-    on_speed: Callable[[Film, Point], None],
-) -> Stage:
-    """Third stage: |U| falls from film.speed through `speeds` (none above it).
-
-    The path parameter is log |U|, in which the film thickness is nearly straight. on_speed is
-    told every step; the speeds it is given are exactly those that were asked for.
-    """
-    exact = {math.log(u): u for u in (*speeds, film.speed)}
-
-    def at(parameter: float) -> Film:
-        return replace(film, speed=exact.get(parameter, math.exp(parameter)))
-
-    return Stage(
-        name="falling speed",
-        problem_at=lambda t: film_problem(section, settings, at(t)),
-        start=math.log(film.speed),
-        stop=math.log(min(speeds)),
-        steps=settings.speed_steps,
-        sealed_pressure=film.sealed_pressure,
-        stroke=film.stroke,
-        waypoints=tuple(math.log(u) for u in speeds),
-        on_point=lambda point: on_speed(at(point.parameter), point),
-        shown=lambda t: at(t).rod_speed,
+def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -> StageRecord:
+    return StageRecord(
+        name=stage.name,
+        seconds=seconds,
+        factorisations=branch.factorisations,
+        iterations=branch.iterations,
+        residual_histories=tuple(p.solution.residual_norms for p in points),
+        parameters=tuple(stage.shown(p.parameter) for p in points),
+        where=place(stage.sealed_pressure, stage.stroke),
+        method=stage.method if branch.converged else f"{stage.method}; ended: {branch.message}",
     )

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from softehl.cases.seal.contact import contact_problem, contact_stage
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathSettings, contact_problem, contact_stage
-from softehl.cases.seal.section import HOUSING, OringSection
-from softehl.cases.seal.stage import Stage
+from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.system import SealSystem
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.kernels import load_kernel
@@ -37,7 +37,7 @@ def finer(parameters: ORing) -> ORing:
 
 @dataclass(frozen=True)
 class _Carrier:
-    """How values go from one mesh to another: of nodes, of elements, of the arc or the rest."""
+    """How values go from one mesh to another: of nodes, of elements, of a part of the boundary."""
 
     words: str
     nodes: Callable[[Array], Array]
@@ -45,17 +45,17 @@ class _Carrier:
     chain: Callable[[str, Array], Array]
 
 
-def _carrier(old: OringSection, new: OringSection) -> _Carrier:
+def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
     """The sharpest way there is: between meshes whose nodes are shared, or by local splines."""
     density = old.mesh.arc // LONG
-    if old.disc == new.disc and new.mesh.arc == 2 * old.mesh.arc:
+    if old.section.disc == new.section.disc and new.mesh.arc == 2 * old.mesh.arc:
         return _Carrier(
             f"prolonged from density {density}",
             lambda values: prolong_nodes(values, density),
             lambda values: prolong_elements(values, density),
             lambda _, values: prolong_chain(values),
         )
-    if old.disc == new.disc and old.mesh.arc == 2 * new.mesh.arc:
+    if old.section.disc == new.section.disc and old.mesh.arc == 2 * new.mesh.arc:
         return _Carrier(
             f"restricted from density {density}",
             lambda values: restrict_nodes(values, density),
@@ -65,7 +65,7 @@ def _carrier(old: OringSection, new: OringSection) -> _Carrier:
     meshes = old.mesh, new.mesh
 
     def chain(name: str, values: Array) -> Array:
-        before, after = (m.arc_nodes if name == "rod" else m.outer_nodes for m in meshes)
+        before, after = (system.section.chains[name][0] for system in (old, new))
         return transfer_chain(*meshes, before, after, values)
 
     return _Carrier(
@@ -77,12 +77,12 @@ def _carrier(old: OringSection, new: OringSection) -> _Carrier:
 
 
 def carried_contact(
-    old: OringSection, new: OringSection, settings: PathSettings, x: Array, name: str = ""
+    old: SealSystem, new: SealSystem, settings: PathSettings, x: Array, name: str = ""
 ) -> tuple[Stage, Array]:
     """A stage of one step that solves for contact on another mesh of a section, and its start.
 
     x: unknowns of the contact state on the old mesh. name: of the stage, by the density if left
-    out. The start is nan, which is refused, where the state cannot be carried over.
+    out. The start is nan, which Newton's method rejects, where the state cannot be carried over.
     """
     carry, p = _carrier(old, new), new.parameters
     pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), "solid", x)
@@ -97,12 +97,14 @@ def carried_contact(
     return stage, _unknowns(old, new, carry, x)
 
 
-def _unknowns(old: OringSection, new: OringSection, carry: _Carrier, x: Array) -> Array:
-    of, to = old.layout, new.layout
+def _unknowns(old: SealSystem, new: SealSystem, carry: _Carrier, x: Array) -> Array:
+    """Every field that contact knows, by what its unknowns stand on."""
     y = new.at_rest()
-    u = x[of.part("displacement")].reshape(-1, 2)
-    y[to.part("displacement")] = carry.nodes(u).ravel()
-    for name in ("rod", *HOUSING):
-        y[to.part(name)] = carry.chain(name, x[of.part(name)])
-    y[to.part("rotation")] = x[of.part("rotation")]
+    for field in old.contact_fields():
+        values = x[old.layout.part(field.name)]
+        if field.on == "nodes":
+            values = carry.nodes(values.reshape(-1, 2)).ravel()
+        elif field.on != "section":
+            values = carry.chain(field.on, values)
+        y[new.layout.part(field.name)] = values
     return y

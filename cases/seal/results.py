@@ -1,4 +1,4 @@
-"""What a converged O-ring state means: h*, pressure, friction, leakage, limits, resolution."""
+"""What a converged state of a seal means: h*, pressure, friction, leakage, limits, resolution."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.path import Film
-from softehl.cases.seal.section import HOUSING, OringSection, sealed_side
+from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.state import ContactState, FilmState, Profile, Section
+from softehl.cases.seal.system import SealSystem
 from softehl.cases.seal.verdict import FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
@@ -37,7 +37,7 @@ MID_CONTACT = 0.1
 """Share of the contact that is left out at either end where oscillations are looked for."""
 
 
-def film_numbers(section: OringSection, problem: Problem, film: Film, x: Array) -> FilmNumbers:
+def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array) -> FilmNumbers:
     """Scalars of a converged film with the unknowns x.
 
     The flux is that at the largest pressure: the mean over the segment for continuous, the mean
@@ -49,7 +49,7 @@ def film_numbers(section: OringSection, problem: Problem, film: Film, x: Array) 
     top = int(np.argmax(at["p"].max(axis=1)))
     whole = run_around(at["p"].min(axis=1) >= 0.0, top)
     jump = 0.0
-    if section.parameters.reynolds == "dg":
+    if system.parameters.reynolds == "dg":
         facets = problem.fields("facet", x)
         flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
         around, whole = slice(max(top - 1, 0), top + 1), slice(max(whole.start - 1, 0), whole.stop)
@@ -57,14 +57,14 @@ def film_numbers(section: OringSection, problem: Problem, film: Film, x: Array) 
         flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
     q = float(flux[around].mean())
     h_star = q / (0.5 * film.rod_speed)
-    z, h = section.arc_film(x)
+    z, h = system.arc_film(x)
     return FilmNumbers(
         speed=film.speed,
         flux=q,
         h_star=h_star,
         h_min=float(h.min()),
         p_max=float(at["p"].max()),
-        friction=float(2.0 * pi * section.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
+        friction=float(2.0 * pi * system.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
         flux_variation=relative_spread(flux[whole]),
         jump=jump,
         oscillation=oscillation(z, h),
@@ -97,14 +97,14 @@ def inlet_segments(h: Array, h_star: float) -> float:
 
 
 def contact_state(
-    section: OringSection, problem: Problem, sealed_pressure: float, x: Array
+    system: SealSystem, problem: Problem, sealed_pressure: float, x: Array
 ) -> ContactState:
     """The frictionless contact state with the unknowns x."""
-    mesh = section.mesh
-    deformed = section.deformed(x)
+    mesh = system.mesh
+    deformed = system.deformed(x)
     arc = deformed[mesh.arc_nodes]
-    pressure = contact_pressure(section, sealed_pressure, x)
-    touching = np.flatnonzero(x[section.layout.part("rod")] < 0.0)
+    pressure = contact_pressure(system, sealed_pressure, x)
+    touching = np.flatnonzero(system.rod_multipliers(x) < 0.0)
     ends = arc[touching[[0, -1]], 0] if len(touching) else np.full(2, np.nan)
     return ContactState(
         sealed_pressure=sealed_pressure,
@@ -113,103 +113,101 @@ def contact_state(
         contact_end_mm=float(ends[1]),
         x_mm=arc[:, 0].copy(),
         p_MPa=pressure,
-        section=section_view(section, problem, x),
+        section=section_view(system, problem, x),
     )
 
 
-def contact_pressure(section: OringSection, sealed_pressure: float, x: Array) -> Array:
+def contact_pressure(system: SealSystem, sealed_pressure: float, x: Array) -> Array:
     """True pressure (arc nodes,): multipliers per current area, plus p_s where it acts, MPa."""
-    mesh = section.mesh
-    current = tributary_areas(section.deformed(x), mesh.arc_segments, mesh.arc_nodes)
-    multipliers = np.minimum(x[section.layout.part("rod")], 0.0)
-    pressure = -multipliers * section.rod_areas / current
-    pressure[: section.lowest] += sealed_pressure
-    pressure[section.lowest] += 0.5 * sealed_pressure  # the pressure ends at this node
+    mesh = system.mesh
+    current = tributary_areas(system.deformed(x), mesh.arc_segments, mesh.arc_nodes)
+    multipliers = np.minimum(system.rod_multipliers(x), 0.0)
+    pressure = -multipliers * system.rod_areas / current
+    pressure[: system.section.lowest] += sealed_pressure
+    pressure[system.section.lowest] += 0.5 * sealed_pressure  # the pressure ends at this node
     return np.asarray(pressure)
 
 
-def housing_pressure(section: OringSection, x: Array) -> Array:
+def housing_pressure(system: SealSystem, x: Array) -> Array:
     """True pressure (nodes,) where the housing or a wall is touched, zero elsewhere, MPa.
 
     The multipliers per current area, and p_s where it acts.
     """
-    mesh, pressure = section.mesh, np.zeros(len(section.mesh.points))
-    nodes, segments, deformed = mesh.outer_nodes, mesh.outer_segments, section.deformed(x)
-    force = sum(np.maximum(-x[section.layout.part(name)], 0.0) for name in HOUSING)
+    pressure, force = np.zeros(len(system.mesh.points)), system.wall_forces(x)
+    (nodes, segments), deformed = system.section.chains["outer_nodes"], system.deformed(x)
     current = tributary_areas(deformed, segments, nodes)
-    wet = tributary_areas(deformed, sealed_side(mesh), nodes)
-    fluid = wet * section.parameters.sealed_pressure
-    force = force * tributary_areas(mesh.points, segments, nodes)
+    wet = tributary_areas(deformed, system.section.elements["sealed_side"], nodes)
+    fluid = wet * system.parameters.sealed_pressure
     pressure[nodes] = np.where(force > 0.0, (force + fluid) / current, 0.0)
     return pressure
 
 
 def film_state(
-    section: OringSection,
+    system: SealSystem,
     problem: Problem,
-    film: Film,
+    film: FilmLoads,
     x: Array,
     verdict: Verdict,
     iterations: int,
 ) -> FilmState:
     """The record of a converged film whose numbers are the last of `verdict`."""
-    numbers = verdict.last or film_numbers(section, problem, film, x)
-    limits = interval_below(*section.arc_film(x), CONTACT_FILM)
+    numbers = verdict.last or film_numbers(system, problem, film, x)
+    limits = interval_below(*system.arc_film(x), CONTACT_FILM)
     return FilmState(
         sealed_pressure_MPa=film.sealed_pressure,
         rod_speed_mm_s=film.rod_speed,
         h_star_um=numbers.h_star / MICROMETRE,
-        density=section.parameters.density,
+        density=system.parameters.density,
         h_min_um=numbers.h_min / MICROMETRE,
         p_max_MPa=numbers.p_max,
         pressure_jump_max_MPa=numbers.jump,
         rod_friction_N=numbers.friction,
-        leak_rate_mm3_s=2.0 * pi * section.rod_radius * numbers.flux,
+        leak_rate_mm3_s=2.0 * pi * system.rod_radius * numbers.flux,
         contact_start_mm=limits[0],
         contact_end_mm=limits[1],
         newton_iterations=iterations,
         flux_variation=numbers.flux_variation,
-        moment_N_mm=float(x[section.layout.part("rotation")][0]),
+        moment_N_mm=system.moment(x),
         contact_p_max_MPa=verdict.reference,
         oscillation_index=numbers.oscillation,
         inlet_segments=numbers.inlet_segments,
         verdict=verdict.word,
         advice=verdict.advice,
-        profile=_profile(section, problem, x),
-        section=section_view(section, problem, x),
+        profile=_profile(system, problem, x),
+        section=section_view(system, problem, x),
     )
 
 
-def section_view(section: OringSection, problem: Problem, x: Array) -> Section:
+def section_view(system: SealSystem, problem: Problem, x: Array) -> Section:
     """The deformed section with its nodal displacements (mm) and Cauchy stresses (MPa).
 
     contact_pressure: that of the housing and its walls, zero elsewhere (MPa).
     """
-    mesh = section.mesh
+    mesh = system.mesh
     stresses = problem.fields("solid", x)
     nodal = nodal_average(
         mesh.quads,
         {name: value for name, value in stresses.items() if name not in ("z", "r")},
         len(mesh.points),
     )
-    displacement = x[section.layout.part("displacement")].reshape(-1, 2).copy()
+    displacement = system.displacements(x).copy()
     return Section(
-        points=section.deformed(x),
+        points=system.deformed(x),
         cells=mesh.quads,
         point_data={
             "displacement": displacement,
-            "contact_pressure": housing_pressure(section, x),
+            "contact_pressure": housing_pressure(system, x),
             **nodal,
         },
     )
 
 
-def _profile(section: OringSection, problem: Problem, x: Array) -> Profile:
+def _profile(system: SealSystem, problem: Problem, x: Array) -> Profile:
     """Fields at the quadrature points of the film, from the sealed to the air side.
 
     Discontinuous pressures are also shown at both ends of each segment: a facet has two rows.
     """
-    block, p = problem.assembler.block("film"), section.parameters
+    block, p = problem.assembler.block("film"), system.parameters
     if p.reynolds == "dg":
         traces = trace_rule(p.pressure_order, p.quadrature, p.quadrature_points)
         block = replace(block, rule=traces)

@@ -63,6 +63,22 @@ def tributary_areas(points: Array, segments: Integers, nodes: Integers) -> Array
     return np.asarray(total[nodes])
 
 
+def contact_data(
+    obstacle: Obstacle, points: Array, nodes: Integers, segments: Integers, stiffness: float
+) -> Array:
+    """Constants (n, 5) of the contact elements of nodes: normal, place, area, augmentation rho.
+
+    points: (V, 2) reference (z, r). nodes, segments: (n,) and (m, 2), see `tributary_areas`.
+    stiffness: MPa, about the shear modulus; rho is stiffness over the width of the node, which is
+    of the order of the stiffness of the material under it: much softer and much stiffer values let
+    single nodes flip for ever.
+    """
+    areas = tributary_areas(points, segments, nodes)
+    width = areas / (2.0 * np.pi * points[nodes, 1])
+    columns = [np.full(len(nodes), v) for v in (obstacle.n_z, obstacle.n_r, obstacle.c)]
+    return np.stack([*columns, areas, stiffness / width], axis=1)
+
+
 def contact_block(
     obstacle: Obstacle,
     kernel: ElementKernel,
@@ -73,14 +89,9 @@ def contact_block(
     """One contact element for each candidate node.
 
     points: (V, 2) reference (z, r). candidates: nodes (n,), their segments (m, 2) and the
-    unknowns (n,) of their multipliers. stiffness: MPa, about the shear modulus; the augmentation
-    rho is stiffness over the width of the node, which is of the order of the stiffness of
-    the material under it: much softer and much stiffer values let single nodes flip for ever.
+    unknowns (n,) of their multipliers. stiffness: MPa, see `contact_data`.
     """
     nodes, segments, multipliers = candidates
-    areas = tributary_areas(points, segments, nodes)
-    width = areas / (2.0 * np.pi * points[nodes, 1])
-    columns = [np.full(len(nodes), v) for v in (obstacle.n_z, obstacle.n_r, obstacle.c)]
-    data = np.stack([*columns, areas, stiffness / width], axis=1)
+    data = contact_data(obstacle, points, nodes, segments, stiffness)
     dofs = gather_rows(displacement_dofs(nodes[:, None]), multipliers)
     return ElementBlock(obstacle.name, kernel, points[nodes].copy(), dofs, data)

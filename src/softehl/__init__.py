@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from softehl.__main__ import main
     from softehl.cases.harness.sweep import Curve
+    from softehl.cases.seal.method import run as run_oring
     from softehl.cases.seal.parameters import ORing
-    from softehl.cases.seal.run import run as run_oring
     from softehl.cases.seal.state import FilmState, Observer, Outcome, Silent
     from softehl.cases.shipped import solve_cases
     from softehl.codegen.language import kinematics
@@ -52,7 +52,7 @@ _PUBLIC = {
     "Status": "softehl.runtime.solve.solution",
     "Study": "softehl.runtime.study",
     "main": "softehl.__main__",
-    "run_oring": "softehl.cases.seal.run:run",
+    "run_oring": "softehl.cases.seal.method:run",
     "solve_cases": "softehl.cases.shipped",
 }
 _MODELLING = {

@@ -21,9 +21,9 @@ from softehl.cases.harness.record import RunRecord
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import NOT_CONVERGED
 from softehl.cases.oring import ORingCase
+from softehl.cases.seal.method import run as solve_really
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import PICTURES
-from softehl.cases.seal.run import run as solve_really
 from softehl.cases.seal.state import (
     COLLAPSED,
     ContactState,

@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.contact_store import (
     WITHOUT_INFLUENCE,
     ContactStore,
     contact_key,
     stored_contact,
 )
+from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathSettings, contact_problem
-from softehl.cases.seal.run import run
-from softehl.cases.seal.section import build_section
-from softehl.cases.seal.stage import Walker
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.state import Outcome, Silent
+from softehl.cases.seal.system import build_system
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.solve.newton import Newton
 
@@ -117,9 +117,9 @@ def test_a_second_curve_has_no_contact_path(solved: tuple[Path, Outcome], contac
 
 def test_a_state_holds_whatever_the_film_is(contacts: Path) -> None:
     def residual(of: ORing) -> float:
-        section = build_section(of)
-        problem = contact_problem(section, PathSettings(), 0.5)
-        return problem.norm(problem.residual(ContactStore(contacts).read(section)))
+        system = build_system(of)
+        problem = contact_problem(system, PathSettings(), 0.5)
+        return problem.norm(problem.residual(ContactStore(contacts).read(system)))
 
     assert max(residual(case()), residual(case(**OTHER))) < 1e-8
     (path,) = contacts.iterdir()
@@ -176,10 +176,10 @@ def spoil(path: Path, rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("damage", [cut, overwrite, empty, shorten, spoil])
 def test_damage_is_seen(damage: Damage, contacts: Path, rng: np.random.Generator) -> None:
-    section, store, (path,) = build_section(case()), ContactStore(contacts), contacts.iterdir()
-    assert np.isfinite(store.read(section)).all()
+    system, store, (path,) = build_system(case()), ContactStore(contacts), contacts.iterdir()
+    assert np.isfinite(store.read(system)).all()
     damage(path, rng)
-    assert not np.isfinite(store.read(section)).all()
+    assert not np.isfinite(store.read(system)).all()
 
 
 @pytest.mark.parametrize("damage", [overwrite, falsify])
@@ -199,21 +199,22 @@ def test_a_damaged_state_costs_little_and_is_replaced(
 
 
 def test_a_stale_state_is_corrected(contacts: Path) -> None:
-    changed = build_section(case(mu_2=0.63))
+    changed = build_system(case(mu_2=0.63))
     (path,) = contacts.iterdir()
     path.rename(contacts / f"{contact_key(changed.parameters)}.npz")
     stage = stored_contact(changed, PathSettings(), Newton())
-    branch, record = Walker().walk(stage, ContactStore(contacts).read(changed), Silent())
-    assert branch.converged
+    driver = PathDriver(Silent())
+    assert not isinstance(driver.follow(stage, ContactStore(contacts).read(changed)), StageFailed)
+    (record,) = driver.records
     assert 0 < (record.factorisations or 0) <= 5
     assert record.residual_histories[-1][-1] < 1e-8
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    section = build_section(case())
+    system = build_system(case())
     store = ContactStore(tmp_path / "file")
-    store.keep(section, section.at_rest())
+    store.keep(system, system.at_rest())
     assert store.densities(case(), (1, 2)) == []
 
 

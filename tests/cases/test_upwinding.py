@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from softehl.cases.seal.fast import METHOD
+from softehl.cases.seal.film import METHOD
+from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import Film, PathSettings, film_problem
-from softehl.cases.seal.run import run
-from softehl.cases.seal.section import build_section
 from softehl.cases.seal.state import Outcome
+from softehl.cases.seal.system import build_system
 from softehl.runtime.fem.problem import Problem
 from tests.cases.oring_cases import oring
-from tests.cases.test_oring_path import Recorder
+from tests.cases.test_method import Recorder
 
 TREATMENTS = ("fe", "dg")
 
@@ -35,15 +35,13 @@ def solved(strength: float, **changes: Any) -> Outcome:
 
 def films(**changes: Any) -> tuple[Problem, np.ndarray]:
     """The film problem of a coarse section, and a state in which nothing is zero."""
-    section, rng = build_section(oring(density=1, **changes)), np.random.default_rng(8)
-    film = Film(1.0, "out", 400.0, rng.uniform(-3, 0, 28), np.zeros(28), weight=0.6)
-    problem = film_problem(section, PathSettings(), film)
-    x = 1e-3 * rng.normal(size=section.layout.total)
-    thickness = section.layout.part("displacement").start + 2 * section.mesh.arc_nodes + 1
-    radii = section.mesh.points[section.mesh.arc_nodes, 1] - section.rod_radius
-    x[thickness] = rng.uniform(5e-4, 2e-3, 28) - radii
-    pressures = section.layout.part("pressure")
-    x[pressures] = rng.uniform(0.5, 3.0, section.layout.count("pressure"))
+    system, rng = build_system(oring(density=1, **changes)), np.random.default_rng(8)
+    film = FilmLoads(1.0, "out", 400.0, rng.uniform(-3, 0, 28), np.zeros(28), weight=0.6)
+    problem = system.film_problem(film)
+    x = 1e-3 * rng.normal(size=system.layout.total)
+    radii = system.mesh.points[system.mesh.arc_nodes, 1] - system.rod_radius
+    system.displacements(x)[system.mesh.arc_nodes, 1] = rng.uniform(5e-4, 2e-3, 28) - radii
+    system.pressures(x)[:] = rng.uniform(0.5, 3.0, system.pressure_count)
     return problem, x
 
 
@@ -122,25 +120,25 @@ def test_it_damps_the_oscillation_and_amplifies_it_with_its_sign_reversed(reynol
 @pytest.mark.parametrize("solid", ["taylor", "fbar"])
 def test_the_section_is_as_stiff_against_a_zigzag_as_the_theory_takes_it_to_be(solid: str) -> None:
     """k / (2 pi G) is 28 zeta(3) / pi^4 = 0.346 of a half-space whose trace is linear."""
-    section = build_section(oring(density=1, solid=solid))
-    nodes, layout = section.mesh.arc_nodes, section.layout
-    problem = section.problem.with_parameters(spring={"stiffness": 1.0})
+    system = build_system(oring(density=1, solid=solid))
+    nodes, layout = system.mesh.arc_nodes, system.layout
+    problem = system.problem.with_parameters(spring={"stiffness": 1.0})
     multipliers = [layout.dofs(name) for name in ("pressure", "rod", "rotation")]
     problem = problem.with_fixed(multipliers, [0.0, 0.0, 0.0])
     load = np.zeros(layout.total)
-    load[2 * nodes + 1] = 2.0 * np.pi * section.mesh.points[nodes, 1] * (-1.0) ** np.arange(28)
-    moved = spsolve(problem.linearise(section.at_rest())[1], load)[2 * nodes + 1]
+    load[2 * nodes + 1] = 2.0 * np.pi * system.mesh.points[nodes, 1] * (-1.0) ** np.arange(28)
+    moved = spsolve(problem.linearise(system.at_rest())[1], load)[2 * nodes + 1]
     amplitude = np.abs(np.diff(moved, 2))[10:16] / 4
     assert np.ptp(amplitude) < 0.1 * amplitude.mean()
     k = 1.0 / amplitude.mean()
-    assert 0.31 < k / (2.0 * np.pi * section.parameters.shear_modulus) < 0.36
+    assert 0.31 < k / (2.0 * np.pi * system.parameters.shear_modulus) < 0.36
 
 
 @pytest.mark.parametrize("stroke", ["out", "in"])
 def test_both_strokes_move_the_load_downstream(stroke: str) -> None:
-    section = build_section(oring(density=1, upwinding=0.5))
-    film = Film(1.0, stroke, 400.0, np.zeros(28), np.zeros(28), weight=0.7)  # type: ignore[arg-type]
-    problem = film_problem(section, PathSettings(), film)
+    system = build_system(oring(density=1, upwinding=0.5))
+    film = FilmLoads(1.0, stroke, 400.0, np.zeros(28), np.zeros(28), weight=0.7)  # type: ignore[arg-type]
+    problem = system.film_problem(film)
     names = problem.assembler.block("upwind").kernel.parameters
     given = dict(zip(names, problem.parameters["upwind"].tolist(), strict=True))
     assert given["upwinding"] == (0.5 if stroke == "out" else -0.5)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softehl.cases.seal.path import PathSettings, contact_problem
-from softehl.cases.seal.section import OringSection, build_section
+from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.path import PathSettings
+from softehl.cases.seal.system import SealSystem, build_system
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.fem.problem import Problem
@@ -17,20 +18,20 @@ KAPPA = 500.0
 
 
 @pytest.fixture(scope="module")
-def section() -> OringSection:
-    return build_section(oring(density=1))
+def system() -> SealSystem:
+    return build_system(oring(density=1))
 
 
 @pytest.fixture(scope="module")
-def problem(section: OringSection) -> Problem:
-    return contact_problem(section, PathSettings(), 1.0)
+def problem(system: SealSystem) -> Problem:
+    return contact_problem(system, PathSettings(), 1.0)
 
 
 @pytest.fixture
-def state(section: OringSection, rng: np.random.Generator) -> Array:
-    x = section.at_rest()
-    u = 0.02 * (section.mesh.points - section.mesh.points.mean(axis=0))
-    x[section.layout.part("displacement")] = u.ravel() + 1e-4 * rng.normal(size=u.size)
+def state(system: SealSystem, rng: np.random.Generator) -> Array:
+    x = system.at_rest()
+    u = 0.02 * (system.mesh.points - system.mesh.points.mean(axis=0))
+    system.displacements(x)[:] = u + (1e-4 * rng.normal(size=u.size)).reshape(u.shape)
     return x
 
 
@@ -38,9 +39,9 @@ def lagged(problem: Problem, pressures: Array) -> LaggedPressure:
     return LaggedPressure.of(problem, "solid", load_kernel("follower_pressure"), pressures, KAPPA)
 
 
-def volumes(section: OringSection, x: Array) -> Array:
+def volumes(system: SealSystem, x: Array) -> Array:
     """Volumes of the rings by Pappus: area times the path of the centroid, in closed form."""
-    a = section.deformed(x)[section.mesh.quads]
+    a = system.deformed(x)[system.mesh.quads]
     b = np.roll(a, -1, axis=1)
     cross = a[..., 0] * b[..., 1] - b[..., 0] * a[..., 1]
     return np.asarray(2.0 * np.pi * ((a[..., 1] + b[..., 1]) * cross).sum(axis=1) / 6.0)
@@ -58,30 +59,30 @@ def test_with_the_true_pressures_the_tangent_is_the_problem_s(
 
 
 def test_an_excess_pressure_adds_the_second_derivative_of_the_volume(
-    section: OringSection, problem: Problem, state: Array, rng: np.random.Generator
+    system: SealSystem, problem: Problem, state: Array, rng: np.random.Generator
 ) -> None:
-    excess = rng.normal(size=len(section.mesh.quads))
+    excess = rng.normal(size=len(system.mesh.quads))
     pressures = element_pressures(problem, "solid", state)
     dx = np.zeros_like(state)
-    part = section.layout.part("displacement")
-    dx[part] = rng.normal(size=part.stop - part.start)
+    moved = system.displacements(dx)
+    moved[:] = rng.normal(size=moved.shape)
     added = lagged(problem, pressures + excess).linearise(state)[1] @ dx
     added = added - problem.linearise(state)[1] @ dx
     h = 1e-3
-    second = volumes(section, state + h * dx) - 2 * volumes(section, state)
-    second = (second + volumes(section, state - h * dx)) / h**2
+    second = volumes(system, state + h * dx) - 2 * volumes(system, state)
+    second = (second + volumes(system, state - h * dx)) / h**2
     assert dx @ added == pytest.approx(excess @ second, rel=1e-6)
 
 
 def test_pressures_follow_the_linearised_volume(
-    section: OringSection, problem: Problem, state: Array, rng: np.random.Generator
+    system: SealSystem, problem: Problem, state: Array, rng: np.random.Generator
 ) -> None:
-    start = lagged(problem, np.zeros(len(section.mesh.quads)))
-    assert start.volumes == pytest.approx(volumes(section, section.at_rest()), rel=1e-3)
+    start = lagged(problem, np.zeros(len(system.mesh.quads)))
+    assert start.volumes == pytest.approx(volumes(system, system.at_rest()), rel=1e-3)
     dx = np.zeros_like(state)
-    part = section.layout.part("displacement")
-    dx[part] = 1e-7 * rng.normal(size=part.stop - part.start)
-    change = KAPPA * (volumes(section, state + dx) - volumes(section, state)) / start.volumes
+    moved = system.displacements(dx)
+    moved[:] = 1e-7 * rng.normal(size=moved.shape)
+    change = KAPPA * (volumes(system, state + dx) - volumes(system, state)) / start.volumes
     pressures = start.after(state, state + dx).pressures
     before = element_pressures(problem, "solid", state)
     assert pressures - before == pytest.approx(change, rel=1e-4, abs=1e-8)

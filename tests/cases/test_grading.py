@@ -1,41 +1,29 @@
 """Graded meshes: contact edges, shape of the elements, the contact and the film on them."""
 
-from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 import pytest
 
-from softehl.cases.seal.contact import ContactRoute
+from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.grading import arc_positions, contact_edges, graded_disc
+from softehl.cases.seal.method import run
 from softehl.cases.seal.order import OrderPair
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathSettings
-from softehl.cases.seal.run import run
-from softehl.cases.seal.section import OringSection, build_section
-from softehl.cases.seal.stage import Stage, Walker
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.state import Outcome, Silent
-from softehl.cases.seal.stopped import Stopped
+from softehl.cases.seal.system import SealSystem, build_system
+from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import corner_jacobians
 from tests.cases.oring_cases import oring
 
 
-def _walk(walker: Walker) -> Callable[[Stage, np.ndarray], np.ndarray]:
-    def walk(stage: Stage, x: np.ndarray) -> np.ndarray:
-        branch, _ = walker.walk(stage, x, Silent())
-        if not branch.converged:
-            raise Stopped(stage, branch)
-        return branch.last.x
-
-    return walk
-
-
 @cache
-def _contact(
-    density: int, mesh: str = "graded", p_s: float = 1.0
-) -> tuple[OringSection, np.ndarray]:
-    route = ContactRoute(PathSettings(), _walk(Walker()))
-    return route.contact(oring(density=density, mesh=mesh, sealed_pressure=p_s))
+def _contact(density: int, mesh: str = "graded", p_s: float = 1.0) -> tuple[SealSystem, Array]:
+    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+    found = route.contact(oring(density=density, mesh=mesh, sealed_pressure=p_s))
+    assert not isinstance(found, StageFailed)
+    return found
 
 
 @cache
@@ -44,27 +32,27 @@ def _curve(**changes: object) -> Outcome:
 
 
 def test_the_edge_of_a_pressure_like_a_square_root_is_found_exactly() -> None:
-    section = build_section(oring(density=2))
-    s = arc_positions(section)
-    x = section.at_rest()
+    system = build_system(oring(density=2))
+    s = arc_positions(system.section)
+    x = system.at_rest()
     first, last = 0.413, 1.777
-    x[section.layout.part("rod")] = -np.sqrt(np.maximum(np.minimum(s - first, last - s), 0.0))
-    edges = contact_edges(section, x)
+    system.rod_multipliers(x)[:] = -np.sqrt(np.maximum(np.minimum(s - first, last - s), 0.0))
+    edges = contact_edges(system, x)
     assert [edge.place for edge in edges] == pytest.approx([first, last], abs=1e-12)
     assert [edge.rise for edge in edges] == pytest.approx([1.0, 1.0], abs=1e-12)
 
 
 def test_a_section_that_does_not_touch_keeps_equal_segments() -> None:
-    section = build_section(oring(density=1))
-    assert contact_edges(section, section.at_rest()) == []
-    assert graded_disc(section, section.at_rest()) == section.disc
+    system = build_system(oring(density=1))
+    assert contact_edges(system, system.at_rest()) == []
+    assert graded_disc(system, system.at_rest()) == system.section.disc
 
 
 def test_segments_are_finest_at_the_edges_of_the_contact() -> None:
-    section, x = _contact(2)
-    s = arc_positions(section)
+    system, x = _contact(2)
+    s = arc_positions(system.section)
     sizes, middle = np.diff(s), 0.5 * (s[1:] + s[:-1])
-    for edge in contact_edges(section, x):
+    for edge in contact_edges(system, x):
         nearest = np.abs(middle - edge.place).argmin()
         assert sizes[nearest] < 1.6 * sizes.min()
         assert sizes[nearest] < 1.3 * sizes[nearest - 2 : nearest + 3].min()
@@ -73,19 +61,19 @@ def test_segments_are_finest_at_the_edges_of_the_contact() -> None:
 
 
 def test_a_graded_mesh_is_valid_and_its_boundary_is_round() -> None:
-    section, x = _contact(2)
-    disc = section.disc
-    radii = np.hypot(*(section.mesh.points[section.mesh.boundary] - disc.centre).T)
+    system, x = _contact(2)
+    disc = system.section.disc
+    radii = np.hypot(*(system.mesh.points[system.mesh.boundary] - disc.centre).T)
     assert radii == pytest.approx(np.full(len(radii), disc.radius), rel=1e-13)
-    assert corner_jacobians(section.mesh).min() > 0.1
-    assert graded_disc(section, x).spacing is not None
+    assert corner_jacobians(system.mesh).min() > 0.1
+    assert graded_disc(system, x).spacing is not None
 
 
 def test_the_same_contact_is_found_on_both_meshes() -> None:
     pressures = []
     for mesh in ("uniform", "graded"):
-        section, x = _contact(2, mesh, p_s=0.0)
-        pressures.append(-(x[section.layout.part("rod")] * section.rod_areas).sum())
+        system, x = _contact(2, mesh, p_s=0.0)
+        pressures.append(-(system.rod_multipliers(x) * system.rod_areas).sum())
     assert pressures[1] == pytest.approx(pressures[0], rel=3e-3)
 
 
@@ -107,10 +95,10 @@ def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
 
 def test_a_mesh_may_be_asked_for() -> None:
     assert ORing().mesh == "graded"
-    assert _contact(1, "uniform")[0].disc.spacing is None
+    assert _contact(1, "uniform")[0].section.disc.spacing is None
 
 
 def test_another_pressure_order_has_the_same_mesh() -> None:
-    section, _ = _contact(2)
-    low = build_section(oring(density=2, mesh="graded", pressure_order=2), section.disc)
-    assert OrderPair.of(low).high.mesh.points.tolist() == section.mesh.points.tolist()
+    system, _ = _contact(2)
+    low = build_system(oring(density=2, mesh="graded", pressure_order=2), system.section.disc)
+    assert OrderPair.of(low).high.mesh.points.tolist() == system.mesh.points.tolist()

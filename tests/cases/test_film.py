@@ -7,16 +7,16 @@ from typing import Any
 
 import pytest
 
-from softehl.cases.seal import fast as oring_fast
-from softehl.cases.seal.fast import METHOD
-from softehl.cases.seal.run import run
+from softehl.cases.seal import film as seal_film
+from softehl.cases.seal.film import METHOD
+from softehl.cases.seal.method import run
 from softehl.cases.seal.state import Outcome
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
-from tests.cases.test_oring_path import Recorder
+from tests.cases.test_method import Recorder
 
 SPEEDS = (1600.0, 400.0)
 
@@ -108,7 +108,7 @@ class VeryTired(Tired):
 def test_where_it_gives_up_newton_goes_on(
     monkeypatch: pytest.MonkeyPatch, corrector: type[Tired], ended: str
 ) -> None:
-    monkeypatch.setattr(oring_fast, "SchurCorrector", corrector)
+    monkeypatch.setattr(seal_film, "SchurCorrector", corrector)
     parameters = oring(density=1, sealed_pressure=1.0, stroke="out", speeds=SPEEDS)
     outcome = run(parameters, Recorder())
     assert outcome.converged, outcome.message

@@ -2,15 +2,16 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.path import PathSettings, squeeze_stage
+from softehl.cases.seal.contact import squeeze_stage
+from softehl.cases.seal.method import run
+from softehl.cases.seal.path import PathSettings, StageFailed
 from softehl.cases.seal.report.section import boundary_edges
-from softehl.cases.seal.run import run
-from softehl.cases.seal.section import build_section
 from softehl.cases.seal.state import (
     COLLAPSED,
     OSCILLATING,
@@ -20,7 +21,7 @@ from softehl.cases.seal.state import (
     Outcome,
     Silent,
 )
-from softehl.cases.seal.stopped import Stopped
+from softehl.cases.seal.system import build_system
 from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.solve.solution import Branch, Point, Solution, Status
@@ -275,8 +276,9 @@ def test_a_low_order_is_reached_from_a_higher_one() -> None:
 
 def test_a_film_that_closes_is_named() -> None:
     last = FilmNumbers(889.1, -0.7, 1.67e-3, 6.1e-6, 3.7, -9.0, 1e-9, 0.0, 1.0, 2.5)
-    stop = Stopped(squeeze_stage(build_section(oring(density=1)), PathSettings()), ENDED)
-    assert "turns back" in stop.advice
-    stop.last = last
-    assert "closes: at a node it is only 0.0061 um" in stop.advice
-    assert "pressure_order" in stop.advice
+    squeeze = squeeze_stage(build_system(oring(density=1)), PathSettings())
+    failed = StageFailed(squeeze, ENDED)
+    assert "turns back" in failed.advice
+    failed = replace(failed, last=last)
+    assert "closes: at a node it is only 0.0061 um" in failed.advice
+    assert "pressure_order" in failed.advice

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.path import Film, PathSettings, contact_problem, film_problem
+from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.path import PathSettings
 from softehl.cases.seal.results import (
     contact_pressure,
     film_numbers,
@@ -14,8 +16,8 @@ from softehl.cases.seal.results import (
     inlet_segments,
     oscillation,
 )
-from softehl.cases.seal.section import build_section
 from softehl.cases.seal.state import COLLAPSED, OSCILLATING, UNDER_RESOLVED
+from softehl.cases.seal.system import build_system
 from softehl.cases.seal.verdict import FilmNumbers, Verdict, fewest_inlet_segments
 from tests.cases.oring_cases import oring
 
@@ -122,14 +124,14 @@ def test_a_collapsed_path_stays_collapsed() -> None:
 
 def test_numbers_of_a_film_of_constant_thickness_and_pressure() -> None:
     # without pressure gradient the flux is U h / 2 and the friction that of Couette
-    section = build_section(oring(density=1, pressure_viscosity=0.0))
-    mesh, layout = section.mesh, section.layout
-    film = Film(2.0, "in", 400.0, np.zeros(mesh.arc + 1), np.zeros(mesh.arc + 1))
-    problem = film_problem(section, PathSettings(), film)
-    x = section.at_rest()
+    system = build_system(oring(density=1, pressure_viscosity=0.0))
+    mesh = system.mesh
+    film = FilmLoads(2.0, "in", 400.0, np.zeros(mesh.arc + 1), np.zeros(mesh.arc + 1))
+    problem = system.film_problem(film)
+    x = system.at_rest()
     x[2 * mesh.arc_nodes + 1] = 25.005 - mesh.points[mesh.arc_nodes, 1]
-    x[layout.part("pressure")] = 2.0
-    numbers = film_numbers(section, problem, film, x)
+    system.pressures(x)[:] = 2.0
+    numbers = film_numbers(system, problem, film, x)
     assert numbers.h_star == pytest.approx(0.005, rel=1e-9)
     assert numbers.flux == pytest.approx(-200.0 * 0.005, rel=1e-9)
     assert numbers.h_min == pytest.approx(0.005, rel=1e-9)
@@ -138,7 +140,7 @@ def test_numbers_of_a_film_of_constant_thickness_and_pressure() -> None:
     length = float(np.ptp(mesh.points[mesh.arc_nodes, 0]))
     couette = 2 * np.pi * 25.0 * length * 6.59e-8 * -400.0 / 0.005
     assert numbers.friction == pytest.approx(couette, rel=1e-9)
-    state = film_state(section, problem, film, x, Verdict(2.0).after(numbers), 3)
+    state = film_state(system, problem, film, x, Verdict(2.0).after(numbers), 3)
     assert state.leak_rate_mm3_s == pytest.approx(-2 * np.pi * 25.0, rel=1e-9)
     assert state.rod_speed == -400.0
     assert [state.contact_start_mm, state.contact_end_mm] == pytest.approx(
@@ -151,21 +153,21 @@ def test_numbers_of_a_film_of_constant_thickness_and_pressure() -> None:
 
 
 def test_contact_pressure_is_the_multiplier_plus_the_sealed_pressure() -> None:
-    section = build_section(oring(density=1))
-    x = section.at_rest()
-    x[section.layout.part("rod")] = -3.0
-    pressure = contact_pressure(section, 1.0, x)
-    low = section.lowest
+    system = build_system(oring(density=1))
+    x = system.at_rest()
+    system.rod_multipliers(x)[:] = -3.0
+    pressure = contact_pressure(system, 1.0, x)
+    low = system.section.lowest
     assert pressure[:low] == pytest.approx(np.full(low, 4.0))
     assert pressure[low] == pytest.approx(3.5)
     assert pressure[low + 1 :] == pytest.approx(np.full(len(pressure) - low - 1, 3.0))
-    x[section.layout.part("rod")] = 0.2  # positive multipliers do not pull
-    assert contact_pressure(section, 0.0, x).max() == 0.0
+    system.rod_multipliers(x)[:] = 0.2  # positive multipliers do not pull
+    assert contact_pressure(system, 0.0, x).max() == 0.0
 
 
 def test_sealed_pressure_changes_the_load_of_the_contact_problem_only() -> None:
-    section = build_section(oring(density=1))
-    problem = contact_problem(section, PathSettings(), 2.5)
+    system = build_system(oring(density=1))
+    problem = contact_problem(system, PathSettings(), 2.5)
     assert problem.parameters["sealed_side"].tolist() == [2.5]
     assert "film" not in problem.parameters
     assert "spring" not in problem.parameters

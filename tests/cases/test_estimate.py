@@ -7,8 +7,8 @@ from math import isnan, nan
 import pytest
 
 from softehl.cases.seal.estimate import ORDER, coarser_density, h_star_error
+from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import DENSITIES, ORing
-from softehl.cases.seal.run import run
 from softehl.cases.seal.state import Outcome, Silent
 from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import oring

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from softehl.cases.seal.path import Film, PathSettings, film_problem
-from softehl.cases.seal.section import build_section, film_scale, flux_scales, number_unknowns
+from softehl.cases.seal.declared import Numbering
+from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.scales import film_flux
+from softehl.cases.seal.section import SealSection
+from softehl.cases.seal.system import FIELDS, PRESSURE, build_system
 from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
@@ -13,20 +16,21 @@ TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16:
 
 @pytest.mark.parametrize("d", TABLE_2)
 def test_unknowns_of_table_2(d: int) -> None:
-    mesh = disc_mesh(Disc(0.0, 26.96, 1.765, -34.0, 43.0), d)
-    layout = number_unknowns(mesh, oring(density=1))
+    disc = Disc(0.0, 26.96, 1.765, -34.0, 43.0)
+    section = SealSection(disc, disc_mesh(disc, d))
+    layout = Numbering.of(FIELDS, oring(density=1), section).layout
     total, pressures = TABLE_2[d]
-    assert layout.count("pressure") == pressures == 108 * d + 1
+    assert layout.count(PRESSURE) == pressures == 108 * d + 1
     assert layout.total == pytest.approx(total, rel=0.03)
 
 
 @pytest.mark.parametrize("m_p", range(1, 6))
 def test_discontinuous_pressures_have_all_their_unknowns(m_p: int) -> None:
-    section = build_section(oring(density=1, pressure_order=m_p, reynolds="dg"))
-    assert section.layout.count("pressure") == 27 * (m_p + 1)
-    first = section.layout.part("pressure").start
-    assert section.film_ends.tolist() == [first, first + 27 * (m_p + 1) - 1]
-    film, facet = (section.problem.assembler.block(name) for name in ("film", "facet"))
+    system = build_system(oring(density=1, pressure_order=m_p, reynolds="dg"))
+    assert system.pressure_count == 27 * (m_p + 1)
+    first = system.layout.part("pressure").start
+    assert system.film_ends.tolist() == [first, first + 27 * (m_p + 1) - 1]
+    film, facet = (system.problem.assembler.block(name) for name in ("film", "facet"))
     assert np.unique(film.dofs[:, 4:]).size == 27 * (m_p + 1)
     assert facet.dofs.shape == (26, 6 + 2 * (m_p + 1))
     # a facet sees the displacements and pressures of the segments on its two sides
@@ -37,43 +41,43 @@ def test_discontinuous_pressures_have_all_their_unknowns(m_p: int) -> None:
 
 @pytest.mark.parametrize("m_p", range(1, 6))
 def test_every_pressure_order_has_its_unknowns(m_p: int) -> None:
-    section = build_section(oring(density=1, pressure_order=m_p))
-    assert section.layout.count("pressure") == 27 * m_p + 1
-    film = section.problem.assembler.block("film")
+    system = build_system(oring(density=1, pressure_order=m_p))
+    assert system.pressure_count == 27 * m_p + 1
+    film = system.problem.assembler.block("film")
     assert film.dofs.shape == (27, 4 + m_p + 1)
-    ends = section.layout.dofs("pressure")[[0, -1]]
-    assert [film.dofs[0, 4], film.dofs[-1, -1]] == ends.tolist() == section.film_ends.tolist()
+    ends = system.layout.dofs("pressure")[[0, -1]]
+    assert [film.dofs[0, 4], film.dofs[-1, -1]] == ends.tolist() == system.film_ends.tolist()
 
 
 def test_sealed_pressure_acts_from_the_sealed_end_of_the_arc_to_the_crown() -> None:
-    section = build_section(oring(density=4))
-    block = section.problem.assembler.block("sealed_side")
+    system = build_system(oring(density=4))
+    block = system.problem.assembler.block("sealed_side")
     z = block.coordinates[:, [0, 2]].mean(axis=1)
     assert z.max() < 0.0
     r = block.coordinates[:, [1, 3]]
     assert r.max() == pytest.approx(28.725, abs=2e-3)  # the crown
-    sealed_end = section.mesh.points[section.mesh.arc_nodes[0]]
+    sealed_end = system.mesh.points[system.mesh.arc_nodes[0]]
     assert block.coordinates[-1, 2:] == pytest.approx(sealed_end)
-    arc = section.problem.assembler.block("sealed_arc")
+    arc = system.problem.assembler.block("sealed_arc")
     assert arc.coordinates[0, :2] == pytest.approx(sealed_end)
-    assert arc.coordinates[-1, 3] == section.mesh.points[section.mesh.arc_nodes, 1].min()
+    assert arc.coordinates[-1, 3] == system.mesh.points[system.mesh.arc_nodes, 1].min()
 
 
 def test_axial_force_of_the_sealed_pressure_is_pressure_times_projected_area() -> None:
-    section = build_section(oring(density=2))
-    x = section.at_rest()
+    system = build_system(oring(density=2))
+    x = system.at_rest()
     force = 0.0
     for name in ("sealed_side", "sealed_arc"):
-        block = section.problem.assembler.block(name)
+        block = system.problem.assembler.block(name)
         force -= block.residual(x, np.array([2.0]))[:, [0, 2]].sum()
-    top, bottom = section.mesh.points[:, 1].max(), section.mesh.points[:, 1].min()
+    top, bottom = system.mesh.points[:, 1].max(), system.mesh.points[:, 1].min()
     assert force == pytest.approx(2.0 * np.pi * (top**2 - bottom**2), rel=2e-3)
 
 
 def test_obstacles_touch_the_free_section_where_they_should() -> None:
-    section = build_section(oring(density=2))
-    points = section.mesh.points
-    gaps = {name: obstacle.gap(points).min() for name, obstacle in section.obstacles.items()}
+    system = build_system(oring(density=2))
+    points = system.mesh.points
+    gaps = {name: obstacle.gap(points).min() for name, obstacle in system.obstacles.items()}
     assert gaps["rod"] == pytest.approx(0.195, abs=1e-3)
     assert gaps["housing"] == pytest.approx(28.15 - 28.725, abs=1e-3)
     assert gaps["sealed_wall"] == pytest.approx(1.87 - 1.765, abs=5e-3)
@@ -83,12 +87,12 @@ def test_obstacles_touch_the_free_section_where_they_should() -> None:
 @pytest.mark.parametrize("solid", ["taylor", "fbar", "q4"])
 @pytest.mark.parametrize("stroke", ["out", "in"])
 def test_tangent_of_the_whole_problem(solid: str, stroke: str, rng: np.random.Generator) -> None:
-    section = build_section(oring(density=1, solid=solid))
-    layout = section.layout
-    film = Film(1.0, stroke, 400.0, rng.uniform(-3, 0, 28), np.zeros(28), weight=0.6)  # type: ignore[arg-type]
-    problem = film_problem(section, PathSettings(), film)
+    system = build_system(oring(density=1, solid=solid))
+    layout = system.layout
+    film = FilmLoads(1.0, stroke, 400.0, rng.uniform(-3, 0, 28), np.zeros(28), weight=0.6)  # type: ignore[arg-type]
+    problem = system.film_problem(film)
     x = 1e-3 * rng.normal(size=layout.total)
-    x[layout.part("pressure")] = rng.uniform(0.5, 3.0, layout.count("pressure"))
+    system.pressures(x)[:] = rng.uniform(0.5, 3.0, system.pressure_count)
     x[problem.fixed] = problem.values
     direction = rng.normal(size=layout.total)
     direction[problem.fixed] = 0.0
@@ -108,31 +112,31 @@ def test_tangent_of_the_whole_problem(solid: str, stroke: str, rng: np.random.Ge
 def test_the_film_acts_on_a_held_section_or_on_one_with_a_given_moment(
     moment: float | None,
 ) -> None:
-    section = build_section(oring(density=1))
-    film = Film(1.0, "out", 400.0, np.zeros(28), np.zeros(28), moment=moment)
-    problem = film_problem(section, PathSettings(), film)
+    system = build_system(oring(density=1))
+    film = FilmLoads(1.0, "out", 400.0, np.zeros(28), np.zeros(28), moment=moment)
+    problem = system.film_problem(film)
     prescribed = dict(zip(problem.fixed.tolist(), problem.values.tolist(), strict=True))
-    assert prescribed.get(int(section.layout.dofs("rotation")[0])) == moment
+    assert prescribed.get(int(system.layout.dofs("rotation")[0])) == moment
 
 
 def test_fluxes_are_measured_by_what_rounding_leaves_of_them() -> None:
-    section = build_section(oring(density=1))
+    system = build_system(oring(density=1))
     gap = np.full(28, 1e-3)
-    thin = flux_scales(section, 25.0, gap)
-    assert thin == pytest.approx(np.full(109, film_scale(25.0)), rel=1e-3)
+    thin = system.flux_scales(25.0, gap)
+    assert thin == pytest.approx(np.full(109, film_flux(25.0)), rel=1e-3)
     gap[0] = 0.1  # the film of the first segment, four of whose pressures are its own
-    scales = flux_scales(section, 25.0, gap)
+    scales = system.flux_scales(25.0, gap)
     assert scales[5:] == pytest.approx(thin[5:])
-    dx = np.linalg.norm(np.diff(section.mesh.points[section.mesh.arc_nodes[:2]], axis=0))
-    flux = 1e-4 * 4**2 * 0.1**3 / (12.0 * section.parameters.viscosity * dx)
-    assert scales[:5] == pytest.approx(np.full(5, film_scale(25.0) + flux))
+    dx = np.linalg.norm(np.diff(system.mesh.points[system.mesh.arc_nodes[:2]], axis=0))
+    flux = 1e-4 * 4**2 * 0.1**3 / (12.0 * system.parameters.viscosity * dx)
+    assert scales[:5] == pytest.approx(np.full(5, film_flux(25.0) + flux))
 
 
 def test_a_pressure_is_rounded_to_far_less_than_the_tolerance() -> None:
     """A last digit of 5 MPa drives through a film of 0.1 mm less than 1e-9 of its scale."""
-    section = build_section(oring(density=8))
-    scale = flux_scales(section, 25.0, np.full(217, 0.1)).max()
+    system = build_system(oring(density=8))
+    scale = system.flux_scales(25.0, np.full(217, 0.1)).max()
     dx = 2.37 / 216 / 4  # of the four intervals of a segment, mm
-    rounding = 0.1**3 / (12.0 * section.parameters.viscosity) * np.spacing(5.0) / dx
+    rounding = 0.1**3 / (12.0 * system.parameters.viscosity) * np.spacing(5.0) / dx
     assert rounding < 1e-9 * scale
-    assert rounding > 1e-9 * film_scale(25.0)
+    assert rounding > 1e-9 * film_flux(25.0)

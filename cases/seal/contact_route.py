@@ -1,0 +1,126 @@
+"""First stage: the mesh of a section and its contact state, by whichever way leads there cheaply.
+
+A path from rest is followed on a coarse mesh, unless another run has left a state to start from;
+finer and graded meshes start from a coarser or a uniform one and are corrected by Newton's method.
+Where a way does not lead to the end, the next one begins on a finer mesh, the last of them on the
+mesh itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from softehl.cases.seal.contact import load_stage, squeeze_stage
+from softehl.cases.seal.contact_store import ContactStore, stored_contact
+from softehl.cases.seal.grading import PASSES, graded_disc
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
+from softehl.cases.seal.refinement import carried_contact, finer
+from softehl.cases.seal.system import SealSystem, build_system
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.newton import Newton
+
+State: TypeAlias = tuple[SealSystem, Array]
+
+GUIDE = 2
+"""Least density of the uniform mesh whose contact shows where a graded one is to be fine."""
+
+
+@dataclass(frozen=True)
+class ContactRoute:
+    """Ways to a contact state.
+
+    follow: solves a stage from a start. newton: corrector of stored states. contacts: states of
+    uniform meshes that runs leave for each other.
+    """
+
+    settings: PathSettings
+    follow: Callable[[Stage, Array], Followed]
+    newton: Newton = field(default_factory=Newton)
+    contacts: ContactStore = field(default_factory=ContactStore)
+
+    def contact(self, p: ORing) -> State | StageFailed:
+        """The system of a case, uniform or graded, and its unknowns in contact under p_s."""
+        return self._graded(p) if p.mesh == "graded" else self._uniform(p)
+
+    def _uniform(self, p: ORing) -> State | StageFailed:
+        """By way of coarser meshes; on the mesh itself if that is asked for or the ways fail."""
+        if p.solver == "auto":
+            coarser = list(_doublings(1, p.density // 2))
+            stored = self.contacts.densities(p, (*coarser, p.density))
+            ways = [(d, self._stored) for d in stored] + [(d, self._loaded) for d in coarser]
+            for coarsest, begin in ways:
+                system = build_system(_at(p, coarsest))
+                state = self._refined(system, begin(system), p.density)
+                if not isinstance(state, StageFailed):
+                    return state
+        system = build_system(p)
+        return self._refined(system, self._loaded(system), p.density)
+
+    def _stored(self, system: SealSystem) -> Followed:
+        """Unknowns of a section in contact, from a stored state."""
+        stage = stored_contact(system, self.settings, self.newton)
+        return self.follow(stage, self.contacts.read(system))
+
+    def _loaded(self, system: SealSystem) -> Followed:
+        """Unknowns of a section in contact, from rest: squeezed, then loaded by p_s."""
+        p_s = system.parameters.sealed_pressure
+        x = self.follow(squeeze_stage(system, self.settings), system.at_rest())
+        if p_s > 0.0 and not isinstance(x, StageFailed):
+            x = self.follow(load_stage(system, self.settings, p_s), x)
+        if not isinstance(x, StageFailed):
+            self.contacts.keep(system, x)
+        return x
+
+    def _graded(self, p: ORing) -> State | StageFailed:
+        """Graded at a low density, from the uniform mesh of that density, then refined."""
+        for guide in _doublings(min(GUIDE, p.density), p.density // 2):
+            graded = self._regraded(_at(p, guide))
+            if not isinstance(graded, StageFailed):
+                graded = self._refined(*graded, p.density)
+            if not isinstance(graded, StageFailed):
+                return graded
+        return self._regraded(p)
+
+    def _regraded(self, p: ORing) -> State | StageFailed:
+        """On meshes graded in turn, each by the contact on the one before."""
+        state = self._uniform(p.model_copy(update={"mesh": "uniform", "solver": "auto"}))
+        for number in range(1, PASSES + 1):
+            if isinstance(state, StageFailed):
+                break
+            graded = build_system(p, graded_disc(*state))
+            name = f"contact on graded mesh {number}"
+            state = self._carried(*state, graded, name)
+        return state
+
+    def _refined(self, system: SealSystem, x: Followed, density: int) -> State | StageFailed:
+        """From a contact state to that of the same mesh at `density`, doubling by doubling."""
+        state = x if isinstance(x, StageFailed) else (system, x)
+        while not isinstance(state, StageFailed) and state[0].parameters.density < density:
+            coarse = state[0]
+            state = self._carried(
+                *state, build_system(finer(coarse.parameters), coarse.section.disc)
+            )
+            if not isinstance(state, StageFailed) and coarse.parameters.mesh == "uniform":
+                self.contacts.keep(*state)
+        return state
+
+    def _carried(
+        self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
+    ) -> State | StageFailed:
+        """The contact state x of one mesh on another."""
+        found = self.follow(*carried_contact(old, new, self.settings, x, name))
+        return found if isinstance(found, StageFailed) else (new, found)
+
+
+def _doublings(first: int, last: int) -> Iterator[int]:
+    """first, 2 first, ... up to last."""
+    while first <= last:
+        yield first
+        first *= 2
+
+
+def _at(p: ORing, density: int) -> ORing:
+    return p.model_copy(update={"density": density})

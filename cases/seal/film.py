@@ -1,0 +1,159 @@
+"""Film stages of the path: the film takes over from the contact, then the speed falls.
+
+The film starts at high speed and without shear, where its equations are mild. At a fixed sealed
+pressure the section moves by micrometres from state to state, so that a modified Newton method
+serves: it factorises the section a few times for a whole curve and treats the film, the rod that
+fades out below it and the sealed pressure on the arc exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.system import SealSystem
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.layered import Layer, Layered
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.schur import SchurCorrector
+from softehl.runtime.solve.solution import Point
+from softehl.runtime.solve.steps import StepRule
+
+METHOD = "modified Newton on the Schur complement of the section"
+
+_NEAR = 0.3  # residual at which the section is in equilibrium well enough to be condensed
+_LOOSE = 1e-3  # of the states on the way from contact to film, which are no results
+_FIRM = 1e-6  # of the state from which speeds fall: a section is condensed there that is at rest
+_WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
+_SHEAR_STEPS = StepRule(1.0, 0.05, target_iterations=8)
+_SPEED_STEPS = StepRule(math.log(2.0), 0.004, math.log(2.0) + 1e-9, target_iterations=30)
+
+
+def first_film(system: SealSystem, settings: PathSettings, stroke: Stroke, x: Array) -> FilmLoads:
+    """The film at its highest speed, under the rod forces of the contact state x."""
+    p = system.parameters
+    _, gap = system.arc_film(x)
+    return FilmLoads(
+        p.sealed_pressure,
+        stroke,
+        speed=max(settings.start_speed, *p.speeds),
+        multipliers=system.rod_multipliers(x).copy(),
+        gap=gap,
+        shear=1.0 if p.shear_traction else 0.0,
+        rod_offset=settings.offset,
+    )
+
+
+def weight_stage(system: SealSystem, settings: PathSettings, film: FilmLoads) -> Stage:
+    """Second stage: the film takes over from the contact at film.speed, without shear."""
+    return Stage(
+        name="contact to film",
+        problem_at=lambda w: system.film_problem(replace(film, weight=w, shear=0.0)),
+        start=0.0,
+        stop=1.0,
+        steps=settings.weight_steps,
+        sealed_pressure=film.sealed_pressure,
+        stroke=film.stroke,
+    )
+
+
+def release_stage(system: SealSystem, settings: PathSettings, film: FilmLoads, x: Array) -> Stage:
+    """Second stage, rotation = "free": the moment that held the section fades, without shear."""
+    held = system.moment(x)
+    return Stage(
+        name="release",
+        problem_at=lambda s: system.film_problem(replace(film, shear=0.0, moment=(1.0 - s) * held)),
+        start=0.0,
+        stop=1.0,
+        steps=settings.release_steps,
+        sealed_pressure=film.sealed_pressure,
+        stroke=film.stroke,
+    )
+
+
+def shear_stage(system: SealSystem, settings: PathSettings, film: FilmLoads) -> Stage:
+    """Second stage, continued: the shear stress of the film begins to act on the section."""
+    return Stage(
+        name="shear",
+        problem_at=lambda s: system.film_problem(replace(film, shear=s)),
+        start=0.0,
+        stop=1.0,
+        steps=settings.shear_steps,
+        sealed_pressure=film.sealed_pressure,
+        stroke=film.stroke,
+    )
+
+
+def speed_stage(
+    system: SealSystem,
+    settings: PathSettings,
+    film: FilmLoads,
+    speeds: Sequence[float],
+    on_speed: Callable[[FilmLoads, Point], None],
+) -> Stage:
+    """Third stage: |U| falls from film.speed through `speeds` (none above it).
+
+    The path parameter is log |U|, in which the film thickness is nearly straight. on_speed is
+    told every step; the speeds it is given are exactly those that were asked for.
+    """
+    exact = {math.log(u): u for u in (*speeds, film.speed)}
+
+    def at(parameter: float) -> FilmLoads:
+        return replace(film, speed=exact.get(parameter, math.exp(parameter)))
+
+    return Stage(
+        name="falling speed",
+        problem_at=lambda t: system.film_problem(at(t)),
+        start=math.log(film.speed),
+        stop=math.log(min(speeds)),
+        steps=settings.speed_steps,
+        sealed_pressure=film.sealed_pressure,
+        stroke=film.stroke,
+        waypoints=tuple(math.log(u) for u in speeds),
+        on_point=lambda point: on_speed(at(point.parameter), point),
+        shown=lambda t: at(t).rod_speed,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FastFilm:
+    """Turns film stages into ones that a modified Newton method solves."""
+
+    system: SealSystem
+    layer: Layer
+    corrector: SchurCorrector
+
+    @classmethod
+    def of(cls, system: SealSystem, linear: Condenser) -> FastFilm:
+        """For one stroke; the factors of the section are kept from stage to stage."""
+        finish = Newton(max_iterations=1, linear=linear)
+        return cls(system, system.film_layer(), SchurCorrector(linear, near=_NEAR, finish=finish))
+
+    def weight(self, stage: Stage) -> Stage:
+        """The stage from contact to film, to a tolerance that is enough for a way."""
+        return self._stage(stage, self.corrector.with_tolerance(_LOOSE), _WEIGHT_STEPS)
+
+    def shear(self, stage: Stage) -> Stage:
+        """The stage in which the shear stress begins to act, to a smaller tolerance."""
+        return self._stage(stage, self.corrector.with_tolerance(_FIRM), _SHEAR_STEPS)
+
+    def speed(self, stage: Stage) -> Stage:
+        """The stage of falling speed, to the full tolerance."""
+        return replace(self._stage(stage, self.corrector, _SPEED_STEPS), predictor="parabola")
+
+    def _stage(self, stage: Stage, corrector: SchurCorrector, steps: StepRule) -> Stage:
+        guards = (self.system.film_guard(),)
+
+        def problem_at(parameter: float) -> Layered:
+            problem = stage.problem_at(parameter)
+            assert isinstance(problem, Problem)
+            return Layered(problem, self.layer, guards)
+
+        return replace(
+            stage, problem_at=problem_at, steps=steps, corrector=corrector, method=METHOD
+        )

@@ -1,0 +1,51 @@
+"""What acts on a seal: the loads of the contact problem and those of the film problem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from softehl.runtime.arrays import Array
+
+Stroke = Literal["out", "in"]
+
+
+@dataclass(frozen=True)
+class ContactLoads:
+    """Loads of frictionless contact.
+
+    sealed_pressure: p_s, MPa. offsets: obstacle -> distance (mm) that it keeps from the section,
+    0 where none is given. spring: axial stiffness that holds the section, N/mm^3.
+    """
+
+    sealed_pressure: float = 0.0
+    offsets: Mapping[str, float] = field(default_factory=dict)
+    spring: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class FilmLoads:
+    """Loads of a film.
+
+    sealed_pressure: p_s, MPa. speed: |U|, mm/s. weight: of the film forces, 1 - weight of the
+    contact forces. shear: weight of the shear stress. multipliers, gap: (arc nodes,) rod
+    multipliers, MPa, and distance of the rod, mm, of the contact state; rod_offset: the offset of
+    the rod in it, mm. moment: moment on the section (N mm) if it is free to roll, None if its
+    rotation is held.
+    """
+
+    sealed_pressure: float
+    stroke: Stroke
+    speed: float
+    multipliers: Array
+    gap: Array
+    weight: float = 1.0
+    shear: float = 1.0
+    moment: float | None = None
+    rod_offset: float = 0.0
+
+    @property
+    def rod_speed(self) -> float:
+        """U, positive for outstroke, mm/s."""
+        return self.speed if self.stroke == "out" else -self.speed

@@ -1,0 +1,276 @@
+"""The method for any seal: contact, from contact to film, falling speed; every state is reported.
+
+What changes during a run is a `RunState`, what changes along a stroke a `StrokeState`, and the
+records of the path driver; everything else is frozen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import nan
+from pathlib import Path
+
+from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.contact_store import ContactStore
+from softehl.cases.seal.estimate import coarser_system, h_star_error
+from softehl.cases.seal.film import (
+    FastFilm,
+    first_film,
+    release_stage,
+    shear_stage,
+    speed_stage,
+    weight_stage,
+)
+from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.refinement import carried_contact
+from softehl.cases.seal.results import (
+    MICROMETRE,
+    contact_pressure,
+    contact_state,
+    film_numbers,
+    film_state,
+)
+from softehl.cases.seal.state import FilmState, Observer, Outcome
+from softehl.cases.seal.system import SealSystem, build_system
+from softehl.cases.seal.verdict import Verdict, fewest_inlet_segments
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import Point, Status
+
+OnSpeed = Callable[[FilmLoads, Point], None]
+BuiltFilm = tuple[FilmLoads, Array]
+
+
+@dataclass
+class RunState:
+    """What changes during a run: the states that were reached, and how strokes ended early."""
+
+    states: list[FilmState] = field(default_factory=list)
+    failures: list[tuple[Status, str]] = field(default_factory=list)
+
+
+@dataclass
+class StrokeState:
+    """What changes along a stroke.
+
+    verdict: on the films so far. slowest: the slowest film that was solved, and its unknowns.
+    missing: requested speeds that were not reached yet.
+    """
+
+    verdict: Verdict
+    missing: set[float]
+    slowest: BuiltFilm | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FilmPath:
+    """The films of a system: built up from its contact state, then followed as the speed falls."""
+
+    system: SealSystem
+    settings: PathSettings
+    driver: PathDriver
+
+    def first(self, stroke: Stroke, x: Array) -> FilmLoads:
+        """The first film of a stroke, from the contact state x."""
+        return first_film(self.system, self.settings, stroke, x)
+
+    def fast(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> bool:
+        """All film stages by modified Newton iterations; whether they reached the slowest speed."""
+        system, settings, p = self.system, self.settings, self.system.parameters
+        linear = self.driver.newton.linear
+        if p.solver != "auto" or p.rotation != "fixed" or not isinstance(linear, Condenser):
+            return False
+        fast = FastFilm.of(system, linear)
+        stages = [fast.weight(weight_stage(system, settings, film))]
+        if p.shear_traction:
+            stages.append(fast.shear(shear_stage(system, settings, film)))
+        stages.append(fast.speed(speed_stage(system, settings, film, p.speeds, on_speed)))
+        return not isinstance(self.driver.follow_all(stages, x), StageFailed)
+
+    def build(self, film: FilmLoads, x: Array) -> BuiltFilm | StageFailed:
+        """By Newton's method from the contact state x to the film at its first speed."""
+        system, settings, p = self.system, self.settings, self.system.parameters
+        y = self.driver.follow(weight_stage(system, settings, film), x)
+        if p.rotation == "free" and not isinstance(y, StageFailed):
+            y = self.driver.follow(release_stage(system, settings, film, y), y)
+            film = replace(film, moment=0.0)
+        if p.shear_traction and not isinstance(y, StageFailed):
+            y = self.driver.follow(shear_stage(system, settings, film), y)
+        return y if isinstance(y, StageFailed) else (film, y)
+
+    def slower(
+        self, built: BuiltFilm | StageFailed, speeds: tuple[float, ...], on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """By Newton's method from a film to slower ones; what went wrong, if anything did."""
+        if isinstance(built, StageFailed):
+            return built
+        film, x = built
+        end = self.driver.follow(speed_stage(self.system, self.settings, film, speeds, on_speed), x)
+        return end if isinstance(end, StageFailed) else None
+
+
+@dataclass(frozen=True, eq=False)
+class SealRun:
+    """A system whose contact state x is known, with what is reported of its films.
+
+    coarser: the films of a coarser mesh, which are no results, and its contact state.
+    """
+
+    path: FilmPath
+    x: Array
+    observer: Observer
+    state: RunState
+    coarser: tuple[FilmPath, Array] | None = None
+
+    @property
+    def system(self) -> SealSystem:
+        """The system that is solved."""
+        return self.path.system
+
+    def stroke(self, stroke: Stroke) -> StageFailed | None:
+        """Second and third stage of one stroke; why it ended early, if it did."""
+        p, path = self.system.parameters, self.path
+        reference = float(contact_pressure(self.system, p.sealed_pressure, self.x).max())
+        fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
+        coarser = _thicknesses(*self.coarser, stroke) if self.coarser else {}
+        progress = StrokeState(Verdict(reference, fewest=fewest), set(p.speeds))
+
+        def on_speed(film: FilmLoads, point: Point) -> None:
+            self._judge(progress, coarser, film, point)
+
+        film = path.first(stroke, self.x)
+        if path.fast(film, self.x, on_speed):
+            return None
+        built = progress.slowest or path.build(film, self.x)
+        left = p.speeds if progress.slowest is None else _below(p.speeds, progress.slowest[0].speed)
+        failed = path.slower(built, left, on_speed)
+        if failed is None:
+            return None
+        last = progress.verdict.last
+        self._from_higher_order(film, progress, on_speed)
+        return replace(failed, last=last) if progress.missing else None
+
+    def _judge(
+        self, progress: StrokeState, coarser: Mapping[float, float], film: FilmLoads, point: Point
+    ) -> None:
+        """Look at a film of falling speed; one at a requested speed becomes a state."""
+        system, x = self.system, point.solution.x
+        if progress.slowest is not None and not film.speed < progress.slowest[0].speed:
+            return  # where another way of solving begins
+        progress.slowest = film, x
+        problem = system.film_problem(film)
+        progress.verdict = progress.verdict.after(film_numbers(system, problem, film, x))
+        if film.speed not in system.parameters.speeds:
+            return
+        progress.missing.discard(film.speed)
+        iterations = point.solution.iterations
+        state = film_state(system, problem, film, x, progress.verdict, iterations)
+        thickness = coarser.get(film.speed, nan) / MICROMETRE
+        error = h_star_error(state.density, state.h_star_um, thickness)
+        state = replace(state, h_star_error_percent=error)
+        self.state.states.append(state)
+        self.observer.film_state(state)
+
+    def _from_higher_order(self, film: FilmLoads, progress: StrokeState, on_speed: OnSpeed) -> None:
+        """The speeds that a low pressure order did not reach by itself, as far as possible."""
+        low, driver = self.system, self.path.driver
+        if low.parameters.pressure_order >= REFERENCE_ORDER:
+            return
+        pair, missing = OrderPair.of(low), tuple(sorted(progress.missing, reverse=True))
+        high = FilmPath(pair.high, self.path.settings, driver.named(f"order {REFERENCE_ORDER}: "))
+        found: dict[float, BuiltFilm] = {}
+
+        def keep(at: FilmLoads, point: Point) -> None:
+            if at.speed in missing:
+                found[at.speed] = at, point.solution.x
+
+        x = transferred(self.x, low, pair.high)
+        high.slower(high.build(high.first(film.stroke, x), x), missing, keep)
+        for at, x in found.values():
+            both = driver.follow(pair.stage(self.path.settings, at), pair.start(x))
+            if isinstance(both, StageFailed):
+                continue
+            solution = driver.newton.solve(low.film_problem(at), pair.low_part(both))
+            if solution.converged:
+                on_speed(at, Point(1.0, solution))
+
+
+def _below(speeds: tuple[float, ...], speed: float) -> tuple[float, ...]:
+    return tuple(u for u in speeds if u < speed)
+
+
+def _thicknesses(path: FilmPath, x: Array, stroke: Stroke) -> dict[float, float]:
+    """h* (mm) at the requested speeds, as far as they are reached; nothing is reported."""
+    system, found = path.system, dict[float, float]()
+    film, speeds = path.first(stroke, x), system.parameters.speeds
+
+    def keep(film: FilmLoads, point: Point) -> None:
+        if film.speed in speeds:
+            problem = system.film_problem(film)
+            found[film.speed] = film_numbers(system, problem, film, point.solution.x).h_star
+
+    if not path.fast(film, x, keep):
+        path.slower(path.build(film, x), speeds, keep)
+    return found
+
+
+def run(
+    parameters: ORing,
+    observer: Observer,
+    settings: PathSettings | None = None,
+    newton: Newton | None = None,
+    contacts: Path | None = None,
+) -> Outcome:
+    """Solve a seal and report to the observer; failure is in the outcome's status.
+
+    contacts: folder of contact states (`cases.seal.contact_store`) to start from and to add to.
+    """
+    newton = newton or Newton(max_iterations=10, linear=choose(parameters.linear))
+    driver, settings = PathDriver(observer, newton), settings or PathSettings()
+    state, rotation = RunState(), parameters.rotation
+    route = ContactRoute(settings, driver.follow, driver.newton, ContactStore(contacts))
+    found = route.contact(parameters)
+    if isinstance(found, StageFailed):
+        state.failures.append(found.explain("contact", rotation))
+        return _outcome(build_system(parameters), driver, state)  # for its size: none was settled
+    seal = _begun(FilmPath(found[0], settings, driver), found[1], observer, state)
+    strokes: tuple[Stroke, ...] = ("out", "in")
+    for stroke in strokes if parameters.stroke == "both" else (parameters.stroke,):
+        failed = seal.stroke(stroke)
+        if failed is not None:
+            state.failures.append(failed.explain(f"stroke {stroke}", rotation))
+    return _outcome(seal.system, driver, state)
+
+
+def _begun(path: FilmPath, x: Array, observer: Observer, state: RunState) -> SealRun:
+    """A run whose contact state x (n,) is settled, and with it the mesh; shared by both strokes."""
+    system, settings, p = path.system, path.settings, path.system.parameters
+    problem = contact_problem(system, settings, p.sealed_pressure)
+    observer.contact_state(contact_state(system, problem, p.sealed_pressure, x))
+    seal = SealRun(path, x, observer, state)
+    if not (p.error_estimate and p.mesh == "graded"):
+        return seal
+    coarser = FilmPath(coarser_system(system), settings, path.driver.named("coarser mesh: "))
+    start = carried_contact(system, coarser.system, settings, x, "contact")
+    y = coarser.driver.follow(*start)
+    return seal if isinstance(y, StageFailed) else replace(seal, coarser=(coarser, y))
+
+
+def _outcome(system: SealSystem, driver: PathDriver, state: RunState) -> Outcome:
+    blocks, failures = system.problem.assembler.blocks, state.failures
+    return Outcome(
+        states=tuple(state.states),
+        status=failures[0][0] if failures else Status.CONVERGED,
+        message="; ".join(message for _, message in failures) or "all requested states converged",
+        unknowns=system.counts,
+        kernel_signatures={b.kernel.name: b.kernel.signature for b in blocks},
+        stages=tuple(driver.records),
+        solvers={"solver": system.parameters.solver, "linear": driver.newton.linear.name},
+    )
