@@ -72,6 +72,8 @@ class Kernel:
     coordinates (n, nodes*len(coordinates)) (any, for a kernel that has none), dofs (n, ndof),
     data (n, len(data)), point_data (n, points, len(point_data)), parameters (len(parameters),) or
     a mapping by name, rule None for the model's default (the only one when `unrolled`).
+    places: of every unknown its name without number, and its node or None. history: point data
+    whose new values the last fields are.
     """
 
     name: str
@@ -90,6 +92,8 @@ class Kernel:
     library: Library
     components: int = 2
     conditions: tuple[Condition, ...] = ()
+    places: tuple[tuple[str, int | None], ...] = ()
+    history: tuple[str, ...] = ()
 
     def energy(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Potential of each element, (n,)."""
@@ -278,6 +282,8 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         library=library_of(directory),
         components=entry["components"],
         conditions=tuple((n, r, b, w) for n, r, b, w in entry["conditions"]),
+        places=tuple((n, a) for n, a in entry.get("places", ())),
+        history=tuple(entry.get("history", ())),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ from softehl.runtime.solve.solution import Point
 
 if TYPE_CHECKING:
     from softehl.runtime.mesh.mesh import Predicate
-    from softehl.runtime.study import System
+    from softehl.runtime.system import System
 
 
 _AXES = ("x", "y", "z", "r")
@@ -32,10 +32,11 @@ class Result:
     system: System
     problem: Problem
     point: Point
+    histories: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def t(self) -> float:
-        """The load factor."""
+        """The load factor, or the time."""
         return self.point.parameter
 
     @property
@@ -101,7 +102,9 @@ class Result:
         if block not in blocks:
             known = ", ".join(blocks)
             raise KeyError(f"no block {block!r}{meant(block, blocks)}; there are {known}")
-        return self.problem.fields(block, self.x)
+        found = self.problem.fields(block, self.x)
+        new = [f"new_{name}" for name in blocks[block].kernel.history]
+        return {name: values for name, values in found.items() if name not in new}
 
     def at_nodes(self, block: str) -> dict[str, Array]:
         """Fields of a block averaged to nodes: name -> (points,), nan away from the block.
@@ -168,10 +171,10 @@ class Result:
                 continue
             rows = {tuple(row): k for k, row in enumerate(mesh.cells[block.kind].tolist())}
             chosen = [rows[tuple(row)] for row in block.nodes.tolist()]
-            for field, values in self.fields(name).items():
+            for label, values in self.fields(name).items():
                 data = {kind: np.full(len(nodes), np.nan) for kind, nodes in mesh.cells.items()}
                 data[block.kind][chosen] = values.mean(axis=1)
-                found[f"{name}.{field}"] = list(data.values())
+                found[f"{name}.{label}"] = list(data.values())
         return found
 
 

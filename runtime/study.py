@@ -12,7 +12,7 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -21,138 +21,36 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie, amount
+from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.unknowns import Elements, Numbering, Slot, slots
 from softehl.runtime.kernels import Kernel
+from softehl.runtime.march import Clock, March, Method
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate, meant
 from softehl.runtime.result import Result
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import NotConverged, Point
+from softehl.runtime.solve.solution import Branch, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.system import (
+    AUTOMATIC,
+    Block,
+    Condition,
+    Force,
+    StudyError,
+    System,
+    Where,
+    shown,
+)
 
-Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"
-"""A side or group by name, a predicate of places (n, dim), node numbers, or one place (a tuple)."""
 Source: TypeAlias = "str | Path | Kernel | object"
 """A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition."""
-Number: TypeAlias = float | Callable[[float], float]
-"""A parameter: a number, or a function of the load factor."""
 Datum: TypeAlias = float | Array | Callable[[Array], Array]
 """Data of elements: one number, (n,) numbers, or a function of their centres (n, dim)."""
 
-_SMALLEST = 1e-6  # of the whole load: where a path is given up
-
-
-class StudyError(ValueError):
-    """What was asked of a study cannot be; the message says what was given and what is allowed."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """Elements of one page: the kernel, their nodes (n, k), data, parameters."""
-
-    name: str
-    kernel: Kernel
-    nodes: Integers
-    slots: tuple[Slot, ...]
-    shared: frozenset[str]
-    data: Array | None
-    parameters: Mapping[str, Number]
-    kind: str
-
-
-@dataclass(frozen=True, eq=False)
-class _Condition:
-    """Prescribed values of an unknown at nodes."""
-
-    where: Where
-    nodes: Integers
-    name: str
-    value: Amount
-
-    @property
-    def words(self) -> str:
-        """What was asked for, for messages."""
-        return f"fix({_shown(self.where)}, {self.name}=...)"
-
-
-@dataclass(frozen=True, eq=False)
-class _Force:
-    """A load, a spring or a tie: elements of a kernel of ours on unknowns of one name."""
-
-    label: str
-    kernel: DeadLoad | NodalForce | Spring | Tie
-    nodes: Integers
-    name: str
-
-
-@dataclass(frozen=True, eq=False)
-class System:
-    """A study as equations: numbering and assembler, which all load factors share."""
-
-    mesh: Mesh
-    numbering: Numbering
-    assembler: Assembler
-    blocks: Mapping[str, _Block]
-    conditions: tuple[_Condition, ...]
-    """Prescribed values, as they were written down."""
-    implied: tuple[_Force, ...] = ()
-    """Ties both sides of which are prescribed: checked, not solved."""
-
-    def problem(self, t: float) -> Problem:
-        """The equations at a load factor.  Raises StudyError where prescribed values differ."""
-        fixed, values = self._prescribed(t)
-        for tie in self.implied:
-            self._require_tied(tie, t, dict(zip(fixed.tolist(), values.tolist(), strict=True)))
-        parameters = {}
-        for block in self.assembler.blocks:
-            page = self.blocks.get(block.name)
-            given = page.parameters if page else dict.fromkeys(block.kernel.parameters, t)
-            numbers = [given[name] for name in block.kernel.parameters]
-            parameters[block.name] = np.array([v(t) if callable(v) else v for v in numbers])
-        layout = self.numbering.layout
-        scales = dict.fromkeys(layout.names, 1.0)
-        return Problem(self.assembler, layout, parameters, scales, fixed, values)
-
-    def _require_tied(self, tie: _Force, t: float, values: Mapping[int, float]) -> None:
-        """Raise StudyError where values that are prescribed on both sides break a tie."""
-        assert isinstance(tie.kernel, Tie)
-        offsets = amount(tie.kernel.offset, self.mesh.points[tie.nodes[:, 0]], t)
-        numbers = self.numbering.nodal[tie.name][tie.nodes]
-        for (a, b), offset, node in zip(numbers, offsets, tie.nodes[:, 0], strict=True):
-            apart = values[int(a)] - values[int(b)] - float(offset)
-            if abs(apart) > 1e-12 * max(abs(values[int(a)]), abs(values[int(b)])):
-                raise StudyError(
-                    f"{tie.label}: at node {node} {_place(self.mesh.points[node])} both sides are "
-                    f"prescribed, and {apart:g} apart"
-                )
-
-    def _prescribed(self, t: float) -> tuple[Integers, Array]:
-        """Unknowns and values, each once; one that is given two values is refused."""
-        known: dict[int, tuple[float, _Condition]] = {}
-        for condition in self.conditions:
-            places = self.mesh.points[condition.nodes]
-            numbers = self.numbering.nodal[condition.name][condition.nodes]
-            for node, number, value in zip(
-                condition.nodes.tolist(),
-                numbers.tolist(),
-                amount(condition.value, places, t).tolist(),
-                strict=True,
-            ):
-                if number < 0:
-                    continue
-                before, by = known.setdefault(number, (value, condition))
-                if before != value:
-                    raise StudyError(
-                        f"{condition.name} at node {node} {_place(self.mesh.points[node])} is "
-                        f"prescribed twice: {before:g} by {by.words}, {value:g} by "
-                        f"{condition.words}"
-                    )
-        found = np.array(sorted(known), dtype=np.int64)
-        return found, np.array([known[n][0] for n in found.tolist()])
+_SMALLEST = 1e-6  # of the whole load or time: where a path is given up
 
 
 @dataclass(eq=False)
@@ -163,9 +61,10 @@ class Study:
     """
 
     mesh: Mesh
-    _blocks: dict[str, _Block] = field(default_factory=dict, repr=False)
-    _conditions: list[_Condition] = field(default_factory=list, repr=False)
-    _forces: list[_Force] = field(default_factory=list, repr=False)
+    _blocks: dict[str, Block] = field(default_factory=dict, repr=False)
+    _conditions: list[Condition] = field(default_factory=list, repr=False)
+    _forces: list[Force] = field(default_factory=list, repr=False)
+    _start: dict[str, tuple[Where, Datum]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         """Raises MeshError for a cell that is turned inside out."""
@@ -209,31 +108,39 @@ class Study:
                 f"{kernel.name} has {len(kernel.coordinates)} coordinates a node "
                 f"({', '.join(kernel.coordinates)}), the mesh has {self.mesh.dimension}"
             )
-        found = slots(kernel.unknowns, kernel.nodes)
+        found = slots(kernel)
         self._known("unknown", shared, [s.name for s in found if s.node is None], kernel.name)
-        self._known("argument", given, [*kernel.parameters, *kernel.data], kernel.name)
-        missing = [p for p in (*kernel.parameters, *kernel.data) if p not in given]
+        previous, rates = _automatic(kernel, found)
+        arguments = [*kernel.parameters, *kernel.data, *kernel.point_data]
+        self._known("argument", given, arguments, kernel.name)
+        needed = [p for p in kernel.parameters if p not in AUTOMATIC]
+        needed += [d for d in kernel.data if d not in previous and d not in rates]
+        missing = [a for a in needed if a not in given]
         if missing:
             raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}")
         for parameter in kernel.parameters:
-            _number(name, parameter, given[parameter])
+            _number(name, parameter, given.get(parameter, 0.0))
         centres = self.mesh.points[nodes].mean(axis=1)
-        columns = [_datum(name, d, given[d], centres) for d in kernel.data]
-        self._blocks[name] = _Block(
+        data = {d: _datum(name, d, given[d], centres) for d in kernel.data if d in given}
+        self._blocks[name] = Block(
             name=name,
             kernel=kernel,
             nodes=nodes,
+            kind=kind,
             slots=found,
             shared=frozenset(shared),
-            data=np.stack(columns, axis=1) if columns else None,
-            parameters={p: given[p] for p in kernel.parameters},
-            kind=kind,
+            data=data,
+            previous={d: s for d, s in previous.items() if d not in data},
+            rates={d: s for d, s in rates.items() if d not in data},
+            initial=_initial(name, kernel, given, centres),
+            parameters={p: given[p] for p in kernel.parameters if p in given},
         )
 
     def load(self, where: Where, **components: Amount) -> None:
         """Dead loads per reference length or area of a side, or forces at a place or nodes.
 
-        A number grows with the load factor; a function f(x (n, dim), t) gives the load itself.
+        A number grows with the load factor (in `march` it is constant); a function
+        f(x (n, dim), t) gives the load itself.
         where: a side or a predicate of faces; a tuple of coordinates or node numbers for forces.
         """
         for name, value in components.items():
@@ -251,16 +158,18 @@ class Study:
             self._add_force("spring", where, Spring(_finite(name, value)), nodes[:, None], name)
 
     def fix(self, where: Where, **values: Amount) -> None:
-        """Prescribe unknowns: a number grows with the load factor, f(x (n, dim), t) is the value.
+        """Prescribe unknowns: a number grows with the load factor (in `march` it is constant).
+
+        A function f(x (n, dim), t) gives the value itself.
 
         where: a side, a group, a predicate of places, node numbers, or one place.
         """
         if not values:
-            raise StudyError(f"fix({_shown(where)}): name what is prescribed, as in u_x=0")
+            raise StudyError(f"fix({shown(where)}): name what is prescribed, as in u_x=0")
         for name, value in values.items():
             if not callable(value):
                 _finite(name, value)
-            self._conditions.append(_Condition(where, self._nodes(where), name, value))
+            self._conditions.append(Condition(where, self._nodes(where), name, value))
 
     def tie(
         self, where: Where, to: Where, *names: str, offset: Amount = 0.0, tolerance: float = 1e-6
@@ -272,12 +181,17 @@ class Study:
         ours, theirs = self._nodes(where), self._nodes(to)
         if len(ours) != len(theirs):
             raise StudyError(
-                f"tie({_shown(where)}, {_shown(to)}): {len(ours)} and {len(theirs)} nodes"
+                f"tie({shown(where)}, {shown(to)}): {len(ours)} and {len(theirs)} nodes"
             )
         partners = theirs[_partners(self.mesh.points[ours], self.mesh.points[theirs], tolerance)]
         for name in names:
             pairs = np.stack([ours, partners], axis=1)
             self._add_force("tie", where, Tie(offset), pairs, name)
+
+    def start(self, where: Where | None = None, **values: Datum) -> None:
+        """Values of unknowns at the start, numbers or functions of places; zero if left out."""
+        for name, value in values.items():
+            self._start[name] = ("" if where is None else where, value)
 
     # solving it ---------------------------------------------------------------------------------
 
@@ -288,39 +202,76 @@ class Study:
         until: float = 1.0,
         start: Result | None = None,
         newton: Newton | None = None,
-        smallest: float = _SMALLEST,
         on_step: Callable[[Result], object] | None = None,
     ) -> Result:
         """The solution at load factor `until`, from 0 (or from `start`) in `steps` steps.
 
-        Steps are cut where Newton's method fails and grow again. on_step is given the result of
-        every converged step. Raises StudyError; NotConverged if the end is not reached, whose
-        `result` has the path so far, and whose `reached` is the last Result.
+        Steps are cut where Newton's method fails and grow again; history is committed after each.
+        on_step is given the result of every converged step. Raises StudyError; NotConverged if
+        the end is not reached: its `reached` is the last Result, or None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
-        system = self.system()
-        x0 = np.zeros(system.numbering.layout.total) if start is None else start.x
-        if len(x0) != system.numbering.layout.total:
-            raise StudyError("start: the result of another study, with other unknowns")
+        system = self.system() if start is None else start.system
+        x0 = system.at_rest() if start is None else start.x
         begin = 0.0 if start is None else start.t
-        first = abs(until - begin) / steps
-        rule = StepRule(first, min(smallest, first), first)
+        histories = system.histories() if start is None else start.histories
+        state = [(x0, histories)]  # after the last converged step
         reached: list[Result] = []
 
+        def problem_at(t: float) -> Problem:
+            return system.problem(system.still(t, *state[0]))
+
         def keep(point: Point) -> None:
-            reached[:] = [Result(system, system.problem(point.parameter), point)]
+            problem, x = problem_at(point.parameter), point.solution.x
+            state[0] = x, system.committed(problem, x, state[0][1])
+            reached[:] = [Result(system, problem, point, state[0][1])]
             if on_step is not None:
                 on_step(reached[0])
 
-        corrector = newton or Newton(linear=choose("auto"))
-        path = Continuation(corrector, rule, name="load factor")
-        branch = path.follow(system.problem, begin, until, x0, on_point=keep)
+        first = abs(until - begin) / steps
+        rule = StepRule(first, min(_SMALLEST, first), first)
+        path = Continuation(newton or _newton(), rule, name="load factor")
+        branch = path.follow(problem_at, begin, until, x0, on_point=keep)
         if not branch.converged:
-            error = NotConverged(branch)
-            error.reached = reached[0] if reached else None  # type: ignore[attr-defined]
-            raise error
+            raise _stopped(branch, reached)
         return reached[0]
+
+    def march(
+        self,
+        *,
+        dt: float,
+        until: float,
+        method: Method = "euler",
+        tolerance: float | None = None,
+        start: Result | None = None,
+        checkpoint: str | Path | None = None,
+        restart: str | Path | None = None,
+        newton: Newton | None = None,
+    ) -> Iterator[Result]:
+        """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
+
+        dt: length of the (first) step. method: "euler" (backward) or "bdf2". tolerance: largest
+        local error of a step, relative to each unknown's largest value; steps then adapt, else
+        they are dt, but for those that Newton's method needs shorter. History is committed and
+        values of steps before (data u_old, `Model.rates`) are renewed after every converged step.
+        checkpoint: file that is rewritten after each step; restart: such a file, from which the
+        march goes on bitwise as if it had not stopped. Raises StudyError, NotConverged.
+        """
+        if method not in ("euler", "bdf2"):
+            raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
+        for name, value in (("dt", dt), ("until", until), ("tolerance", tolerance)):
+            if value is not None and not (np.isfinite(value) and value > 0.0):
+                raise StudyError(f"{name} = {value}: must be positive")
+        system = self.system() if start is None else start.system
+        if restart is not None:
+            clock = Clock.load(Path(restart), system)
+        elif start is not None:
+            clock = Clock((start.t,), start.x[None], start.histories, dt)
+        else:
+            clock = Clock((0.0,), system.at_rest()[None], system.histories(), dt)
+        settings = March(method, tolerance, _SMALLEST * dt, newton or _newton())
+        return settings.run(system, clock, until, None if checkpoint is None else Path(checkpoint))
 
     def system(self) -> System:
         """What is written down, as equations.  Raises StudyError for what does not fit together."""
@@ -349,8 +300,9 @@ class Study:
         blocks = [self._page_block(b, numbering) for b in self._blocks.values()]
         blocks += [self._force_block(f, numbering) for f in forces if len(f.nodes)]
         assembler = Assembler.build(layout.total, blocks)
+        start = {name: self._at_start(name, numbering) for name in self._start}
         pages, conditions = dict(self._blocks), (*self._conditions,)
-        return System(self.mesh, numbering, assembler, pages, conditions, (*implied,))
+        return System(self.mesh, numbering, assembler, pages, conditions, (*implied,), start)
 
     # inside -------------------------------------------------------------------------------------
 
@@ -373,6 +325,15 @@ class Study:
             )
         return next(iter(fit.items()))
 
+    def _at_start(self, name: str, numbering: Numbering) -> Array:
+        """Values of an unknown at every node, (points,)."""
+        where, value = self._start[name]
+        nodes = np.arange(len(self.mesh.points)) if where == "" else self._nodes(where)
+        self._require(name, nodes, numbering, f"start({name}=...)", every=False)
+        found = np.zeros(len(self.mesh.points))
+        found[nodes] = _datum("start", name, value, self.mesh.points[nodes])
+        return found
+
     def _prescribed(self, name: str) -> Integers:
         """Nodes at which an unknown is prescribed."""
         parts = [c.nodes for c in self._conditions if c.name == name]
@@ -386,7 +347,7 @@ class Study:
         if isinstance(where, tuple) or given.dtype.kind == "f":
             return np.array([self.mesh.node_at(given)])
         if given.dtype.kind not in "iu" or given.ndim != 1 or not given.size:
-            raise StudyError(f"{_shown(where)}: node numbers are a list of integers")
+            raise StudyError(f"{shown(where)}: node numbers are a list of integers")
         if given.min() < 0 or given.max() >= len(self.mesh.points):
             raise StudyError(f"node numbers go from 0 to {len(self.mesh.points) - 1}")
         return given.astype(np.int64)
@@ -399,8 +360,8 @@ class Study:
         nodes: Integers,
         name: str,
     ) -> None:
-        label = f"{what} {len(self._forces) + 1}: {what}({_shown(where)}, {name})"
-        self._forces.append(_Force(label, kernel, nodes, name))
+        label = f"{what} {len(self._forces) + 1}: {what}({shown(where)}, {name})"
+        self._forces.append(Force(label, kernel, nodes, name))
 
     def _require(
         self, name: str, nodes: Integers, numbering: Numbering, words: str, *, every: bool
@@ -415,14 +376,16 @@ class Study:
         if not (there.all() if every else there.any()):
             raise StudyError(f"{words}: no page has the unknown {name!r} there")
 
-    def _page_block(self, block: _Block, numbering: Numbering) -> ElementBlock:
+    def _page_block(self, block: Block, numbering: Numbering) -> ElementBlock:
         n = len(block.nodes)
         width = len(block.kernel.coordinates)
         places = self.mesh.points[block.nodes].reshape(n, -1) if width else np.empty((n, 0))
         dofs = numbering.dofs[block.name]
-        return ElementBlock(block.name, block.kernel, places, dofs, data=block.data)
+        given = [block.data[d] for d in block.kernel.data if d in block.data]
+        data = np.stack(given, axis=1) if given else None  # what else there is comes with steps
+        return ElementBlock(block.name, block.kernel, places, dofs, data=data)
 
-    def _force_block(self, force: _Force, numbering: Numbering) -> ElementBlock:
+    def _force_block(self, force: Force, numbering: Numbering) -> ElementBlock:
         dofs = numbering.nodal[force.name][force.nodes]
         places = self.mesh.points[force.nodes].reshape(len(dofs), -1)
         if isinstance(force.kernel, Tie):
@@ -452,6 +415,35 @@ def _load(source: Source, model: str | None) -> Kernel:
     import softehl
 
     return softehl.load_kernel(source, model)  # type: ignore[arg-type]
+
+
+def _newton() -> Newton:
+    return Newton(linear=choose("auto"))
+
+
+def _stopped(branch: Branch, reached: list[Result]) -> NotConverged:
+    error = NotConverged(branch)
+    error.reached = reached[0] if reached else None
+    return error
+
+
+def _automatic(kernel: Kernel, found: Sequence[Slot]) -> tuple[dict[str, Slot], dict[str, Slot]]:
+    """Data u_old1, ... and u_rate1, ... of nodal unknowns u: what a study fills itself."""
+    nodal = {f"{s.name}{{}}{s.node + 1}": s for s in found if s.node is not None}
+    previous = {label.format("_old"): slot for label, slot in nodal.items()}
+    rates = {label.format("_rate"): slot for label, slot in nodal.items()}
+    return tuple(  # type: ignore[return-value]
+        {d: table[d] for d in kernel.data if d in table} for table in (previous, rates)
+    )
+
+
+def _initial(block: str, kernel: Kernel, given: Mapping[str, Any], centres: Array) -> Array | None:
+    """Point data at the start, (n, points, k): numbers or functions of the centres, else zero."""
+    if not kernel.point_data:
+        return None
+    columns = [_datum(block, name, given.get(name, 0.0), centres) for name in kernel.point_data]
+    points = len(kernel.default_rule.weights)
+    return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
 
 
 def _number(block: str, name: str, value: object) -> None:
@@ -493,14 +485,4 @@ def _partners(ours: Array, theirs: Array, tolerance: float) -> Integers:
     return np.asarray(chosen, dtype=np.int64)
 
 
-def _shown(where: object) -> str:
-    if callable(where):
-        return getattr(where, "__name__", "predicate")
-    return repr(where) if isinstance(where, str | tuple) else "nodes"
-
-
-def _place(x: Array) -> str:
-    return "(" + ", ".join(f"{value:.4g}" for value in x) + ")"
-
-
-__all__ = ["MeshError", "Study", "StudyError", "System"]
+__all__ = ["MeshError", "Study", "StudyError"]

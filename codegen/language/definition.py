@@ -57,7 +57,11 @@ class Definition:
     components: int = 2
     """Basis values of the interpolated field: value and derivative, on each side of a facet."""
     nodal: tuple[tuple[int, int], ...] = ()
-    """First unknown and number of components of every field with unknowns at the nodes."""
+    """First unknown and number of components of every field with unknowns at all nodes."""
+    places: tuple[tuple[str, int | None], ...] = ()
+    """Of every unknown its name without number, and its node or None."""
+    history: tuple[str, ...] = ()
+    """Point data that the last fields are the new values of."""
 
     @property
     def coordinate_width(self) -> int:

@@ -59,6 +59,8 @@ class Model:
         self._components = 2
         self._directions: list[Node] = []
         self._nodal: list[tuple[int, int]] = []
+        self._places: list[tuple[str, int | None]] = []
+        self._history: list[tuple[str, Node]] = []
         self._arguments: dict[str, list[Argument]] = {
             "parameters": [],
             "data": [],
@@ -88,16 +90,24 @@ class Model:
             for c, name in enumerate(names)
         ]
 
-    def nodal_unknowns(self, *names: str, idle: Sequence[str] = ()) -> list[list[sp.Symbol]]:
+    def nodal_unknowns(
+        self, *names: str, idle: Sequence[str] = (), nodes: int | None = None
+    ) -> list[list[sp.Symbol]]:
         """Unknowns at the nodes, numbered node by node; one list for each component.
 
-        The `idle` ones of `names` belong to the node but need not enter the mathematics.
+        The `idle` ones of `names` belong to the node but need not enter the mathematics. nodes:
+        at the first so many nodes only, such as a pressure at the corners of a quadratic cell.
         """
         columns: list[list[sp.Symbol]] = [[] for _ in names]
-        self._nodal.append((len(self._unknowns), len(names)))
-        for a in range(self.nodes):
+        count = self.nodes if nodes is None else nodes
+        if not 1 <= count <= self.nodes:
+            raise ModelError(f"{names[0]}: nodes = {nodes}, must be 1 to {self.nodes}")
+        if count == self.nodes:
+            self._nodal.append((len(self._unknowns), len(names)))
+        for a in range(count):
             for c, name in enumerate(names):
                 columns[c].append(self.unknown(f"{name}{a + 1}"))
+                self._places[-1] = (name, a)
                 if name in idle:
                     self._declared.pop(f"{name}{a + 1}", None)
         return columns
@@ -108,6 +118,7 @@ class Model:
             raise ModelError(f"declare {name} before the interpolated {self._interpolated}")
         symbol = self._input(name, "dofs", len(self._unknowns))
         self._unknowns.append(name)
+        self._places.append((name, None))
         self._directions.append(self._bound[symbol])
         return symbol
 
@@ -142,6 +153,53 @@ class Model:
     def point_data(self, **meanings: str) -> list[sp.Symbol]:
         """Arguments that differ from quadrature point to point, e.g. history variables."""
         return self._declare("point data", meanings, varying=True)
+
+    def nodal_data(
+        self, *names: str, meaning: str = "at the nodes", nodes: int | None = None
+    ) -> list[list[sp.Symbol]]:
+        """Data at the (first) nodes: a list over the nodes for each name, data name1, name2, ...
+
+        A study fills `u_old` (for an unknown u) with the values of the step before.
+        """
+        columns = []
+        for name in names:
+            given = {f"{name}{a + 1}": f"{name} {meaning}" for a in range(nodes or self.nodes)}
+            columns.append(self._declare("data", given))
+        return columns
+
+    def rates(self, *names: str) -> list[list[sp.Expr]]:
+        """Time derivatives of nodal unknowns, in the order of `nodal_unknowns`.
+
+        du/dt = rate u + u_rate, with the parameter `rate` and the data `u_rate` at the nodes:
+        `Study.march` gives both, by backward Euler or BDF2.
+        """
+        known = {a.name: sp.Symbol(a.name, real=True) for a in self._arguments["parameters"]}
+        rate = known.get("rate")
+        if rate is None:
+            (rate,) = self.parameters(rate="coefficient of the time derivative [1/s]")
+        found = []
+        for name in names:
+            count = sum(n == name and a is not None for n, a in self._places)
+            if not count:
+                raise ModelError(f"rates: {name} is no unknown at the nodes")
+            values = [sp.Symbol(f"{name}{a + 1}", real=True) for a in range(count)]
+            label, words = f"{name}_rate", "of the steps before"
+            (rest,) = self.nodal_data(label, meaning=words, nodes=count)
+            found.append([rate * u + v for u, v in zip(values, rest, strict=True)])
+        return found
+
+    def history(self, **new: Any) -> None:
+        """What `point_data` become after a converged step: m.history(v_old=v).
+
+        Each is a field of the kernel, named new_v_old.
+        """
+        known = [a.name for a in self._arguments["point data"]]
+        for name, value in new.items():
+            if name not in known:
+                raise ModelError(
+                    f"history: {name} is no point data; there are {', '.join(known) or 'none'}"
+                )
+            self._history.append((name, self._lower(value)))
 
     def require(self, *conditions: Any) -> None:
         """What parameters and data must satisfy, e.g. `mu > 0`; checked at every call.
@@ -353,7 +411,7 @@ class Model:
             given=self._given,
             directions=tuple(self._directions),
             interface=tuple(self._interface),
-            fields=tuple(self._fields),
+            fields=(*self._fields, *((f"new_{name}", n) for name, n in self._history)),
             product=self._product,
             derivatives=tuple(self._derivatives),
             example=tuple(self._example.items()),
@@ -361,6 +419,8 @@ class Model:
             conditions=tuple(self._conditions),
             nodal=tuple(self._nodal),
             components=self._components,
+            places=tuple(self._places),
+            history=tuple(name for name, _ in self._history),
         )
 
         chosen = definition.tasks or ()
@@ -374,7 +434,7 @@ class Model:
         """Every unknown enters the potential, every other argument it or a field."""
         given = [n for pairs in self._given.values() for n in (*pairs, *pairs.values())]
         equations = set(reachable([potential, *given]))
-        used = equations | set(reachable([n for _, n in self._fields]))
+        used = equations | set(reachable([n for _, n in (*self._fields, *self._history)]))
         for name, (n, where) in self._declared.items():
             unknown = isinstance(n.payload, Input) and n.payload.array == "dofs"
             if n not in (equations if unknown else used):

@@ -57,6 +57,8 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "parameters": {a.name: a.meaning for a in d.parameters},
         "data": {a.name: a.meaning for a in d.data},
         "point_data": {a.name: a.meaning for a in d.point_data},
+        "places": [list(place) for place in d.places],
+        "history": list(d.history),
         "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],
         "fields": [name for name, _ in d.fields],
         "unrolled": d.unroll,

@@ -88,7 +88,8 @@ class ElementBlock:
     name: by which parameters are given. coordinates: (n, 2 nodes) reference (z, r), node by node.
     dofs: (n, ndof) numbers of the unknowns. data: (n, k) constants of each element or None.
     rule: quadrature rule, None for the kernel's own. constant: the tangent depends on parameters
-    alone, so that it is evaluated once for each set of them.
+    alone, so that it is evaluated once for each set of them. point_data: (n, points, k) values at
+    the quadrature points, such as the history of the steps before, or None.
     """
 
     name: str
@@ -98,6 +99,7 @@ class ElementBlock:
     data: Array | None = None
     rule: Rule | None = None
     constant: bool = False
+    point_data: Array | None = None
 
     def residual(self, x: Array, parameters: Array) -> Array:
         """Element residuals (n, ndof) at the global vector x."""
@@ -118,12 +120,14 @@ class ElementBlock:
         for first in range(0, n, step):
             part = slice(first, first + step)
             data = None if self.data is None else self.data[part]
+            history = None if self.point_data is None else self.point_data[part]
             coordinates, dofs = self.coordinates[part], self.dofs[part]
-            piece = replace(self, coordinates=coordinates, dofs=dofs, data=data)
+            piece = replace(self, coordinates=coordinates, dofs=dofs, data=data, point_data=history)
             yield piece, scatter[width * first : width * (first + step)]
 
     def _given(self, parameters: Array) -> dict[str, Any]:
-        return {"data": self.data, "parameters": parameters, "rule": self.rule}
+        given = {"data": self.data, "parameters": parameters, "rule": self.rule}
+        return given if self.point_data is None else {**given, "point_data": self.point_data}
 
     def fields(self, x: Array, parameters: Array) -> dict[str, Array]:
         """Fields of the kernel at its quadrature points, name -> (n, points)."""
@@ -141,6 +145,11 @@ class Memo:
 
     tangents: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
     crosses: dict[bytes, Integers] = field(default_factory=dict)
+
+    def without(self, name: str) -> Memo:
+        """A copy that knows nothing of one block's tangent."""
+        tangents = {n: known for n, known in self.tangents.items() if n != name}
+        return Memo(tangents, dict(self.crosses))
 
     def keep_cross(self, key: bytes, places: Integers) -> None:
         """Remember the positions of a set of unknowns; the oldest of too many is forgotten."""
@@ -177,6 +186,14 @@ class Assembler:
             if block.name == name:
                 return block
         raise KeyError(f"no block {name!r}; there are {', '.join(b.name for b in self.blocks)}")
+
+    def with_data(
+        self, name: str, *, data: Array | None = None, point_data: Array | None = None
+    ) -> Assembler:
+        """The assembler with other data of one block; the pattern is shared."""
+        changed = replace(self.block(name), data=data, point_data=point_data)
+        blocks = tuple(changed if b.name == name else b for b in self.blocks)
+        return replace(self, blocks=blocks, memo=self.memo.without(name))
 
     def residual(self, x: Array, parameters: Mapping[str, Array]) -> Array:
         """Sum of the element residuals, (size,)."""

@@ -12,13 +12,19 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.cells import Cell, measures
 
 Amount = float | Callable[[Array, float], Array | float]
-"""A number that grows with the load factor, or a function of places (n, dim) and load factor."""
+"""A number that the load factor multiplies, or a function of places (n, dim) and of t."""
+
+_TIME = ("t", "factor")
+"""Parameters of loads: time or load factor, and what numbers are multiplied by."""
 
 
-def amount(value: Amount, places: Array, t: float) -> Array:
-    """Values (n,) at places (n, dim) and load factor t.  Raises ValueError for another shape."""
+def amount(value: Amount, places: Array, t: float, factor: float) -> Array:
+    """Values (n,) at places (n, dim): factor times a number, or a function of places and t.
+
+    Raises ValueError for another shape.
+    """
     if not callable(value):
-        return np.full(len(places), t * float(value))
+        return np.full(len(places), factor * float(value))
     found = np.asarray(value(places, t), dtype=np.float64)
     if found.shape not in ((), (len(places),)):
         raise ValueError(f"a function of {len(places)} places gave values of shape {found.shape}")
@@ -40,7 +46,7 @@ class _Kernel:
 
 @dataclass(frozen=True, eq=False)
 class DeadLoad(_Kernel):
-    """A load per reference length or area of faces, one component; its parameter is t.
+    """A load per reference length or area of faces, one component; its parameters are t and factor.
 
     face: kind of the faces, whose coordinates the elements have. value: of the load.
     """
@@ -48,7 +54,7 @@ class DeadLoad(_Kernel):
     face: Cell
     value: Amount
     name = "dead load"
-    parameters = ("t",)
+    parameters = _TIME
 
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Minus the virtual work of the load, (n, k)."""
@@ -56,7 +62,7 @@ class DeadLoad(_Kernel):
         points, weights = self.face.rule(4)
         shape = self.face.shape(points)
         x = np.einsum("qk,nkc->nqc", shape, places)
-        load = amount(self.value, x.reshape(-1, x.shape[2]), float(given["parameters"][0]))
+        load = amount(self.value, x.reshape(-1, x.shape[2]), *given["parameters"].tolist())
         area = measures(self.face, places, points) if self.face.dimension else np.ones(x.shape[:2])
         work = np.einsum("nq,nq,q,qk->nk", load.reshape(x.shape[:2]), area, weights, shape)
         return np.asarray(-work)
@@ -69,15 +75,15 @@ class DeadLoad(_Kernel):
 
 @dataclass(frozen=True, eq=False)
 class NodalForce(_Kernel):
-    """Forces at nodes; its parameter is t."""
+    """Forces at nodes; its parameters are t and factor."""
 
     value: Amount
     name = "nodal force"
-    parameters = ("t",)
+    parameters = _TIME
 
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Minus the forces, (n, 1)."""
-        return -amount(self.value, coordinates, float(given["parameters"][0]))[:, None]
+        return -amount(self.value, coordinates, *given["parameters"].tolist())[:, None]
 
     def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
         """Residual, and a tangent of zeros."""
@@ -103,19 +109,19 @@ class Spring(_Kernel):
 
 @dataclass(frozen=True, eq=False)
 class Tie(_Kernel):
-    """u_a = u_b + offset by a multiplier: unknowns u_a, u_b, multiplier; its parameter is t.
+    """u_a = u_b + offset by a multiplier: unknowns u_a, u_b, multiplier; parameters t and factor.
 
     The coordinates are those of the node a.
     """
 
     offset: Amount
     name = "tie"
-    parameters = ("t",)
+    parameters = _TIME
 
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Forces of the multiplier and the equation itself, (n, 3)."""
         a, b, force = dofs.T
-        offset = amount(self.offset, coordinates, float(given["parameters"][0]))
+        offset = amount(self.offset, coordinates, *given["parameters"].tolist())
         return np.stack([force, -force, a - b - offset], axis=1)
 
     def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Flags, Integers
 from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.kernels import Kernel
 
 _NUMBERED = re.compile(r"(.*?[^\d_]_?)(\d+)")
 
@@ -27,11 +28,15 @@ class Slot:
     node: int | None
 
 
-def slots(unknowns: Sequence[str], nodes: int) -> tuple[Slot, ...]:
-    """What each unknown of a kernel is.
+def slots(kernel: Kernel) -> tuple[Slot, ...]:
+    """What each unknown of a kernel is: what its page says, else what the names do."""
+    if kernel.places:
+        return tuple(Slot(name, node) for name, node in kernel.places)
+    return from_names(kernel.unknowns, kernel.nodes)
 
-    A name is nodal where it comes with the numbers 1 to n of the first n of the element's nodes.
-    """
+
+def from_names(unknowns: Sequence[str], nodes: int) -> tuple[Slot, ...]:
+    """A name is nodal where it comes with the numbers 1 to n of the element's first n nodes."""
     matches = [_NUMBERED.fullmatch(name) for name in unknowns]
     numbers: dict[str, list[int]] = {}
     for match in matches:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -55,11 +56,15 @@ _ADVICE = {
 
 
 class NotConverged(RuntimeError):  # noqa: N818 (named after what it is)
-    """Raised by `raise_for_status` only; `result` is the Solution or Branch that failed."""
+    """Raised for the outermost caller only; `result` is the Solution or Branch that failed.
+
+    reached: the last state that was reached, where there is one (a study's Result).
+    """
 
     def __init__(self, result: Solution | Branch) -> None:
         super().__init__(f"{result.status.value}: {result.message}. {result.status.advice}")
         self.result = result
+        self.reached: Any = None
 
 
 @dataclass(frozen=True, eq=False)

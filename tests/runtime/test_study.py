@@ -209,7 +209,7 @@ def test_a_path_that_ends_says_how_far_it_came() -> None:
     study.fix("right", u_x=-2.5)  # would turn the block inside out
     with pytest.raises(NotConverged) as error:
         study.solve(steps=5)
-    reached = error.value.reached  # type: ignore[attr-defined]
+    reached = error.value.reached
     assert 0.0 < reached.t < 1.0
 
 

@@ -1,0 +1,168 @@
+"""Time: backward Euler and BDF2 over the steps of a study, adaptive, with history, restartable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.io import read_arrays, write_arrays
+from softehl.runtime.result import Result
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import NotConverged, Point, Solution
+from softehl.runtime.system import Step, StudyError, System
+
+Method: TypeAlias = Literal["euler", "bdf2"]
+
+_ORDER = {"euler": 1, "bdf2": 2}
+_GROWTH, _SAFETY = 2.0, 0.9
+_ROUNDING = 1e-12  # of the whole time: a step is not cut to less than that before the end
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Everything that passes from one step to the next.
+
+    times: of the last states, latest first, at most three. states: (k, n) their unknowns.
+    histories: block -> point data after the last step. dt: length of the next step.
+    """
+
+    times: tuple[float, ...]
+    states: Array
+    histories: Mapping[str, Array]
+    dt: float
+
+    @property
+    def t(self) -> float:
+        """The present time."""
+        return self.times[0]
+
+    def save(self, path: Path) -> None:
+        """Write what a restart needs, atomically."""
+        parts = {f"history {name}": values for name, values in self.histories.items()}
+        arrays = {"times": np.array(self.times), "states": self.states, "dt": np.array(self.dt)}
+        write_arrays(path, {**arrays, **parts})
+
+    @classmethod
+    def load(cls, path: Path, system: System) -> Clock:
+        """What `save` wrote.  Raises StudyError where it does not belong to the study."""
+        found = read_arrays(path)
+        if found is None:
+            raise StudyError(f"restart: {str(path)!r} is missing or damaged")
+        histories = {n[8:]: v for n, v in found.items() if n.startswith("history ")}
+        expected = {name: v.shape for name, v in system.histories().items()}
+        shapes = {name: v.shape for name, v in histories.items()}
+        if found.get("states", np.empty((0, 0))).shape[1:] != (system.size,) or shapes != expected:
+            raise StudyError(f"restart: {str(path)!r} holds another study")
+        return cls(tuple(found["times"].tolist()), found["states"], histories, float(found["dt"]))
+
+
+@dataclass(frozen=True)
+class March:
+    """Settings of a march.
+
+    method: "euler" (backward, order 1) or "bdf2" (order 2, of variable steps). tolerance: largest
+    local error of a step relative to the largest value of each unknown; None for equal steps.
+    smallest: step at which it is given up.
+    """
+
+    method: Method
+    tolerance: float | None
+    smallest: float
+    newton: Newton
+
+    def run(
+        self, system: System, clock: Clock, until: float, checkpoint: Path | None
+    ) -> Iterator[Result]:
+        """Every converged step until the end.  Raises NotConverged."""
+        length = until - clock.t
+        while until - clock.t > _ROUNDING * abs(length):
+            dt = _towards(until - clock.t, clock.dt)
+            result, clock = self._step(system, clock, dt)
+            if checkpoint is not None:
+                clock.save(checkpoint)
+            yield result
+
+    def _step(self, system: System, clock: Clock, dt: float) -> tuple[Result, Clock]:
+        """One accepted step; it is cut as often as Newton's method or the error asks for it."""
+        wanted = max(clock.dt, dt)
+        while True:
+            step = self._posed(system, clock, dt)
+            problem = system.problem(step)
+            guess = _extrapolated(clock, step.t)
+            with np.errstate(all="ignore"):
+                solution = self.newton.solve(problem, guess)
+            if not solution.converged:
+                dt = self._cut(dt, 0.5, solution)
+                wanted = dt
+                continue
+            factor = self._factor(system, clock, step, solution.x)
+            if factor < 1.0 and self.tolerance is not None:
+                dt = self._cut(dt, max(factor, 0.2), solution)
+                wanted = dt
+                continue
+            break
+        after = system.committed(problem, solution.x, clock.histories)
+        following = min(factor, _GROWTH) * dt if self.tolerance is not None else wanted
+        if self.tolerance is None and wanted < clock.dt:
+            following = min(_GROWTH * wanted, clock.dt)
+        states = np.vstack([solution.x, clock.states])[:3]
+        times = (step.t, *clock.times)[:3]
+        reached = Result(system, problem, Point(step.t, solution), after)
+        return reached, Clock(times, states, after, following)
+
+    def _posed(self, system: System, clock: Clock, dt: float) -> Step:
+        """The step of length dt: du/dt = rate u + rest."""
+        old = clock.states[0]
+        if self.method == "bdf2" and len(clock.times) > 1:
+            r = dt / (clock.times[0] - clock.times[1])
+            rate = (1.0 + 2.0 * r) / (1.0 + r) / dt
+            rest = (r * r / (1.0 + r) * clock.states[1] - (1.0 + r) * old) / dt
+        else:
+            rate, rest = 1.0 / dt, -old / dt
+        return Step(clock.t + dt, 1.0, old, rate, rest, dt, clock.histories)
+
+    def _factor(self, system: System, clock: Clock, step: Step, x: Array) -> float:
+        """By how much the next step may be longer; below 1 where the error is too large."""
+        order = _ORDER[self.method] if len(clock.times) > 1 else 1
+        if self.tolerance is None or len(clock.times) <= order:
+            return 1.0
+        difference = x - _extrapolated(clock, step.t, order + 1)
+        # of the difference from the polynomial through the states before, which has its own error
+        share = 2.0 / 11.0
+        if order == 1:
+            share = step.dt / (step.dt + clock.times[0] - clock.times[1])
+        worst = 0.0
+        for name in system.numbering.layout.names:
+            part = system.numbering.layout.part(name)
+            size = max(float(np.abs(x[part]).max(initial=0.0)), 1e-300)
+            worst = max(worst, share * float(np.abs(difference[part]).max(initial=0.0)) / size)
+        if worst == 0.0:
+            return _GROWTH
+        return float(_SAFETY * math.pow(self.tolerance / worst, 1.0 / (order + 1)))
+
+    def _cut(self, dt: float, factor: float, solution: Solution) -> float:
+        if factor * dt < self.smallest:
+            raise NotConverged(replace(solution, message=f"{solution.message}; dt = {dt:.3g}"))
+        return factor * dt
+
+
+def _towards(left: float, dt: float) -> float:
+    """A step of about dt that does not leave a sliver before the end."""
+    if left <= dt * (1.0 + 1e-9):
+        return left
+    return min(dt, 0.5 * left) if left < 2.0 * dt and left > dt * (1.0 + 1e-9) else dt
+
+
+def _extrapolated(clock: Clock, t: float, count: int = 2) -> Array:
+    """Unknowns at t on the polynomial through the last states, at most `count` of them."""
+    times, states = clock.times[:count], clock.states[:count]
+    found = np.zeros_like(states[0])
+    for a, state in zip(times, states, strict=True):
+        found += math.prod((t - b) / (a - b) for b in times if b != a) * state
+    return np.asarray(found)

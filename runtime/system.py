@@ -1,0 +1,233 @@
+"""A study as equations: numbering, assembler, and the problem at a time or load factor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.assembly import Assembler
+from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie, amount
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.unknowns import Numbering, Slot
+from softehl.runtime.kernels import Kernel
+from softehl.runtime.mesh.mesh import Mesh, Predicate
+
+Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"
+"""A side or group by name, a predicate of places (n, dim), node numbers, or one place (a tuple)."""
+Number: TypeAlias = float | Callable[[float], float]
+"""A parameter: a number, or a function of time or load factor."""
+
+AUTOMATIC = ("rate", "dt", "t")
+"""Parameters that a study gives where a page has them and the user does not."""
+
+
+class StudyError(ValueError):
+    """What was asked of a study cannot be; the message says what was given and what is allowed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Elements of one page.
+
+    nodes: (n, k). kind: of the cells or faces. data: name -> (n,) of those that the user gave.
+    previous: column of the kernel's data -> name and node of the unknown whose value at the step
+    before it is; rates: likewise of what `rates` adds. initial: (n, points, k) point data at the
+    start, or None.
+    """
+
+    name: str
+    kernel: Kernel
+    nodes: Integers
+    kind: str
+    slots: tuple[Slot, ...]
+    shared: frozenset[str]
+    data: Mapping[str, Array]
+    previous: Mapping[str, Slot]
+    rates: Mapping[str, Slot]
+    initial: Array | None
+    parameters: Mapping[str, Number]
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """Prescribed values of an unknown at nodes."""
+
+    where: Where
+    nodes: Integers
+    name: str
+    value: Amount
+
+    @property
+    def words(self) -> str:
+        """What was asked for, for messages."""
+        return f"fix({shown(self.where)}, {self.name}=...)"
+
+
+@dataclass(frozen=True, eq=False)
+class Force:
+    """A load, a spring or a tie: elements of a kernel of ours on unknowns of one name."""
+
+    label: str
+    kernel: DeadLoad | NodalForce | Spring | Tie
+    nodes: Integers
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Where a problem stands: its time or load factor, and what was before.
+
+    factor: what numbers in loads and supports are multiplied by. old: (n,) unknowns of the step
+    before. rate, rest: du/dt = rate u + rest, rest (n,). dt: length of the step. histories: block
+    -> (cells, points, k) point data.
+    """
+
+    t: float
+    factor: float
+    old: Array
+    rate: float
+    rest: Array
+    dt: float
+    histories: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Numbering and assembler, which all steps share.
+
+    conditions: prescribed values, as they were written down. implied: ties both sides of which
+    are prescribed: checked, not solved. start: name -> (points,) initial values.
+    """
+
+    mesh: Mesh
+    numbering: Numbering
+    assembler: Assembler
+    blocks: Mapping[str, Block]
+    conditions: tuple[Condition, ...]
+    implied: tuple[Force, ...] = ()
+    start: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.numbering.layout.total
+
+    def at_rest(self) -> Array:
+        """Unknowns at the start, (n,): zero but for initial values."""
+        x = np.zeros(self.size)
+        for name, values in self.start.items():
+            numbers = self.numbering.nodal[name]
+            x[numbers[numbers >= 0]] = values[numbers >= 0]
+        return x
+
+    def histories(self) -> dict[str, Array]:
+        """Point data at the start."""
+        return {b.name: b.initial for b in self.blocks.values() if b.initial is not None}
+
+    def still(self, t: float, old: Array, histories: Mapping[str, Array]) -> Step:
+        """A step without time: t is the load factor, rates are zero."""
+        return Step(t, t, old, 0.0, np.zeros(self.size), 0.0, histories)
+
+    def committed(
+        self, problem: Problem, x: Array, before: Mapping[str, Array]
+    ) -> dict[str, Array]:
+        """Point data after a converged step: what pages call their history."""
+        after = dict(before)
+        for block in self.blocks.values():
+            names = block.kernel.history
+            if names:
+                fields = problem.fields(block.name, x)
+                state = before[block.name].copy()
+                for name in names:
+                    state[:, :, block.kernel.point_data.index(name)] = fields[f"new_{name}"]
+                after[block.name] = state
+        return after
+
+    def problem(self, step: Step) -> Problem:
+        """The equations of a step.  Raises StudyError where prescribed values differ."""
+        fixed, values = self._prescribed(step)
+        for tie in self.implied:
+            self._require_tied(tie, step, dict(zip(fixed.tolist(), values.tolist(), strict=True)))
+        assembler, parameters = self.assembler, {}
+        for block in self.assembler.blocks:
+            page = self.blocks.get(block.name)
+            if page is None:
+                given: Mapping[str, Number] = {"t": step.t, "factor": step.factor}
+            else:
+                automatic = {"rate": step.rate, "dt": step.dt, "t": step.t}
+                given = {**automatic, **page.parameters}
+                if page.previous or page.rates or page.initial is not None:
+                    state = {"data": self._data(page, step)}
+                    history = step.histories.get(page.name)
+                    assembler = assembler.with_data(page.name, **state, point_data=history)
+            numbers = [given[name] for name in block.kernel.parameters]
+            parameters[block.name] = np.array([v(step.t) if callable(v) else v for v in numbers])
+        layout = self.numbering.layout
+        return Problem(
+            assembler, layout, parameters, dict.fromkeys(layout.names, 1.0), fixed, values
+        )
+
+    def _data(self, page: Block, step: Step) -> Array | None:
+        """Data of the elements of a page, (n, k), in the kernel's order."""
+        columns = []
+        for name in page.kernel.data:
+            if name in page.data:
+                columns.append(page.data[name])
+                continue
+            slot = page.previous.get(name) or page.rates[name]
+            source = step.old if name in page.previous else step.rest
+            columns.append(source[self.numbering.nodal[slot.name][page.nodes[:, slot.node or 0]]])
+        return np.stack(columns, axis=1) if columns else None
+
+    def _require_tied(self, tie: Force, step: Step, values: Mapping[int, float]) -> None:
+        """Raise StudyError where values that are prescribed on both sides break a tie."""
+        assert isinstance(tie.kernel, Tie)
+        places = self.mesh.points[tie.nodes[:, 0]]
+        offsets = amount(tie.kernel.offset, places, step.t, step.factor)
+        numbers = self.numbering.nodal[tie.name][tie.nodes]
+        for (a, b), offset, node in zip(numbers, offsets, tie.nodes[:, 0], strict=True):
+            apart = values[int(a)] - values[int(b)] - float(offset)
+            if abs(apart) > 1e-12 * max(abs(values[int(a)]), abs(values[int(b)])):
+                raise StudyError(
+                    f"{tie.label}: at node {node} {place_text(self.mesh.points[node])} both sides "
+                    f"are prescribed, and {apart:g} apart"
+                )
+
+    def _prescribed(self, step: Step) -> tuple[Integers, Array]:
+        """Unknowns and values, each once; one that is given two values is refused."""
+        known = np.full(self.size, np.nan)
+        by = np.full(self.size, -1)
+        for k, condition in enumerate(self.conditions):
+            numbers = self.numbering.nodal[condition.name][condition.nodes]
+            places = self.mesh.points[condition.nodes]
+            values = amount(condition.value, places, step.t, step.factor)
+            there = numbers >= 0
+            numbers, values, nodes = numbers[there], values[there], condition.nodes[there]
+            wrong = np.flatnonzero((by[numbers] >= 0) & (known[numbers] != values))
+            if len(wrong):
+                i = int(wrong[0])
+                before = self.conditions[int(by[numbers[i]])]
+                raise StudyError(
+                    f"{condition.name} at node {nodes[i]} "
+                    f"{place_text(self.mesh.points[nodes[i]])} is prescribed twice: "
+                    f"{known[numbers[i]]:g} by {before.words}, {values[i]:g} by {condition.words}"
+                )
+            known[numbers], by[numbers] = values, k
+        fixed = np.flatnonzero(by >= 0)
+        return fixed, known[fixed]
+
+
+def shown(where: object) -> str:
+    """A place that was meant, for messages."""
+    if callable(where):
+        return getattr(where, "__name__", "predicate")
+    return repr(where) if isinstance(where, str | tuple) else "nodes"
+
+
+def place_text(x: Array) -> str:
+    """Coordinates, for messages."""
+    return "(" + ", ".join(f"{value:.4g}" for value in x) + ")"

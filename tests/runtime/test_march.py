@@ -1,0 +1,198 @@
+"""Time and history in studies: closed forms, orders, adaptive steps, restart, and what is refused."""
+
+from __future__ import annotations
+
+import itertools
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softehl import Definition, Mesh, Model, Study, element, kinematics, quadrature
+from softehl.runtime.result import Result
+from softehl.runtime.study import StudyError
+
+
+@cache
+def heat() -> Definition:
+    """du/dt = d2u/dx2, lines of 2 nodes, capacity lumped at the nodes by its rule."""
+    m = Model("heat", nodes=2, rule=quadrature.gauss(2, 1))
+    X = m.coordinates("X")
+    (u,) = m.nodal_unknowns("u")
+    (k,) = m.parameters(k="conductivity")
+    (u_dot,) = m.rates("u")
+    kind, (xi,) = element("line2"), m.point()
+    e = kinematics.isoparametric(m, X, kind.gradient(xi))
+    N = kind.shape(xi)
+    slope = m.define("slope", sum(d[0] * v for d, v in zip(e.dN, u, strict=True)))
+    value = m.define("value", sum(a * v for a, v in zip(N, u, strict=True)))
+    rate = m.define("rate_of_u", sum(a * v for a, v in zip(N, u_dot, strict=True)))
+    m.weak_form([(k * slope * e.detJ, slope), (rate * e.detJ, value)])
+    return m.finish()
+
+
+@cache
+def maxwell() -> Definition:
+    """A bar with a spring beside a spring and a linear dashpot in series; v is its strain."""
+    m = Model("maxwell", nodes=2, rule=quadrature.gauss(1, 1), unroll=True)
+    (X,) = m.coordinates("X")
+    (u,) = m.nodal_unknowns("u")
+    E, tau, dt = m.parameters(E="modulus [MPa]", tau="time of relaxation [s]", dt="step [s]")
+    (v_old,) = m.point_data(v_old="strain of the dashpot at the beginning of the step")
+    length = m.define("length", X[1] - X[0])
+    strain = m.define("strain", (u[1] - u[0]) / length)
+    v = m.define("v", (v_old + dt / tau * strain) / (1 + dt / tau))
+    stress = m.define("stress", E * strain + E * (strain - v))
+    m.weak_form([(stress * length / 2, strain)])
+    m.fields(stress=stress)
+    m.history(v_old=v)
+    return m.finish()
+
+
+def rod(cells: int = 40) -> Study:
+    """A rod of length 1 with a half wave of temperature, cold at both ends."""
+    study = Study(Mesh.line(1.0, cells=cells))
+    study.add("rod", heat(), k=1.0)
+    study.fix("left", u=0.0)
+    study.fix("right", u=0.0)
+    study.start(u=lambda x: np.sin(np.pi * x[:, 0]))
+    return study
+
+
+def middle(results: list[Result]) -> float:
+    return results[-1].at((0.5,))["u"]
+
+
+@pytest.mark.parametrize(("method", "order"), [("euler", 1), ("bdf2", 2)])
+def test_orders_in_time(method: str, order: int) -> None:
+    """Against the mesh's own mode, whose decay is known: only the error of time is left."""
+    study, until = rod(), 0.1
+    h = 1.0 / 40
+    stiffness = 2.0 / h * (1.0 - np.cos(np.pi * h))
+    capacity = h / 3.0 * (2.0 + np.cos(np.pi * h))
+    exact = np.exp(-stiffness / capacity * until)
+    errors = []
+    for steps in (40, 80):
+        march = study.march(dt=until / steps, until=until, method=method)  # type: ignore[arg-type]
+        errors.append(abs(middle(list(march)) - exact))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+
+
+def test_adaptive_steps_keep_the_tolerance() -> None:
+    study, until = rod(), 0.5
+    for tolerance in (1e-2, 1e-3):
+        march = study.march(dt=1e-4, until=until, method="bdf2", tolerance=tolerance)
+        results = list(march)
+        times = [0.0, *(r.t for r in results)]
+        steps = np.diff(times)
+        assert results[-1].t == pytest.approx(until)
+        assert steps.max() > 10 * steps.min()
+        exact = np.exp(-(np.pi**2) * until)
+        assert abs(middle(results) - exact) < 20 * tolerance * exact
+    fewer = list(study.march(dt=1e-4, until=until, method="bdf2", tolerance=1e-2))
+    assert len(fewer) < len(results)
+
+
+def test_history_relaxes_as_the_closed_form_of_backward_euler() -> None:
+    study = Study(Mesh.line(2.0, cells=3))
+    study.add("bar", maxwell(), E=10.0, tau=0.5)
+    study.fix("left", u=0.0)
+    study.fix("right", u=0.02)
+    dt, results = 0.1, []
+    for n, result in enumerate(study.march(dt=0.1, until=1.0), start=1):
+        results.append(result)
+        dashpot = 0.01 * (1.0 - (1.0 + dt / 0.5) ** -n)
+        stress = 10.0 * 0.01 + 10.0 * (0.01 - dashpot)
+        np.testing.assert_allclose(result.fields("bar")["stress"], stress, rtol=1e-10)
+    assert len(results) == 10
+    assert list(results[-1].fields("bar")) == ["stress"], "history is no result of its own"
+    wrong = 10.0 * 0.01 + 10.0 * 0.01 * np.exp(-1.0 / 0.5)  # the limit dt -> 0, not this dt
+    assert results[-1].fields("bar")["stress"][0, 0] != pytest.approx(wrong, rel=1e-3)
+
+
+def test_history_in_load_steps_is_committed_once_each() -> None:
+    """Plasticity without hardening: what is stretched and let go keeps its plastic strain."""
+    m = Model("plastic", nodes=2, rule=quadrature.gauss(1, 1), unroll=True)
+    (X,) = m.coordinates("X")
+    (u,) = m.nodal_unknowns("u")
+    E, sy, H = m.parameters(E="modulus", sy="yield stress", H="hardening")
+    ep_old, alpha_old = m.point_data(ep_old="plastic strain", alpha_old="its length")
+    import sympy as sp
+
+    length = m.define("length", X[1] - X[0])
+    strain = m.define("strain", (u[1] - u[0]) / length)
+    trial = m.define("trial", E * (strain - ep_old))
+    excess = m.define("excess", sp.Abs(trial) - sy - H * alpha_old)
+    dg = m.define("dg", sp.Piecewise((excess / (E + H), excess > 0), (0, True)))
+    stress = m.define("stress", trial - E * dg * sp.sign(trial))
+    m.weak_form([(stress * length / 2, strain)])
+    m.fields(stress=stress)
+    m.history(ep_old=ep_old + dg * sp.sign(trial), alpha_old=alpha_old + dg)
+    study = Study(Mesh.line(1.0, cells=2))
+    study.add("bar", m.finish(), E=100.0, sy=1.0, H=10.0)
+    study.fix("left", u=0.0)
+    study.fix("right", u=lambda x, t: np.full(len(x), 0.05 * min(t, 2.0 - t)))
+    there = study.solve(steps=7)
+    yielded = 1.0 + 10.0 * (100.0 * 0.05 - 1.0) / 110.0
+    assert there.fields("bar")["stress"][0, 0] == pytest.approx(yielded, rel=1e-10)
+    plastic = (100.0 * 0.05 - 1.0) / 110.0
+    back = study.solve(start=there, until=1.0 + 0.2, steps=3)
+    assert back.fields("bar")["stress"][0, 0] == pytest.approx(
+        100.0 * (0.05 * 0.8 - plastic), rel=1e-9
+    )
+
+
+def test_a_march_goes_on_bitwise(tmp_path: Path) -> None:
+    study, file = rod(), tmp_path / "rod.npz"
+    whole = list(study.march(dt=0.01, until=0.2, method="bdf2", tolerance=1e-3))
+    begun = study.march(dt=0.01, until=0.2, method="bdf2", tolerance=1e-3, checkpoint=file)
+    first = list(itertools.islice(begun, 4))
+    begun.close()  # type: ignore[attr-defined]
+    rest = list(study.march(dt=0.01, until=0.2, method="bdf2", tolerance=1e-3, restart=file))
+    assert [r.t for r in (*first, *rest)] == [r.t for r in whole]
+    np.testing.assert_array_equal(rest[-1].x, whole[-1].x)
+
+
+def test_history_goes_through_a_restart(tmp_path: Path) -> None:
+    study, file = Study(Mesh.line(2.0, cells=3)), tmp_path / "bar.npz"
+    study.add("bar", maxwell(), E=10.0, tau=0.5)
+    study.fix("left", u=0.0)
+    study.fix("right", u=0.02)
+    whole = list(study.march(dt=0.1, until=1.0))
+    list(study.march(dt=0.1, until=0.5, checkpoint=file))
+    rest = list(study.march(dt=0.1, until=1.0, restart=file))
+    np.testing.assert_array_equal(rest[-1].x, whole[-1].x)
+    np.testing.assert_array_equal(
+        rest[-1].fields("bar")["stress"], whole[-1].fields("bar")["stress"]
+    )
+
+
+def test_what_is_refused(tmp_path: Path) -> None:
+    study = rod(4)
+    with pytest.raises(StudyError, match="dt = 0"):
+        study.march(dt=0.0, until=1.0)
+    with pytest.raises(StudyError, match="allowed are"):
+        study.march(dt=0.1, until=1.0, method="bdf3")  # type: ignore[arg-type]
+    with pytest.raises(StudyError, match="missing or damaged"):
+        study.march(dt=0.1, until=1.0, restart=tmp_path / "nothing.npz")
+    file = tmp_path / "other.npz"
+    list(rod(5).march(dt=0.1, until=0.1, checkpoint=file))
+    with pytest.raises(StudyError, match="another study"):
+        study.march(dt=0.1, until=1.0, restart=file)
+    with pytest.raises(StudyError, match="no unknown 'T'"):
+        study.start(T=1.0)
+        study.system()
+
+
+def test_pages_that_are_refused() -> None:
+    from softehl.codegen.language.lower import ModelError
+
+    m = Model("m", nodes=2, rule=quadrature.gauss(1, 1))
+    m.nodal_unknowns("u")
+    with pytest.raises(ModelError, match="history: v is no point data; there are none"):
+        m.history(v=0)
+    with pytest.raises(ModelError, match="w is no unknown at the nodes"):
+        m.rates("w")
+    with pytest.raises(ModelError, match="nodes = 3, must be 1 to 2"):
+        m.nodal_unknowns("p", nodes=3)
