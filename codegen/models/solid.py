@@ -15,7 +15,6 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 
-
 Terms = tuple[materials.Energy, materials.Energy]
 """Isochoric and volumetric term of an energy."""
 PAPER = (materials.MOONEY_RIVLIN, materials.VOLUMETRIC)
