@@ -1,22 +1,24 @@
-"""`softehl generate` and `softehl kernels`."""
+"""`softehl generate`: what is wrong is said in one line on stderr, with exit code 2."""
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-
-from rich.console import Console
-from rich.table import Column, Table
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cache, product, targets
 from softehl.codegen.tools import files as cli_files
-from softehl.codegen.tools.build import GENERATED
+from softehl.codegen.tools.build import GENERATED, BuildError
+from softehl.codegen.tools.location import CacheError
+from softehl.codegen.tools.model_text import ModelFileError
+from softehl.codegen.tools.samples import NoStateError
 from softehl.codegen.tools.trace import show as show_trace
+
+CHECKOUT = (GENERATED.parent / "pyproject.toml").exists()
+"""Whether this is a source checkout: what is installed is never written to."""
 
 
 def generate(
@@ -26,6 +28,32 @@ def generate(
     target: str = Target.SIMD,
     out: Path | None = None,
 ) -> int:
+    """See `_generate`; says what is wrong in one line."""
+    try:
+        _require_printable(*models, *([out] if out else []))
+        return _generate(models, check, trace, Target(target), out)
+    except (ModelFileError, NoStateError, BuildError, CacheError) as error:
+        return _refused(str(error))
+    except OSError as error:
+        return _refused(f"cannot write {error.filename}: {error.strerror or error}")
+
+
+def _require_printable(*paths: Path) -> None:
+    for path in paths:
+        try:
+            str(path).encode()
+        except UnicodeEncodeError:
+            raise ModelFileError(f"the name {str(path)!a} is not UTF-8: rename it") from None
+
+
+def _refused(message: str) -> int:
+    print(f"softehl: {message}", file=sys.stderr)
+    return 2
+
+
+def _generate(
+    models: Sequence[Path], check: bool, trace: str | None, target: Target, out: Path | None
+) -> int:
     """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1).
 
     With `models` do the same for the files of a user, as `codegen.tools.files` says.
@@ -33,18 +61,22 @@ def generate(
     """
     if target != Target.SIMD:
         if check or trace is not None:
-            print(f"softehl: --check and --trace know target simd, not {target}", file=sys.stderr)
-            return 2
+            return _refused(f"--check and --trace know target simd, not {target}")
         if models:
-            return cli_files.write_target(models, Target(target), out)
-        return targets.write((make() for make in ALL.values()), Target(target), out)
+            return cli_files.write_target(models, target, out)
+        return targets.write((make() for make in ALL.values()), target, out)
     if models:
         return cli_files.generate(models, out=out, check=check, trace=trace)
     if out is not None:
-        print("softehl: --out needs a MODEL.py or a --target", file=sys.stderr)
-        return 2
+        return _refused("--out needs a MODEL.py or a --target")
     if trace is not None:
         return _trace(trace)
+    if not (check or CHECKOUT):
+        return _refused("generate needs a MODEL.py: the kernels of an installed softehl stay as is")
+    return _regenerate(check)
+
+
+def _regenerate(check: bool) -> int:
     files = product.files(pipeline.compile_model(make()) for make in ALL.values())
     stale = [name for name, text in files.items() if _differs(GENERATED / name, text)]
     known = {*files, "__init__.py"}
@@ -70,21 +102,6 @@ def _differs(path: Path, text: str) -> bool:
 
 def _trace(family: str) -> int:
     if family not in ALL:
-        print(f"softehl: no model {family!r}; there are {', '.join(ALL)}", file=sys.stderr)
-        return 2
+        return _refused(f"no model {family!r}; there are {', '.join(ALL)}")
     show_trace(ALL[family]())
-    return 0
-
-
-def kernels() -> int:
-    """Print the cost table of the manifest."""
-    entries = json.loads((GENERATED / "manifest.json").read_text())["kernels"]
-    titles = ("task", "operations", "once", "per point", "temporaries", "live", "C bytes")
-    table = Table(Column("kernel", no_wrap=True), *titles)
-    for name, entry in entries.items():
-        for task, cost in entry["tasks"].items():
-            names = ("operations", "operations_once", "operations_per_point", "temporaries")
-            row = [*(cost[n] for n in names), cost["peak_live"], entry["bytes"]]
-            table.add_row(name, task, *map(str, row))
-    Console().print(table)
     return 0

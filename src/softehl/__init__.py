@@ -5,6 +5,8 @@ solves a case loads no SymPy and `softehl --help` loads nothing at all.
 """
 
 import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,7 +105,8 @@ def __getattr__(name: str) -> Any:
     if place is None:
         raise AttributeError(f"module 'softehl' has no attribute {name!r}")
     module, colon, attribute = place.partition(":")
-    imported = importlib.import_module(module)
+    with with_sympy():
+        imported = importlib.import_module(module)
     value = imported if colon and not attribute else getattr(imported, attribute or name)
     globals()[name] = value
     return value
@@ -111,6 +114,23 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return [*globals(), *_PUBLIC, *_MODELLING]
+
+
+class SymPyNeededError(ModuleNotFoundError):
+    """Kernels can be derived only where SymPy and mpmath are installed."""
+
+
+@contextmanager
+def with_sympy() -> Iterator[None]:
+    """Say in one line what to install where SymPy is needed and missing: `SymPyNeededError`."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in ("sympy", "mpmath"):
+            raise
+        raise SymPyNeededError(
+            "deriving kernels needs SymPy: pip install 'softehl[generate]'", name=error.name
+        ) from None
 
 
 def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "Kernel":
@@ -133,4 +153,6 @@ def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "
     from softehl.codegen.tools import library
 
     place = Path(source) if isinstance(source, str) else source
-    return kernels.kernel_in(library.folder_of(place), name)
+    with with_sympy():
+        folder = library.folder_of(place)
+    return kernels.kernel_in(folder, name)

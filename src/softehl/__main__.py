@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softehl import __version__
+from softehl import SymPyNeededError, __version__, with_sympy
 
 if TYPE_CHECKING:
     import click
@@ -27,6 +27,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except click.ClickException as error:
         click.echo(f"softehl: {' '.join(error.format_message().split())}", err=True)
         return error.exit_code
+    except SymPyNeededError as error:
+        click.echo(f"softehl: {error}", err=True)
+        return 2
     except (click.Abort, KeyboardInterrupt):
         click.echo("softehl: interrupted; what was reached is saved", err=True)
         return 130
@@ -68,16 +71,26 @@ def _commands() -> "click.Group":
         The file is run; a model is a function without arguments annotated `-> Definition`.
         Without a file the kernels that ship, in generated/, are regenerated.
         """
-        from softehl.codegen.tools.cli import generate
+        with with_sympy():
+            from softehl.codegen.tools.cli import generate
 
-        return generate(models, check, trace, target, out)
+            return generate(models, check, trace, target, out)
 
     @commands.command()
     def kernels() -> int:
-        """Show what the kernels cost: the table of manifest.json."""
-        from softehl.codegen.tools.cli import kernels
+        """Show what the kernels cost, and which compiled library of them is used."""
+        from softehl.cases.harness.case_file import BadInput
+        from softehl.codegen.tools.table import kernels
+        from softehl.runtime.library import KernelError, library_of
 
-        return kernels()
+        code = kernels()
+        try:
+            library = library_of()
+        except KernelError as error:
+            raise BadInput(str(error)) from None
+        why = f" ({library.reason})" if library.reason else ""
+        click.echo(f"{library.kind} library{why}: {library.path}")
+        return code
 
     commands.add_command(run)
     commands.add_command(keys)
