@@ -11,13 +11,18 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 GENERATED := $(wildcard generated/*.c generated/*.h generated/manifest.json)
 BUILDER := $(wildcard codegen/tools/build.py codegen/abi.py)
+# a second Python, on which `make test-other` runs the tests
+OTHERS ?= python3.13 python3.12 $(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python \
+	$(HOME)/.pyenv/versions/3.12.*/bin/python)
 
-.PHONY: help oring test slow lint check format docs clean
+.PHONY: help oring test test-other slow wheel lint check format docs clean
 
 help:
 	@echo "make oring    solve the O-ring and write its film-thickness curve to $(OUT)"
 	@echo "make test     run the test suite"
 	@echo "make slow     the tests that take minutes"
+	@echo "make wheel    build the wheel, install it elsewhere and use it, with and without compiler"
+	@echo "make test-other    the test suite on a second Python, where one is installed"
 	@echo "make lint     ruff and mypy; make check: lint and test"
 	@echo "make docs     the pages of docs/ as a site, in build/docs"
 	@echo "make clean    remove the environment and everything built"
@@ -30,6 +35,20 @@ test: $(VENV)/.dev $(VENV)/.kernels
 
 slow: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m pytest -n 2 -m slow
+
+wheel: $(VENV)/.dev
+	$(BIN)/python -m tests.packaging.wheel
+
+test-other:
+	@main=$$($(PYTHON) -c 'import sys; print(sys.version_info[:2])'); \
+	for other in $(OTHERS); do \
+	  found=$$($$other -c 'import sys, venv, ensurepip; print(sys.version_info[:2])' 2>/dev/null); \
+	  if [ -n "$$found" ] && [ "$$found" != "$$main" ]; then \
+	    echo "the tests on $$($$other --version)"; \
+	    exec $(MAKE) test VENV=.venv-other PYTHON="$$other"; \
+	  fi; \
+	done; \
+	echo "no second Python is installed (looked for: $(OTHERS)): its tests are left out"
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -46,9 +65,9 @@ docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-other build dist src/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find codegen generated runtime cases tests -name __pycache__ -prune -exec rm -rf {} +
-	find generated \( -name '*.so' -o -name '*.o' -o -name '*.dylib' \) -delete
+	rm -f generated/*.so generated/*.sha256
 
 # The stamps are touched last, so an interrupted step is done again.
 $(VENV)/.created:
@@ -71,6 +90,7 @@ $(VENV)/.docs: $(VENV)/.installed
 	$(PIP) install --editable '.[docs]'
 	@touch $@
 
+# Kernels are compiled into the user's cache at their first use: this is one, before anything waits.
 $(VENV)/.kernels: $(GENERATED) $(BUILDER) $(VENV)/.installed
 	$(BIN)/python -m softehl.codegen.tools.build
 	@touch $@

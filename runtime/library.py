@@ -109,12 +109,16 @@ def manifest(directory: Path = GENERATED) -> dict[str, Any]:
     raise StaleKernelsError(f"{path} is damaged: {_remedy(directory)}")
 
 
-@cache
 def library_of(directory: Path = GENERATED) -> Library:
     """The library of a folder; for the kernels that ship the best there is.
 
     Raises `KernelError` when it is missing, stale or damaged.
     """
+    return _library_of(directory)
+
+
+@cache
+def _library_of(directory: Path) -> Library:
     if directory != GENERATED:
         return _opened(directory / LIBRARY, directory)
     try:

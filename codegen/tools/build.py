@@ -99,7 +99,7 @@ def build(
         _run([*command, *map(str, objects), "-o", str(linked), "-lm"], linked)
         data = linked.read_bytes()
     cache.write(directory / LIBRARY, data, mode=0o755)
-    cache.write(directory / DIGEST, f"{_sha256(data)}  {LIBRARY}\n".encode())
+    cache.write(directory / DIGEST, f"{_sha256(data)}  {LIBRARY}\n".encode(), mode=0o644)
     return {source.stem: s for source, s in zip(sources, seconds, strict=True)}
 
 
@@ -136,7 +136,7 @@ def _run(command: Sequence[str], makes: Path) -> None:
         raise BuildError(f"the C compiler failed ({done.returncode}):\n  {line}\n{done.stderr}")
     if not makes.is_file():
         raise BuildError(
-            f"{command[0]} is no C compiler: it wrote nothing; set CC to one\n  {line}"
+            f"{command[0]} is no C compiler (it wrote nothing): set CC to one\n  {line}"
         )
 
 

@@ -117,30 +117,37 @@ def folder(
 
     keep: raise `CacheError` where the cache cannot be used, instead of taking a temporary folder.
     """
-    found = _found(key, complete)
+
+    def usable(place: Path) -> bool:
+        try:
+            return not location.fault(place) and complete(place)
+        except OSError:
+            return False
+
+    found = _found(key, usable)
     if found is not None:
         return found
     built = own((writable() if keep else root()) / "built")
     place = built / key
     with _alone(built / f".lock-{key}"):
-        if not complete(place):
+        if not usable(place):
             with _scratch(built) as scratch:
                 make(scratch)
                 _synchronise(scratch)
-                _publish(scratch, place, complete)
+                _publish(scratch, place, usable)
                 _synchronise(built)
     return place
 
 
-def _found(key: str, complete: Callable[[Path], bool]) -> Path | None:
+def _found(key: str, usable: Callable[[Path], bool]) -> Path | None:
     """The folder of a key in a cache that need not be writable."""
     try:
         built = location.wanted() / "built"
-        place = built / key
-        safe = not any(map(location.fault, (built.parent, built, place)))
+        safe = not any(map(location.fault, (built.parent, built)))
     except (CacheError, OSError):
         return None
-    return place if safe and complete(place) else None
+    place = built / key
+    return place if safe and usable(place) else None
 
 
 @contextmanager

@@ -79,7 +79,7 @@ def _commands() -> "click.Group":
     @commands.command()
     def kernels() -> int:
         """Show what the kernels cost, and which compiled library of them is used."""
-        from softehl.cases.harness.case_file import BadInput
+        from softehl.cases.harness.errors import BadInput
         from softehl.codegen.tools.table import kernels
         from softehl.runtime.library import KernelError, library_of
 
