@@ -5,9 +5,10 @@ The rod is held 10 micrometres off, where the film will be.
 
 from __future__ import annotations
 
+from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import ContactLoads
 from softehl.cases.seal.path import PathSettings, Stage
-from softehl.cases.seal.system import BORE, ROD, SealSystem
+from softehl.cases.seal.system import BORE, ROD
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.newton import Corrector, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule

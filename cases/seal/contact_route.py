@@ -14,11 +14,11 @@ from typing import TypeAlias
 
 from softehl.cases.seal.contact import load_stage, squeeze_stage
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
+from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.grading import PASSES, graded_disc
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import carried_contact, finer
-from softehl.cases.seal.system import SealSystem, build_system
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
 

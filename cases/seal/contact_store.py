@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from softehl.cases.seal.contact import contact_problem, contact_stage
+from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
-from softehl.cases.seal.system import SealSystem, contact_kernels
+from softehl.cases.seal.system import contact_kernels
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.kernels import load_kernel

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from softehl.cases.seal.system import SealSystem, build_system
+from softehl.cases.seal.equations import SealSystem, build_system
 
 ORDER = 2.5
 """Order of convergence of h*: 2 in theory, 2.1 to 3.2 were measured between densities 2 and 4."""

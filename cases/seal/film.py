@@ -12,9 +12,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.path import PathSettings, Stage
-from softehl.cases.seal.system import SealSystem
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.section import SealSection, uniform_disc
-from softehl.cases.seal.system import SealSystem
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG, Disc
 from softehl.runtime.mesh.spacing import Spot, graded

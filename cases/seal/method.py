@@ -14,6 +14,7 @@ from pathlib import Path
 from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
+from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.estimate import coarser_system, h_star_error
 from softehl.cases.seal.film import (
     FastFilm,
@@ -36,7 +37,6 @@ from softehl.cases.seal.results import (
     film_state,
 )
 from softehl.cases.seal.state import FilmState, Observer, Outcome
-from softehl.cases.seal.system import SealSystem, build_system
 from softehl.cases.seal.verdict import Verdict, fewest_inlet_segments
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.backends import choose

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.path import PathSettings, Stage
-from softehl.cases.seal.system import PRESSURE, SealSystem
+from softehl.cases.seal.system import PRESSURE
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.rules import lagrange, pressure_nodes

@@ -12,9 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from softehl.cases.seal.contact import contact_problem, contact_stage
+from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
-from softehl.cases.seal.system import SealSystem
+from softehl.cases.seal.system import SOLID
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.kernels import load_kernel
@@ -85,10 +86,10 @@ def carried_contact(
     out. The start is nan, which Newton's method rejects, where the state cannot be carried over.
     """
     carry, p = _carrier(old, new), new.parameters
-    pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), "solid", x)
+    pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), SOLID, x)
     problem = LaggedPressure.of(
         contact_problem(new, settings, p.sealed_pressure),
-        "solid",
+        SOLID,
         load_kernel("follower_pressure"),
         carry.elements(pressures),
         p.bulk_modulus,

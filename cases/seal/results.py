@@ -7,9 +7,10 @@ from math import pi
 
 import numpy as np
 
+from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.state import ContactState, FilmState, Profile, Section
-from softehl.cases.seal.system import SealSystem
+from softehl.cases.seal.system import FACET, FILM, SOLID
 from softehl.cases.seal.verdict import FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
@@ -45,12 +46,12 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
     constant. Its relative spread is taken over the neighbours on both sides up to where the film
     cavitates, eqs. (16) and (25).
     """
-    at = problem.fields("film", x)
+    at = problem.fields(FILM, x)
     top = int(np.argmax(at["p"].max(axis=1)))
     whole = run_around(at["p"].min(axis=1) >= 0.0, top)
     jump = 0.0
     if system.parameters.reynolds == "dg":
-        facets = problem.fields("facet", x)
+        facets = problem.fields(FACET, x)
         flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
         around, whole = slice(max(top - 1, 0), top + 1), slice(max(whole.start - 1, 0), whole.stop)
     else:
@@ -184,7 +185,7 @@ def section_view(system: SealSystem, problem: Problem, x: Array) -> Section:
     contact_pressure: that of the housing and its walls, zero elsewhere (MPa).
     """
     mesh = system.mesh
-    stresses = problem.fields("solid", x)
+    stresses = problem.fields(SOLID, x)
     nodal = nodal_average(
         mesh.quads,
         {name: value for name, value in stresses.items() if name not in ("z", "r")},
@@ -207,11 +208,11 @@ def _profile(system: SealSystem, problem: Problem, x: Array) -> Profile:
 
     Discontinuous pressures are also shown at both ends of each segment: a facet has two rows.
     """
-    block, p = problem.assembler.block("film"), system.parameters
+    block, p = problem.assembler.block(FILM), system.parameters
     if p.reynolds == "dg":
         traces = trace_rule(p.pressure_order, p.quadrature, p.quadrature_points)
         block = replace(block, rule=traces)
-    values = block.fields(x, problem.parameters["film"])
+    values = block.fields(x, problem.parameters[FILM])
     at = {name: value.ravel() for name, value in values.items()}
     return Profile(
         x_mm=at["x"],

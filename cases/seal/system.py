@@ -1,42 +1,27 @@
-"""The coupled system of a seal, declared once: fields, element blocks, parameters, unknowns.
+"""The coupled system of a seal, declared once: fields, element blocks, obstacles, parameters.
 
-`FIELDS` and `BLOCKS` are the declaration: another field, obstacle or term of the film is one line
-in them, and what a kernel is given is looked up by the names of its parameters. Nobody else knows
-how fields are called and where their unknowns stand: a `SealSystem` is asked.
+Another field, obstacle or term of the film is one line of `FIELDS` or `BLOCKS`; a kernel is given
+those of the values below that it names. `cases.seal.equations` makes equations of it on a section,
+and nobody else knows how fields are called and where their unknowns stand.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from fractions import Fraction
 from math import copysign
-
-import numpy as np
+from typing import TypeAlias
 
 from softehl.cases.seal import scales
-from softehl.cases.seal.declared import Block, Field, Group, Numbering
+from softehl.cases.seal.declared import Block, Field
 from softehl.cases.seal.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.section import SealSection, disc_section
-from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.assembly import Assembler
-from softehl.runtime.fem.contact import (
-    Obstacle,
-    contact_data,
-    inner_cylinder,
-    outer_cylinder,
-    plane,
-    tributary_areas,
-)
-from softehl.runtime.fem.dofs import DofLayout
-from softehl.runtime.fem.layered import Layer
-from softehl.runtime.fem.problem import KeepsOrientation, Problem, StaysPositive
+from softehl.cases.seal.section import SealSection
+from softehl.runtime.fem.contact import Obstacle, inner_cylinder, outer_cylinder, plane
 from softehl.runtime.fem.rules import facet_rule, film_rule
 from softehl.runtime.kernels import Rule
-from softehl.runtime.mesh.sections import Disc, SectionMesh
 
-_STEP = 0.9  # of its thickness a film may lose in an iteration
+Values: TypeAlias = Mapping[str, float]
+"""Parameters of a kernel by their names."""
 
 
 def _segment_rule(p: ORing, order: int) -> Rule:
@@ -45,6 +30,9 @@ def _segment_rule(p: ORing, order: int) -> Rule:
 
 DISPLACEMENT, PRESSURE, ROD, ROTATION = "displacement", "pressure", "rod", "rotation"
 """Displacements; film pressures; contact multipliers of the rod; moment that holds the section."""
+
+SOLID, FILM, FACET = "solid", "film", "facet"
+"""Blocks whose fields are results: the section, segments of the film, what lies between them."""
 
 BORE = "housing"
 WALLS = (BORE, "sealed_wall", "air_wall")
@@ -59,12 +47,12 @@ FIELDS = (
 )
 
 BLOCKS = (
-    Block("solid", "solid_{solid}", "cells", (DISPLACEMENT,), "solid"),
+    Block(SOLID, "solid_{solid}", "cells", (DISPLACEMENT,), "solid"),
     Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
     Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
     Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
     *(Block(name, "contact", "outer_nodes", (DISPLACEMENT, name), "contact") for name in WALLS),
-    Block("film", "film", "arc", (DISPLACEMENT, PRESSURE), "film", layer=True, rule=_segment_rule),
+    Block(FILM, "film", "arc", (DISPLACEMENT, PRESSURE), "film", layer=True, rule=_segment_rule),
     Block(
         *("upwind", "film_upwind", "arc", (DISPLACEMENT, PRESSURE), "film"),
         layer=True,
@@ -72,7 +60,7 @@ BLOCKS = (
         rule=_segment_rule,
     ),
     Block(
-        *("facet", "film_facet", "facets", (DISPLACEMENT, PRESSURE), "film"),
+        *(FACET, "film_facet", "facets", (DISPLACEMENT, PRESSURE), "film"),
         layer=True,
         needed=lambda p: p.reynolds == "dg",
         rule=lambda _, order: facet_rule(order),
@@ -82,7 +70,7 @@ BLOCKS = (
 )
 
 
-def _obstacles(p: ORing) -> dict[str, Obstacle]:
+def obstacles_of(p: ORing) -> dict[str, Obstacle]:
     """The obstacles by the names of their blocks."""
     half = 0.5 * p.groove_width
     obstacles = (
@@ -94,20 +82,53 @@ def _obstacles(p: ORing) -> dict[str, Obstacle]:
     return {obstacle.name: obstacle for obstacle in obstacles}
 
 
-def _solid_values(p: ORing) -> dict[str, float]:
-    """What solids may ask for."""
-    return {"mu_1": p.mu_1, "mu_2": p.mu_2, "kappa": p.bulk_modulus}
+def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | None:
+    """What a block of the unloaded contact problem may ask for; None where it is switched off."""
+    if block.group == "solid":
+        return {"mu_1": p.mu_1, "mu_2": p.mu_2, "kappa": p.bulk_modulus}
+    if block.group == "load":
+        return {"pressure": 0.0}
+    if block.group == "contact":
+        return {"offset": 0.0, "force_weight": 1.0}
+    if block.name == "rotation":
+        centre = {"centre_z": 0.0, "centre_r": section.disc.centre_r}
+        return {**centre, "polar_moment": section.polar_moment, "angle": 0.0}
+    return None
 
 
-def _film_values(p: ORing, film: FilmLoads) -> dict[str, float]:
-    """What terms of the film may ask for."""
+def contact_values(loads: ContactLoads) -> dict[str, Values | None]:
+    """What the loads of contact change, by block.
+
+    The sealed pressure also acts on the arc up to its lowest node, as the film will carry it there;
+    the rod multipliers of that part are the contact pressure in excess of it.
+    """
+    pressure = {"pressure": loads.sealed_pressure}
+    return {
+        "sealed_side": pressure,
+        "sealed_arc": pressure,
+        **{name: {"offset": offset} for name, offset in loads.offsets.items()},
+        "spring": {"stiffness": loads.spring} if loads.spring else None,
+    }
+
+
+def faded_values(film: FilmLoads) -> dict[str, Values | None]:
+    """What is left of the contact forces on the arc once a film has its weight, by block."""
+    left = 1.0 - film.weight
+    return {
+        ROD: {"force_weight": left} if left > 0.0 else None,
+        "sealed_arc": {"pressure": film.sealed_pressure * left},
+    }
+
+
+def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
+    """What a term of the film may ask for that has this share of the forces."""
     return {
         "rod_radius": 0.5 * p.rod_diameter,
         "rod_speed": film.rod_speed,
         "viscosity": p.viscosity,
         "pressure_viscosity": p.pressure_viscosity,
         "cavitation_penalty": p.cavitation_penalty,
-        "force_weight": film.weight,
+        "force_weight": film.weight * share,
         "shear_weight": film.shear,
         "shear_modulus": p.shear_modulus,
         "upwinding": p.upwinding * copysign(1.0, film.rod_speed),
@@ -118,286 +139,3 @@ def contact_kernels(p: ORing) -> tuple[str, ...]:
     """Names of the kernels that the contact problem of a case depends on, each once."""
     kernels = [b.kernel_of(p) for b in BLOCKS if b.group != "film"]
     return tuple(dict.fromkeys(kernels))
-
-
-@dataclass(frozen=True, eq=False)
-class SealSystem:
-    """A section with its unknowns and equations: everything that does not change while loads do.
-
-    blocks: those that the case has. obstacles: by block name. problem: the contact problem at
-    p_s = 0 with the film switched off and its pressures prescribed to be zero; mean rotation is
-    held in it, even if a later stage lets it go.
-    """
-
-    parameters: ORing
-    section: SealSection
-    numbering: Numbering
-    blocks: tuple[Block, ...]
-    obstacles: Mapping[str, Obstacle]
-    problem: Problem
-
-    @classmethod
-    def of(
-        cls,
-        p: ORing,
-        section: SealSection,
-        fields: tuple[Field, ...] = FIELDS,
-        blocks: tuple[Block, ...] = BLOCKS,
-    ) -> SealSystem:
-        """The system of a case on a section."""
-        numbering = Numbering.of(fields, p, section)
-        present, obstacles = tuple(b for b in blocks if b.needed(p)), _obstacles(p)
-        constants = {
-            b.name: contact_data(
-                obstacles[b.name], section.mesh.points, *section.chains[b.elements], p.shear_modulus
-            )
-            for b in present
-            if b.group == "contact"
-        }
-        elements = [numbering.element_block(b, p, constants.get(b.name)) for b in present]
-        cells = section.coordinates("cells"), numbering.rows(DISPLACEMENT, "cells")
-        problem = Problem(
-            assembler=Assembler.build(numbering.layout.total, elements),
-            layout=numbering.layout,
-            parameters={},
-            scales={field.name: field.scale(p) for field in fields},
-            guards=(KeepsOrientation(*cells),),
-        )
-        system = cls(p, section, numbering, present, obstacles, problem)
-        return replace(system, problem=system._at_rest())
-
-    # --- the section ----------------------------------------------------------------------------
-
-    @property
-    def mesh(self) -> SectionMesh:
-        """The undeformed mesh."""
-        return self.section.mesh
-
-    @property
-    def rod_radius(self) -> float:
-        """Radius of the rod, mm."""
-        return 0.5 * self.parameters.rod_diameter
-
-    @property
-    def rod_areas(self) -> Array:
-        """Tributary areas (arc nodes,) of the rod multipliers, mm^2."""
-        return tributary_areas(self.mesh.points, self.mesh.arc_segments, self.mesh.arc_nodes)
-
-    # --- what a vector of unknowns holds ----------------------------------------------------------
-
-    @property
-    def layout(self) -> DofLayout:
-        """The vector of unknowns, one for all stages."""
-        return self.numbering.layout
-
-    def at_rest(self) -> Array:
-        """Unknowns of the undeformed section: all zero."""
-        return np.zeros(self.layout.total)
-
-    def displacements(self, x: Array) -> Array:
-        """Displacements (V, 2) in (z, r), mm."""
-        return x[self.layout.part(DISPLACEMENT)].reshape(-1, 2)
-
-    def deformed(self, x: Array) -> Array:
-        """Deformed nodes (V, 2) in (z, r), mm."""
-        return np.asarray(self.mesh.points + self.displacements(x))
-
-    def arc_film(self, x: Array) -> tuple[Array, Array]:
-        """Positions z and distances h from the rod of the deformed arc nodes, (arc nodes,), mm."""
-        z, r = self.deformed(x)[self.mesh.arc_nodes].T
-        return z, r - self.rod_radius
-
-    def rod_multipliers(self, x: Array) -> Array:
-        """Contact multipliers (arc nodes,) of the rod, MPa; negative where it presses."""
-        return x[self.layout.part(ROD)]
-
-    def moment(self, x: Array) -> float:
-        """Moment that holds the mean rotation of the section, N mm."""
-        return float(x[self.layout.part(ROTATION)][0])
-
-    def pressure_dofs(self, field: str = PRESSURE) -> Integers:
-        """Numbers (segments, m_p + 1) of the pressure unknowns of each segment of the film."""
-        return self.numbering.rows(field, "arc")
-
-    def pressures(self, x: Array, field: str = PRESSURE) -> Array:
-        """All pressure unknowns, MPa."""
-        return x[self.layout.part(field)]
-
-    @property
-    def pressure_count(self) -> int:
-        """Number of pressure unknowns."""
-        return self.layout.count(PRESSURE)
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Numbers of unknowns, as a run records them."""
-        return {"total": self.layout.total, PRESSURE: self.pressure_count}
-
-    def wall_forces(self, x: Array) -> Array:
-        """Normal forces (outer nodes,) of the housing and its walls on the nodes, N."""
-        nodes, segments = self.section.chains["outer_nodes"]
-        pressing = [np.maximum(-x[self.layout.part(name)], 0.0) for name in WALLS]
-        return np.asarray(sum(pressing) * tributary_areas(self.mesh.points, segments, nodes))
-
-    @property
-    def film_ends(self) -> Integers:
-        """Pressure unknowns at the sealed and the air end of the film, (15), for "fe" and "dg"."""
-        return self._ends(PRESSURE)
-
-    def columns(self, block: str, field: str) -> slice:
-        """Where the unknowns of a field stand in the dof map of a block."""
-        return self.numbering.columns(self._block(block), field)
-
-    def contact_fields(self) -> tuple[Field, ...]:
-        """The fields that contact knows: film pressures are all zero in it."""
-        return tuple(field for field in self._fields if field.on != "film")
-
-    # --- loads ------------------------------------------------------------------------------------
-
-    def contact_problem(self, loads: ContactLoads) -> Problem:
-        """Frictionless contact (9)-(10) under a sealed pressure (8).
-
-        The pressure also acts on the arc up to its lowest node, as the film will carry it there;
-        the rod multipliers of that part are the contact pressure in excess of it.
-        """
-        pressure = {"pressure": loads.sealed_pressure}
-        return self.problem.with_parameters(
-            **{b.name: pressure for b in self._group("load")},
-            **{name: {"offset": offset} for name, offset in loads.offsets.items()},
-            spring={"stiffness": loads.spring} if loads.spring else None,
-        )
-
-    def film_problem(self, film: FilmLoads, shares: Mapping[str, float] | None = None) -> Problem:
-        """Film forces (18) weighted by w, contact forces by 1 - w; Reynolds equation (25) in full.
-
-        The rod multipliers are frozen, so their contact elements are springs of stiffness rho about
-        the contact pressure: forces that fade without a constraint that would outlive them.
-        shares: of the film forces by pressure field, where there are several.
-        """
-        p_s, w, fields = film.sealed_pressure, film.weight, shares or {PRESSURE: 1.0}
-        contact = self.contact_problem(ContactLoads(p_s, {ROD: film.rod_offset}))
-        problem = contact.with_parameters(
-            rod={"force_weight": 1.0 - w} if w < 1.0 else None,
-            sealed_arc={"pressure": p_s * (1.0 - w)},
-            **self._film_parameters(film, fields),
-        )
-        fixed = [*map(self._ends, fields), self.layout.dofs(ROD)]
-        values: list[Array | float] = [np.array([p_s, 0.0]) for _ in fields]
-        values.append(film.multipliers)
-        if film.moment is not None:
-            fixed.append(self.layout.dofs(ROTATION))
-            values.append(film.moment)
-        fluxes = {name: self.flux_scales(film.speed, film.gap, name) for name in fields}
-        return replace(
-            problem.with_fixed(fixed, values),
-            scales={**problem.scales, **fluxes},
-            guards=(*problem.guards, self.film_guard()),
-        )
-
-    def film_guard(self) -> StaysPositive:
-        """Film thickness at the nodes of the arc, positive in every iterate."""
-        nodes = self.mesh.arc_nodes
-        start = self.layout.part(DISPLACEMENT).start
-        return StaysPositive(
-            start + 2 * nodes + 1, self.mesh.points[nodes, 1] - self.rod_radius, _STEP
-        )
-
-    def flux_scales(self, speed: float, gap: Array, field: str = PRESSURE) -> Array:
-        """Reference fluxes (n,), mm^2/s, of the equations of a pressure field at |U| (mm/s).
-
-        gap: (arc nodes,) film thickness, mm, near enough.
-        """
-        unknowns, arc = self.numbering.unknowns[field], self.mesh.points[self.mesh.arc_nodes]
-        h, dx = np.maximum(gap[1:], gap[:-1]), np.linalg.norm(np.diff(arc, axis=0), axis=1)
-        driven = scales.pressure_flux(h, dx, unknowns.order, self.parameters.viscosity)
-        largest = np.zeros(unknowns.count)
-        np.maximum.at(largest, unknowns.rows["arc"], driven[:, None])
-        return scales.film_flux(speed) + largest
-
-    # --- other systems on the same section --------------------------------------------------------
-
-    def film_layer(self) -> Layer:
-        """The film as the layer of the modified Newton iteration.
-
-        Displacements of the arc and the moment are shared with the section; the pressures but
-        those at the ends are the film's own, whatever else its blocks know is prescribed.
-        """
-        start, nodes = self.layout.part(DISPLACEMENT).start, self.mesh.arc_nodes
-        moment = self.layout.dofs(ROTATION)
-        shared = np.concatenate([start + 2 * nodes, start + 2 * nodes + 1, moment])
-        inner = np.setdiff1d(self.layout.dofs(PRESSURE), self.film_ends)
-        names = [block.name for block in self.blocks if block.layer]
-        return Layer.of(self.problem.assembler, names, shared, inner)
-
-    def with_pressure(self, name: str, order: int) -> SealSystem:
-        """The system with another pressure of this order on the same film thickness, last of all
-        fields; its blocks are called after it.
-        """
-        film = [
-            replace(
-                block,
-                name=f"{name}_{block.name}",
-                fields=tuple(name if field == PRESSURE else field for field in block.fields),
-            )
-            for block in self._group("film")
-        ]
-        (pressure,) = [field for field in self._fields if field.name == PRESSURE]
-        fields = (*self._fields, replace(pressure, name=name, order=order))
-        return SealSystem.of(self.parameters, self.section, fields, (*self.blocks, *film))
-
-    # --- inside -----------------------------------------------------------------------------------
-
-    def _at_rest(self) -> Problem:
-        """See `problem`."""
-        section, solid = self.section, _solid_values(self.parameters)
-        contact, pressure = {"offset": 0.0, "force_weight": 1.0}, {"pressure": 0.0}
-        centre = {"centre_z": 0.0, "centre_r": section.disc.centre_r}
-        problem = self.problem.with_parameters(
-            **{b.name: self._chosen(b, solid) for b in self._group("solid")},
-            **{b.name: pressure for b in self._group("load")},
-            **{b.name: contact for b in self._group("contact")},
-            rotation={**centre, "polar_moment": section.polar_moment, "angle": 0.0},
-        )
-        pressures = [field.name for field in self._fields if field.on == "film"]
-        return problem.with_fixed([self.layout.dofs(n) for n in pressures], [0.0] * len(pressures))
-
-    def _film_parameters(
-        self, film: FilmLoads, shares: Mapping[str, float]
-    ) -> dict[str, dict[str, float]]:
-        """Parameters of every term of the film, each with its share of the forces."""
-        values, found = _film_values(self.parameters, film), {}
-        for block in self._group("film"):
-            (field,) = [name for name in block.fields if name in shares]
-            given = {**values, "force_weight": film.weight * shares[field]}
-            found[block.name] = self._chosen(block, given)
-        return found
-
-    def _chosen(self, block: Block, values: Mapping[str, float]) -> dict[str, float]:
-        """Those of the values that the kernel of a block asks for."""
-        names = self.problem.assembler.block(block.name).kernel.parameters
-        missing = [name for name in names if name not in values]
-        if missing:
-            raise KeyError(
-                f"block {block.name!r} asks for {', '.join(missing)}; cases/seal/system.py gives "
-                f"{block.group} blocks {', '.join(values)}"
-            )
-        return {name: values[name] for name in names}
-
-    @property
-    def _fields(self) -> tuple[Field, ...]:
-        return tuple(unknowns.field for unknowns in self.numbering.unknowns.values())
-
-    def _group(self, group: Group) -> list[Block]:
-        return [block for block in self.blocks if block.group == group]
-
-    def _block(self, name: str) -> Block:
-        (found,) = [block for block in self.blocks if block.name == name]
-        return found
-
-    def _ends(self, field: str) -> Integers:
-        return self.layout.dofs(field)[[0, -1]]
-
-
-def build_system(p: ORing, disc: Disc | None = None, density: Fraction | None = None) -> SealSystem:
-    """The system of a case on its section; see `disc_section`."""
-    return SealSystem.of(p, disc_section(p, disc, density))

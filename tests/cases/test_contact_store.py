@@ -17,11 +17,11 @@ from softehl.cases.seal.contact_store import (
     contact_key,
     stored_contact,
 )
+from softehl.cases.seal.equations import build_system
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.state import Outcome, Silent
-from softehl.cases.seal.system import build_system
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.solve.newton import Newton
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.grading import arc_positions, contact_edges, graded_disc
 from softehl.cases.seal.method import run
 from softehl.cases.seal.order import OrderPair
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.state import Outcome, Silent
-from softehl.cases.seal.system import SealSystem, build_system
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import corner_jacobians
 from tests.cases.oring_cases import oring

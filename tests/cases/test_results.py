@@ -7,6 +7,7 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.equations import build_system
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.path import PathSettings
 from softehl.cases.seal.results import (
@@ -17,7 +18,6 @@ from softehl.cases.seal.results import (
     oscillation,
 )
 from softehl.cases.seal.state import COLLAPSED, OSCILLATING, UNDER_RESOLVED
-from softehl.cases.seal.system import build_system
 from softehl.cases.seal.verdict import FilmNumbers, Verdict, fewest_inlet_segments
 from tests.cases.oring_cases import oring
 

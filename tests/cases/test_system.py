@@ -1,13 +1,17 @@
-"""The discrete O-ring: counts of Table 2, loads on the right surfaces, tangent of the whole."""
+"""The coupled system: declared once, counts of Table 2, loads, tangent of the whole."""
+
+import ast
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from softehl.cases.seal.declared import Numbering
+from softehl.cases.seal.declared import Block, Numbering
+from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.scales import film_flux
 from softehl.cases.seal.section import SealSection
-from softehl.cases.seal.system import FIELDS, PRESSURE, build_system
+from softehl.cases.seal.system import BLOCKS, DISPLACEMENT, FIELDS, PRESSURE
 from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
@@ -140,3 +144,84 @@ def test_a_pressure_is_rounded_to_far_less_than_the_tolerance() -> None:
     rounding = 0.1**3 / (12.0 * system.parameters.viscosity) * np.spacing(5.0) / dx
     assert rounding < 1e-9 * scale
     assert rounding > 1e-9 * film_flux(25.0)
+
+
+# --- declared once --------------------------------------------------------------------------------
+
+CASES = Path(__file__).parents[2] / "cases"
+DECLARATION = CASES / "seal" / "system.py"
+ASKED = ("part", "dofs", "count", "rows", "columns", "block", "fields", "pressures")
+"""Methods that take the name of a field or of a block."""
+
+
+def spelled(source: str) -> list[str]:
+    """Names of fields and blocks that a file spells, and columns of dof maps that it counts."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            first = node.args[0] if node.args else None
+            literal = isinstance(first, ast.Constant | ast.JoinedStr)
+            if node.func.attr in ASKED and literal:
+                found.append(ast.unparse(node))
+        elif isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple):
+            name = ast.unparse(node.value).rpartition(".")[2]
+            if name in ("dofs", "rows"):
+                found.append(ast.unparse(node))
+    return found
+
+
+@pytest.mark.parametrize(
+    "path",
+    [p for p in sorted(CASES.rglob("*.py")) if p != DECLARATION],
+    ids=lambda path: str(path.relative_to(CASES)),
+)
+def test_fields_and_blocks_are_named_in_one_file(path: Path) -> None:
+    assert spelled(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        'x[system.layout.part("pressure")]',
+        "part = layout.dofs('rod')",
+        'assembler.block(f"{name}_film")',
+        "pressures = block.dofs[:, 4:]",
+        "dofs[:, columns:] += 3",
+    ],
+)
+def test_a_name_that_is_spelled_elsewhere_is_seen(source: str) -> None:
+    assert len(spelled(source)) == 1
+
+
+@pytest.mark.parametrize("reynolds", ["fe", "dg"])
+def test_columns_of_the_film_s_dof_maps(reynolds: str) -> None:
+    system = build_system(oring(density=1, pressure_order=3, reynolds=reynolds))
+    film = system.problem.assembler.block("film").dofs
+    assert np.array_equal(film[:, system.columns("film", PRESSURE)], system.pressure_dofs())
+    assert film[:, system.columns("film", DISPLACEMENT)].max() < 2 * len(system.mesh.points)
+    x = system.at_rest()
+    system.pressures(x)[:] = np.arange(system.pressure_count)
+    assert x[system.film_ends].tolist() == [0.0, system.pressure_count - 1.0]
+    assert np.flatnonzero(x).min() == system.film_ends[0] + 1
+
+
+def test_a_second_pressure_stands_beside_the_first() -> None:
+    low = build_system(oring(density=1, pressure_order=2, reynolds="dg", upwinding=1.0))
+    both = low.with_pressure("higher", 4)
+    before = low.layout.total
+    assert both.layout.total == before + 5 * 27
+    names = [block.name for block in both.problem.assembler.blocks]
+    assert names[-3:] == ["higher_film", "higher_upwind", "higher_facet"]
+    for own, other, count in (("film", "higher_film", 4), ("facet", "higher_facet", 6)):
+        a, b = (both.problem.assembler.block(name).dofs for name in (own, other))
+        assert np.array_equal(a[:, :count], b[:, :count])
+        assert a[:, count:].max() < before <= b[:, count:].min()
+
+
+def test_a_kernel_that_asks_for_what_nobody_gives_is_named() -> None:
+    stranger = Block("stranger", "contact", "arc", (DISPLACEMENT, PRESSURE), "film")
+    p = oring(density=1)
+    system = SealSystem.of(p, build_system(p).section, blocks=(*BLOCKS, stranger))
+    film = FilmLoads(1.0, "out", 400.0, np.zeros(28), np.zeros(28))
+    with pytest.raises(KeyError, match=r"'stranger' asks for offset; cases/seal/system.py gives"):
+        system.film_problem(film)
