@@ -27,7 +27,7 @@ ORDER = {
     ),
     "runtime": (
         *("arrays", "tuning", "library", "io", "kernels", "mesh", "fem", "solve"),
-        *("study result", "engines"),
+        *("system", "result", "march", "study", "engines"),
     ),
     "cases": ("harness", "seal", "oring slider", "paper", "shipped", "cli document"),
 }
