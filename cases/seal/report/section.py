@@ -62,41 +62,58 @@ def boundary_edges(cells: Integers) -> Integers:
     return np.asarray(edges[first[count == 1]])
 
 
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """What colours and bands mean.  levels: of stress, MPa; height: of a band, mm for 1 MPa."""
+
+    levels: Array
+    height: float
+
+    @classmethod
+    def of(cls, p: ORing, views: Sequence[View]) -> Scale:
+        """One scale for several states."""
+        from matplotlib.ticker import MaxNLocator
+
+        stress = max(float(von_mises(view.section).max()) for view in views)
+        pressure = max(
+            float(max(view.profile.p_MPa.max(), view.section.point_data["contact_pressure"].max()))
+            for view in views
+        )
+        levels = np.asarray(MaxNLocator(_LEVELS).tick_values(0.0, stress))
+        return cls(levels, _BAND * p.section_diameter / pressure)
+
+
 def section_figure(p: ORing, views: Sequence[View]) -> Figure:
     """A panel for each state, all with one scale of stress and one of pressure."""
     from matplotlib.figure import Figure
 
-    stresses = [von_mises(view.section) for view in views]
-    levels = _levels(max(float(stress.max()) for stress in stresses))
-    largest = max(float(np.max(pressures)) for view in views for pressures in _pressures(view))
-    left, panel, bar = 0.5, 3.3, 0.75
-    figure = Figure(figsize=(left + panel * len(views) + bar, 4.2))
+    scale, left, panel, bar = Scale.of(p, views), 0.5, 3.3, 0.75
+    figure = Figure(figsize=(left + panel * len(views) + bar, 4.3))
     panels = figure.subplots(1, len(views), sharey=True, squeeze=False)[0]
-    for axes, view, stress in zip(panels, views, stresses, strict=True):
-        _draw_gland(axes, p)
-        shown = _draw_ring(axes, view.section, stress, levels)
-        _draw_film(axes, p, view, _BAND * p.section_diameter / largest)
-        _draw_contact(axes, p, view.section, _BAND * p.section_diameter / largest)
-        _draw_rod(axes, p, view.row)
+    for axes, view in zip(panels, views, strict=True):
+        shown = draw_view(axes, p, view, scale)
+        speed = f"{view.row.rod_speed_mm_s:+g}".replace("-", "\N{MINUS SIGN}")
+        film = f"$U$ = {speed} mm/s, $h^{{*}}$ = {view.row.h_star_um:.3g} µm"
+        axes.set_title(f"{style.STROKES[view.row.stroke]}, {film}")
+        axes.set_xlabel("$z$ [mm]")
     panels[0].set_ylabel("$r$ [mm]")
     style.set_margins(figure, left=left, right=bar, bottom=0.48, top=0.82, between=0.05)
     _, low, right, high = panels[-1].get_position(original=True).extents
     width = figure.get_size_inches()[0]
-    scale = figure.add_axes((right + 0.1 / width, low, 0.13 / width, high - low))
-    figure.colorbar(shown, cax=scale, label="von Mises stress [MPa]")
+    colours = figure.add_axes((right + 0.1 / width, low, 0.13 / width, high - low))
+    figure.colorbar(shown, cax=colours, label="von Mises stress [MPa]")
     style.write_head(figure, style.subject(p), left)
     return figure
 
 
-def _pressures(view: View) -> tuple[Array, Array]:
-    """Pressures in the film and, at the nodes of the section, where the housing is touched, MPa."""
-    return view.profile.p_MPa, view.section.point_data["contact_pressure"]
-
-
-def _levels(largest: float) -> Array:
-    from matplotlib.ticker import MaxNLocator
-
-    return np.asarray(MaxNLocator(_LEVELS).tick_values(0.0, largest))
+def draw_view(axes: Axes, p: ORing, view: View, scale: Scale) -> TriContourSet:
+    """One state in its gland; what a colour bar needs."""
+    _draw_gland(axes, p)
+    shown = _draw_ring(axes, view.section, scale.levels)
+    _draw_film(axes, p, view.profile, scale.height)
+    _draw_contact(axes, p, view.section, scale.height)
+    _draw_motion(axes, p, view.row.rod_speed_mm_s)
+    return shown
 
 
 def _draw_gland(axes: Axes, p: ORing) -> None:
@@ -117,11 +134,11 @@ def _draw_gland(axes: Axes, p: ORing) -> None:
         **metal,
     )
     axes.set(xlim=(start - beside, end + beside), ylim=(rod - below, housing + above))
-    axes.set(xlabel="$z$ [mm]", aspect="equal")
+    axes.set_aspect("equal")
     axes.grid(visible=False)
 
 
-def _draw_ring(axes: Axes, section: Section, stress: Array, levels: Array) -> TriContourSet:
+def _draw_ring(axes: Axes, section: Section, levels: Array) -> TriContourSet:
     """The stress in bands of colour, and the outline."""
     from matplotlib.collections import LineCollection
     from matplotlib.tri import Triangulation
@@ -129,15 +146,15 @@ def _draw_ring(axes: Axes, section: Section, stress: Array, levels: Array) -> Tr
     cells = section.cells
     triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     grid = Triangulation(section.points[:, 0], section.points[:, 1], triangles)
-    shown: TriContourSet = axes.tricontourf(grid, stress, levels=levels, cmap="YlOrRd")
+    shown: TriContourSet = axes.tricontourf(grid, von_mises(section), levels=levels, cmap="YlOrRd")
     edges = section.points[boundary_edges(cells)]
     axes.add_collection(LineCollection(list(edges), colors=_LINE, linewidths=0.9))
     return shown
 
 
-def _draw_film(axes: Axes, p: ORing, view: View, height: float) -> None:
+def _draw_film(axes: Axes, p: ORing, profile: Profile, height: float) -> None:
     """Film pressure as a band in the rod.  height: mm for 1 MPa."""
-    rod, x, film = 0.5 * p.rod_diameter, view.profile.x_mm, np.maximum(view.profile.p_MPa, 0.0)
+    rod, x, film = 0.5 * p.rod_diameter, profile.x_mm, np.maximum(profile.p_MPa, 0.0)
     axes.fill_between(x, rod, rod - height * film, color=_FILM, lw=0)
     top = int(np.argmax(film))
     _write(axes, (x[top], rod - height * film[top]), f"film pressure, max {film[top]:.3g} MPa", -3)
@@ -171,17 +188,14 @@ def _normals(points: Array, edges: Integers) -> Array:
     return np.asarray(np.divide(total, length, out=total, where=length > 0.0))
 
 
-def _draw_rod(axes: Axes, p: ORing, row: FilmRow) -> None:
-    """Which way the rod goes, and what the film is."""
-    speed = f"{row.rod_speed_mm_s:+g}".replace("-", "\N{MINUS SIGN}")
-    name = style.STROKES[row.stroke]
-    axes.set_title(f"{name}, $U$ = {speed} mm/s, $h^{{*}}$ = {row.h_star_um:.3g} µm")
-    half, sign = 0.3 * p.section_diameter, np.sign(row.rod_speed_mm_s)
+def _draw_motion(axes: Axes, p: ORing, speed: float) -> None:
+    """An arrow the way the rod goes."""
+    half = 0.3 * p.section_diameter * np.sign(speed)
     level = 0.5 * p.rod_diameter - (_AROUND[1] - 0.05) * p.section_diameter
     axes.annotate(
         "",
-        (p.groove_centre + sign * half, level),
-        (p.groove_centre - sign * half, level),
+        (p.groove_centre + half, level),
+        (p.groove_centre - half, level),
         arrowprops={"arrowstyle": "-|>", "color": _LINE, "linewidth": 1.2},
     )
 
