@@ -15,7 +15,7 @@ BUILDER := $(wildcard codegen/tools/build.py codegen/abi.py)
 OTHERS ?= python3.13 python3.12 $(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python \
 	$(HOME)/.pyenv/versions/3.12.*/bin/python)
 
-.PHONY: help oring test test-other slow wheel lint check format docs clean
+.PHONY: help oring test test-other slow wheel lint check format docs pictures clean
 
 help:
 	@echo "make oring    solve the O-ring and write its film-thickness curve to $(OUT)"
@@ -63,6 +63,9 @@ format: $(VENV)/.dev
 
 docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+
+pictures: $(VENV)/.kernels
+	$(BIN)/python docs/pictures.py
 
 clean:
 	rm -rf $(VENV) .venv-other build dist src/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

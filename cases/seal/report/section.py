@@ -156,8 +156,8 @@ def _draw_film(axes: Axes, p: ORing, profile: Profile, height: float) -> None:
     """Film pressure as a band in the rod.  height: mm for 1 MPa."""
     rod, x, film = 0.5 * p.rod_diameter, profile.x_mm, np.maximum(profile.p_MPa, 0.0)
     axes.fill_between(x, rod, rod - height * film, color=_FILM, lw=0)
-    top = int(np.argmax(film))
-    _write(axes, (x[top], rod - height * film[top]), f"film pressure, max {film[top]:.3g} MPa", -3)
+    below = rod - height * film.max()
+    _write(axes, (p.groove_centre, below), f"film pressure, max {film.max():.3g} MPa", -3)
 
 
 def _draw_contact(axes: Axes, p: ORing, section: Section, height: float) -> None:
@@ -174,7 +174,7 @@ def _draw_contact(axes: Axes, p: ORing, section: Section, height: float) -> None
     axes.add_collection(bands)
     above = 0.5 * p.housing_diameter + height * pressure.max()
     text = f"contact pressure, max {pressure.max():.3g} MPa"
-    _write(axes, (section.points[pressure.argmax(), 0], above), text, 3)
+    _write(axes, (p.groove_centre, above), text, 3)
 
 
 def _normals(points: Array, edges: Integers) -> Array:

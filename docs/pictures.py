@@ -1,0 +1,141 @@
+"""The strip of pictures on the first screen of the README, from our own runs: `make pictures`.
+
+Four runs of the O-ring are solved (half a minute); the times of the kernels are those of
+benchmarks/README.md.  The files are the same every time on one machine.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+import softehl
+from softehl.cases.seal.report import style
+from softehl.cases.seal.report.curve import plain_ticks
+from softehl.cases.seal.report.section import Scale, View, draw_view
+from softehl.cases.seal.telling import read_profile, read_section
+
+SIZE = (2.5, 2.3)
+"""Of each picture, inches: four stand side by side."""
+SPEEDS = (1600.0, 800.0, 400.0, 200.0, 100.0)
+PRESSED = softehl.ORing(
+    density=4, sealed_pressure=5.0, stroke="out", speeds=(1600.0,), error_estimate=False
+)
+SWEPT = softehl.ORing(stroke="in", speeds=SPEEDS, error_estimate=False)
+STABLE = softehl.ORing(stroke="in", speeds=(100.0,), error_estimate=False)
+PAPERS = STABLE.model_copy(update={"mesh": "uniform", "upwinding": 0.0})
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "README.md"
+
+_STYLE: Any = {
+    **style.STYLE,
+    "axes.labelpad": 1.5,
+    "axes.labelsize": 7.5,
+    "axes.linewidth": 0.6,
+    "axes.titlesize": 8,
+    "figure.dpi": 200,
+    "font.size": 7,
+    "legend.fontsize": 6.5,
+    "legend.handlelength": 1.4,
+    "lines.linewidth": 1.2,
+    "xtick.labelsize": 7,
+    "xtick.major.width": 0.6,
+    "ytick.labelsize": 7,
+    "ytick.major.width": 0.6,
+}
+
+
+def main(folder: Path) -> None:
+    """Write every picture into the folder."""
+    with tempfile.TemporaryDirectory() as place:
+        runs = {"pressed": PRESSED, "swept": SWEPT, "stable": STABLE, "papers": PAPERS}
+        curves = dict(zip(runs, softehl.solve_cases(runs, place), strict=True))
+        with matplotlib.rc_context(_STYLE):
+            pictures = {
+                "section": section(curves["pressed"]),
+                "films": films(curves["swept"]),
+                "stabilised": stabilised(curves["papers"], curves["stable"]),
+                "kernels": kernels(BENCHMARKS.read_text(encoding="utf-8")),
+            }
+            folder.mkdir(parents=True, exist_ok=True)
+            for name, figure in pictures.items():
+                figure.savefig(folder / f"{name}.png", pil_kwargs={"optimize": True})
+
+
+def section(curve: softehl.Curve) -> Figure:
+    """The deformed section in its gland."""
+    (row,) = curve.rows
+    view = View(row, read_profile(curve.folder, row), read_section(curve.folder, row))
+    figure = Figure(figsize=SIZE)
+    axes = figure.subplots()
+    shown = draw_view(axes, curve.parameters, view, Scale.of(curve.parameters, [view]))
+    axes.set(xticks=[], yticks=[])
+    axes.set_title(f"{curve.parameters.sealed_pressure:g} MPa from the left")
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    style.set_margins(figure, left=0.05, right=0.55, bottom=0.08, top=0.25)
+    bar = figure.add_axes((0.8, 0.12, 0.035, 0.7))
+    figure.colorbar(shown, cax=bar, label="von Mises stress [MPa]")
+    return figure
+
+
+def films(curve: softehl.Curve) -> Figure:
+    """Film thickness along the contact, a line a speed."""
+    figure = Figure(figsize=SIZE)
+    axes = figure.subplots()
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.05, 0.85, len(curve.rows)))
+    for row, colour in zip(curve.rows, shades, strict=True):
+        profile = read_profile(curve.folder, row)
+        label = f"{abs(row.rod_speed_mm_s):g}"
+        axes.plot(profile.x_mm, profile.h_um, color=tuple(colour), label=label)
+    axes.set(xlim=(-0.8, 1.3), ylim=(0.3, 30.0), yscale="log")
+    axes.yaxis.set_ticks(plain_ticks(0.3, 30.0))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+    axes.set(xlabel="position $x$ [mm]", ylabel=style.FILM, title="instroke, 1 MPa")
+    axes.legend(title="$|U|$ [mm/s]", title_fontsize=6.5, loc="upper center", ncols=2)
+    style.set_margins(figure, left=0.42, right=0.06, bottom=0.36, top=0.25)
+    return figure
+
+
+def stabilised(papers: softehl.Curve, ours: softehl.Curve) -> Figure:
+    """The film of the paper's scheme and ours, with the same number of unknowns."""
+    figure = Figure(figsize=SIZE)
+    axes = figure.subplots()
+    for curve, label, colour in ((papers, "paper's scheme", "#c8553d"), (ours, "ours", "#1b6ca8")):
+        profile = read_profile(curve.folder, curve.rows[0])
+        axes.plot(profile.x_mm, profile.h_um, color=colour, label=label, linewidth=1.0)
+    axes.set(xlim=(-0.65, 1.1), ylim=(0.0, 1.2))
+    axes.set(xlabel="position $x$ [mm]", ylabel=style.FILM)
+    axes.set_title("100 mm/s, equal number of unknowns")
+    axes.legend(loc="upper center")
+    style.set_margins(figure, left=0.42, right=0.06, bottom=0.36, top=0.25)
+    return figure
+
+
+def kernels(page: str) -> Figure:
+    """Times of one tangent of the plain quadrilateral, each generator at its best."""
+    found = re.findall(
+        r"^\| Q4 B \| ([A-Za-z]+)[^|]*\| (\d+) \| \d+ \| [\d.]+ \|", page, re.MULTILINE
+    )
+    names, times = [name for name, _ in found], [float(time) for _, time in found]
+    figure = Figure(figsize=SIZE)
+    axes = figure.subplots()
+    bars = axes.barh(names, times, color=["#1b6ca8", "#b9bdc4", "#b9bdc4"], height=0.6)
+    axes.bar_label(bars, [f"{time:g} ns" for time in times], padding=2)
+    axes.set(xlim=(0.0, 1.28 * max(times)), xlabel="time of one tangent [ns]")
+    axes.set_title("hyperelastic element, one core")
+    axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    style.set_margins(figure, left=0.52, right=0.08, bottom=0.36, top=0.25)
+    return figure
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent / "pictures"))
