@@ -21,6 +21,7 @@ from softehl.runtime.library import (
     Library,
     MissingKernelsError,
     StaleKernelsError,
+    damaged_manifest,
     library_of,
     manifest,
 )
@@ -263,7 +264,14 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
     entries = manifest(directory)
     if name not in entries:
         raise MissingKernelsError(f"no kernel {name!r}; there are {', '.join(entries)}")
-    entry = entries[name]
+    try:
+        return _kernel(name, entries[name], library_of(directory))
+    except (KeyError, TypeError, ValueError):
+        raise damaged_manifest(directory) from None
+
+
+def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
+    """The kernel that an entry of a manifest describes."""
     rule = entry["rule"]
     return Kernel(
         name=name,
@@ -279,7 +287,7 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         unrolled=entry["unrolled"],
         default_rule=Rule(np.array(rule["points"]), np.array(rule["weights"]), None),
         signature=entry["signature"],
-        library=library_of(directory),
+        library=library,
         components=entry["components"],
         conditions=tuple((n, r, b, w) for n, r, b, w in entry["conditions"]),
         places=tuple((n, a) for n, a in entry.get("places", ())),

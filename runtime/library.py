@@ -106,7 +106,13 @@ def manifest(directory: Path = GENERATED) -> dict[str, Any]:
             return dict(kernels)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         pass
-    raise StaleKernelsError(f"{path} is damaged: {_remedy(directory)}")
+    raise damaged_manifest(directory)
+
+
+def damaged_manifest(directory: Path) -> StaleKernelsError:
+    """The error of a manifest that cannot be understood."""
+    path = directory / "manifest.json"
+    return StaleKernelsError(f"{path} is damaged: {_remedy(directory)}")
 
 
 def library_of(directory: Path = GENERATED) -> Library:

@@ -21,8 +21,10 @@ from softehl.cases.harness.files import Content, write_content
 from softehl.cases.harness.observer import Outcome, StageRecord, State
 from softehl.cases.harness.row import Record, Row
 from softehl.runtime.io import read_json, write_csv, write_json
+from softehl.runtime.library import library_of
 
 _OURS = ("run.json", "curve.csv")
+_SIZE = ("kernels", "kernel_library", "unknowns", "solvers")
 _PACKAGES = (
     *("softehl", "numpy", "scipy", "cffi", "pypardiso"),
     *("pydantic", "click", "rich", "meshio", "matplotlib"),
@@ -76,7 +78,7 @@ class RunRecord:
         self.advice: set[str] = set()
         self._began: float | None = None
         self._earlier: dict[str, Any] = {}
-        self._size: dict[str, Any] = {"kernels": None, "unknowns": None, "solvers": None}
+        self._size: dict[str, Any] = dict.fromkeys(_SIZE)
         self._logs: list[StageLog] = []
         self._stages: list[StageRecord] | None = None
         _require_folder(folder)
@@ -129,6 +131,7 @@ class RunRecord:
         for outcome in outcomes:
             self._size = {
                 "kernels": dict(outcome.kernel_signatures),
+                "kernel_library": library_of().kind,
                 "unknowns": dict(outcome.unknowns),
                 "solvers": dict(outcome.solvers),
             }

@@ -58,6 +58,7 @@ def default_folder(path: Path) -> Path:
 
 
 def _generate(paths: Sequence[Path], folder: Path) -> int:
+    build.tuned()  # a missing compiler is better named before the derivation than after
     definitions, made = library.of_files(paths)
     changed = write(folder, made)
     names = " ".join(p.name for p in paths)

@@ -37,6 +37,7 @@ from softehl.cases.seal.state import (
 )
 from softehl.cases.seal.telling import Teller
 from softehl.runtime.kernels import MissingKernelsError
+from softehl.runtime.library import library_of
 from softehl.runtime.solve.solution import Status
 
 HEADER = (
@@ -336,6 +337,7 @@ def test_run_json(here: Path, invoke: Invoke) -> None:
     assert content["parameters"] == {**parameters, "speeds": [400.0, 100.0]}
     assert (content["case"], content["status"]) == ("oring", "converged")
     assert content["kernels"] == {"film": "abc"}
+    assert content["kernel_library"] == library_of().kind
     assert content["unknowns"] == {"total": 1234, "pressure": 109}
     assert {"python", "numpy", "scipy", "softehl"} <= set(content["versions"])
     assert content["stages"] == [
