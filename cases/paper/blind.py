@@ -8,7 +8,7 @@ from typing import Any
 from softehl.cases.paper.checks import LETTERS, observed_order
 from softehl.cases.paper.curves import ORDERS
 from softehl.cases.paper.item import STUDY_DENSITIES, Item, Product, Scope, Table
-from softehl.cases.paper.states import CURED, PAPER, Request, State, Store, ask, setup
+from softehl.cases.paper.states import PAPER, STABILISED, Request, State, Store, ask, setup
 from softehl.cases.seal.parameters import DENSITIES
 from softehl.runtime.io import Cell
 
@@ -52,7 +52,7 @@ def _piezo_requests(scope: Scope) -> list[Request]:
     u, p_s = scope.speed(100.0), scope.pressure(5.0)
     return [
         ask(setup(d, p_s, pressure_viscosity=alpha, **scheme), [u, -u])
-        for scheme in (PAPER, CURED)
+        for scheme in (PAPER, STABILISED)
         for d in scope.meshes(STUDY_DENSITIES, default=8)
         for alpha in (0.02, 0.0)
     ]
@@ -64,7 +64,7 @@ def piezo(store: Store, scope: Scope) -> Product:
     caption = f"p_s = {p_s:g} MPa, |U| = {u:g} mm/s, alpha = 0.02 against 0."
     tables = {
         "piezo": _piezo_table(store, scope, PAPER),
-        "piezo_cured": _piezo_table(store, scope, CURED),
+        "piezo_stabilised": _piezo_table(store, scope, STABILISED),
     }
     return Product(tables, caption)
 

@@ -3,12 +3,12 @@
 from softehl.cases.paper import (
     blind,
     checks,
-    cure,
     curves,
     inverse,
     onset,
     points,
     profiles,
+    stabilisation,
     statements,
     tables,
 )
@@ -31,6 +31,6 @@ ITEMS: dict[str, Item] = {
         *points.ITEMS,
         *inverse.ITEMS,
         *statements.ITEMS,
-        *cure.ITEMS,
+        *stabilisation.ITEMS,
     ]
 }

@@ -20,7 +20,7 @@ from softehl.cases.paper.item import (
     density_words,
     state_table,
 )
-from softehl.cases.paper.states import CURED, PAPER, Request, State, Store, ask, setup
+from softehl.cases.paper.states import PAPER, STABILISED, Request, State, Store, ask, setup
 from softehl.cases.seal.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.runtime.io import Cell
@@ -84,7 +84,7 @@ def _study_requests(scope: Scope) -> list[Request]:
     pressures = scope.some_pressures(STUDY_PRESSURES)
     return [
         ask(setup(d, p, **scheme), both(scope.some_speeds()))
-        for scheme in (PAPER, CURED)
+        for scheme in (PAPER, STABILISED)
         for d in scope.meshes(STUDY_DENSITIES, default=8)
         for p in pressures
     ]
@@ -98,7 +98,7 @@ def mesh_study(store: Store, scope: Scope) -> Product:
     )
     tables = {
         "mesh_study": _study(store, scope, PAPER),
-        "mesh_study_cured": _study(store, scope, CURED),
+        "mesh_study_stabilised": _study(store, scope, STABILISED),
     }
     return Product(tables, caption)
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from softehl.cases.paper.findings_film import FILM
 from softehl.cases.paper.findings_mesh import MESH
-from softehl.cases.paper.look import Finding, Look
+from softehl.cases.paper.query import Finding, Query
 
-__all__ = ["FINDINGS", "Finding", "Look"]
+__all__ = ["FINDINGS", "Finding", "Query"]
 
-FINDINGS: tuple[tuple[str, str, Callable[[Look], Finding]], ...] = (*FILM, *MESH)
+FINDINGS: tuple[tuple[str, str, Callable[[Query], Finding]], ...] = (*FILM, *MESH)

@@ -8,32 +8,32 @@ from math import exp, isfinite, log
 import numpy as np
 
 from softehl.cases.paper.item import STUDY_DENSITIES
-from softehl.cases.paper.look import Finding, Look, Measure, angle, counted, difference, numbers
+from softehl.cases.paper.query import Finding, Measure, Query, angle, counted, difference, numbers
 from softehl.cases.paper.tables import FIG_4_PRESSURES, TABLE_2, table_2_densities, unknowns
 
 _LAYERS = (5.0, 20.0)
 """Film thicknesses between which the inclination is taken, um."""
 
 
-def _unknowns(look: Look) -> Finding:
-    densities = table_2_densities(look.scope)
+def _unknowns(query: Query) -> Finding:
+    densities = table_2_densities(query.scope)
     ours = [unknowns(d)[0] for d in densities]
     off = [100.0 * (n / TABLE_2[d][0] - 1.0) for d, n in zip(densities, ours, strict=True)]
     text = f"{', '.join(map(str, ours))}: {numbers(off, '+.2f')} %"
     return Finding(text, all(x == 0.0 for x in off))
 
 
-def _pressure_unknowns(look: Look) -> Finding:
-    densities = table_2_densities(look.scope)
+def _pressure_unknowns(query: Query) -> Finding:
+    densities = table_2_densities(query.scope)
     ours = [unknowns(d)[1] for d in densities]
     return Finding(", ".join(map(str, ours)), ours == [TABLE_2[d][1] for d in densities])
 
 
-def _zone_expands(look: Look) -> Finding:
-    density = look.scope.mesh(2, 2)
+def _zone_expands(query: Query) -> Finding:
+    density = query.scope.mesh(2, 2)
     ends = []
-    for p_s in look.scope.some_pressures(FIG_4_PRESSURES):
-        row = look.row(density, p_s, 400.0)
+    for p_s in query.scope.some_pressures(FIG_4_PRESSURES):
+        row = query.row(density, p_s, 400.0)
         ends.append((row.contact_start_mm, row.contact_end_mm))
     starts, stops = zip(*ends, strict=True)
     moved = (max(starts) - min(starts), stops[-1] - stops[0])
@@ -43,11 +43,11 @@ def _zone_expands(look: Look) -> Finding:
     return Finding(text, list(stops) == sorted(stops) and moved[0] < 0.25 * moved[1])
 
 
-def _minimum_at_outlet(look: Look) -> Finding:
+def _minimum_at_outlet(query: Query) -> Finding:
     shares = []
     for sign in (1.0, -1.0):
-        row = look.row(look.density, 1.0, sign * 100.0)
-        profile = look.state(look.density, 1.0, sign * 100.0).profile
+        row = query.row(query.density, 1.0, sign * 100.0)
+        profile = query.state(query.density, 1.0, sign * 100.0).profile
         x = float(profile.x_mm[int(np.argmin(profile.h_um))])
         inside = row.contact_end_mm - x if sign > 0 else x - row.contact_start_mm
         shares.append(100.0 * inside / (row.contact_end_mm - row.contact_start_mm))
@@ -55,11 +55,11 @@ def _minimum_at_outlet(look: Look) -> Finding:
     return Finding(text, all(0.0 <= share < 10.0 for share in shares))
 
 
-def _pressure_drop(look: Look) -> Finding:
-    p_s = look.scope.pressure(2.0)
-    out = look.state(look.density, p_s, 100.0).profile
-    back = look.state(look.density, p_s, -100.0)
-    row, profile = look.row(look.density, p_s, -100.0), back.profile
+def _pressure_drop(query: Query) -> Finding:
+    p_s = query.scope.pressure(2.0)
+    out = query.state(query.density, p_s, 100.0).profile
+    back = query.state(query.density, p_s, -100.0)
+    row, profile = query.row(query.density, p_s, -100.0), back.profile
     near = np.abs(profile.x_mm - row.contact_start_mm) < 0.1
     drop = p_s - float(profile.p_MPa[near].min())
     text = (
@@ -69,11 +69,11 @@ def _pressure_drop(look: Look) -> Finding:
     return Finding(text, drop > 0.1 and float(out.p_MPa.min()) > -0.05)
 
 
-def _inclination(look: Look) -> Finding:
+def _inclination(query: Query) -> Finding:
     angles = []
     for p_s in (1.0, 2.0):
         for sign in (1.0, -1.0):
-            profile = look.state(look.density, p_s, sign * 100.0).profile
+            profile = query.state(query.density, p_s, sign * 100.0).profile
             x, h = profile.x_mm, profile.h_um
             low = int(np.argmin(h))
             angles.append(angle(x[: low + 1][::-1], h[: low + 1][::-1], *_LAYERS))
@@ -86,20 +86,23 @@ def _inclination(look: Look) -> Finding:
     return Finding(text, holds)
 
 
-def _thinner_instroke(look: Look) -> Finding:
-    d = look.density
+def _thinner_instroke(query: Query) -> Finding:
+    d = query.density
     pairs = [
-        (look.h(d, p, -u), look.h(d, p, u)) for p in look.pressures if p > 0 for u in look.speeds
+        (query.h(d, p, -u), query.h(d, p, u))
+        for p in query.pressures
+        if p > 0
+        for u in query.speeds
     ]
     return counted(pairs, "pairs at p_s > 0 with the thinner film at instroke")
 
 
-def _falls_with_speed(look: Look) -> Finding:
-    d, slopes = look.density, []
-    fast, slow = look.speeds[0], look.speeds[-1]
-    for p in look.pressures:
+def _falls_with_speed(query: Query) -> Finding:
+    d, slopes = query.density, []
+    fast, slow = query.speeds[0], query.speeds[-1]
+    for p in query.pressures:
         for sign in (1.0, -1.0):
-            films = [(u, look.h(d, p, sign * u)) for u in (fast, slow)]
+            films = [(u, query.h(d, p, sign * u)) for u in (fast, slow)]
             if fast > slow and all(isfinite(h) for _, h in films):
                 slopes.append(log(films[0][1] / films[1][1]) / log(fast / slow))
     if not slopes:
@@ -109,23 +112,24 @@ def _falls_with_speed(look: Look) -> Finding:
 
 
 def _with_sealed_pressure(sign: float) -> Measure:
-    def measure(look: Look) -> Finding:
-        d, pairs = look.density, []
-        for u in look.speeds:
-            films = [look.h(d, p, sign * u) for p in look.pressures]
+    def measure(query: Query) -> Finding:
+        d, pairs = query.density, []
+        for u in query.speeds:
+            films = [query.h(d, p, sign * u) for p in query.pressures]
             pairs += [(a, b) if sign > 0 else (b, a) for a, b in itertools.pairwise(films)]
         word = "rises" if sign > 0 else "falls"
         found = counted(pairs, f"steps of p_s over which h* {word}")
-        films = [look.h(d, p, sign * 400.0) for p in look.pressures]
+        films = [query.h(d, p, sign * 400.0) for p in query.pressures]
         return Finding(f"{found.text}; h* at |U| = 400: {numbers(films, '.4g')} um", found.holds)
 
     return measure
 
 
-def _weaker_at_outstroke(look: Look) -> Finding:
-    low, high = look.pressures[0], look.pressures[-1]
+def _weaker_at_outstroke(query: Query) -> Finding:
+    low, high = query.pressures[0], query.pressures[-1]
     changes = [
-        100.0 * (look.h(look.density, high, s * 400.0) / look.h(look.density, low, s * 400.0) - 1.0)
+        100.0
+        * (query.h(query.density, high, s * 400.0) / query.h(query.density, low, s * 400.0) - 1.0)
         for s in (1.0, -1.0)
     ]
     text = f"|U| = 400, p_s {low:g} to {high:g}: outstroke {changes[0]:+.1f} %, instroke "
@@ -136,10 +140,10 @@ def _less(a: float, b: float) -> bool | None:
     return a < b if isfinite(a) and isfinite(b) and (a or b) else None
 
 
-def _h_star_at_maximum(look: Look) -> Finding:
+def _h_star_at_maximum(query: Query) -> Finding:
     off = []
     for sign in (1.0, -1.0):
-        state = look.state(look.density, 1.0, sign * 400.0)
+        state = query.state(query.density, 1.0, sign * 400.0)
         profile = state.profile
         h = float(profile.h_um[int(np.argmax(profile.p_MPa))])
         off.append(100.0 * (h / state.h_star - 1.0))
@@ -148,11 +152,11 @@ def _h_star_at_maximum(look: Look) -> Finding:
     )
 
 
-def _flux_constant(look: Look) -> Finding:
+def _flux_constant(query: Query) -> Finding:
     rows = [
-        look.state(look.density, p, s * u).row
-        for p in look.pressures
-        for u in look.speeds
+        query.state(query.density, p, s * u).row
+        for p in query.pressures
+        for u in query.speeds
         for s in (1.0, -1.0)
     ]
     worst = max(
@@ -163,53 +167,53 @@ def _flux_constant(look: Look) -> Finding:
     )
 
 
-def _zones_shrink(look: Look) -> Finding:
-    pairs, d = [], look.density
+def _zones_shrink(query: Query) -> Finding:
+    pairs, d = [], query.density
     for sign in (1.0, -1.0):
-        rows = [look.state(d, 1.0, sign * u).row for u in look.speeds]
+        rows = [query.state(d, 1.0, sign * u).row for u in query.speeds]
         widths = [r.inlet_segments if r else float("nan") for r in rows]
         pairs += list(zip(widths[1:], widths, strict=False))
     return counted(pairs, "halvings of |U| over which the inlet (10 h* to 1.5 h*) gets shorter")
 
 
-def _near_contact(look: Look) -> Finding:
-    off, p_s = [], look.scope.pressure(1.0)
+def _near_contact(query: Query) -> Finding:
+    off, p_s = [], query.scope.pressure(1.0)
     for sign in (1.0, -1.0):
-        row = look.row(look.density, p_s, sign * 100.0)
+        row = query.row(query.density, p_s, sign * 100.0)
         off.append(100.0 * (row.p_max_MPa / row.contact_p_max_MPa - 1.0))
     return Finding(
         f"largest pressure against dry contact: {numbers(off, '+.2f')} %", max(map(abs, off)) < 2.0
     )
 
 
-def _contact_width(look: Look) -> Finding:
+def _contact_width(query: Query) -> Finding:
     def width(p_s: float, u: float) -> float:
-        row = look.row(look.density, p_s, u)
+        row = query.row(query.density, p_s, u)
         return row.contact_end_mm - row.contact_start_mm
 
-    fast, slow = look.speeds[0], look.speeds[-1]
-    low, high = look.pressures[0], look.pressures[-1]
+    fast, slow = query.speeds[0], query.speeds[-1]
+    low, high = query.pressures[0], query.pressures[-1]
     by_p, by_u = width(high, fast) - width(low, fast), width(1.0, slow) - width(1.0, fast)
     text = f"width changes by {by_p:+.3f} mm over p_s and {by_u:+.3f} mm over |U| (outstroke)"
     return Finding(text, _less(abs(by_u), abs(by_p)))
 
 
-def _thin(look: Look) -> Finding:
+def _thin(query: Query) -> Finding:
     rows = [
-        look.state(look.density, p, s * u).row
-        for p in look.pressures
-        for u in look.speeds
+        query.state(query.density, p, s * u).row
+        for p in query.pressures
+        for u in query.speeds
         for s in (1.0, -1.0)
     ]
     least = min(row.h_star_um for row in rows if row is not None and row.verdict == "ok")
     return Finding(f"smallest h* with verdict ok: {least:.3f} um", least < 1.0)
 
 
-def _shear(look: Look) -> Finding:
-    p_s, d = look.scope.pressure(1.0), look.density
+def _shear(query: Query) -> Finding:
+    p_s, d = query.scope.pressure(1.0), query.density
     changes: dict[str, list[float]] = {"h_star_um": [], "h_min_um": []}
-    for u in (sign * speed for sign in (1.0, -1.0) for speed in look.speeds):
-        a, b = look.state(d, p_s, u), look.state(d, p_s, u, shear_traction=False)
+    for u in (sign * speed for sign in (1.0, -1.0) for speed in query.speeds):
+        a, b = query.state(d, p_s, u), query.state(d, p_s, u, shear_traction=False)
         if a.row and b.row and a.plain and b.plain:
             for name, values in changes.items():
                 values.append(100.0 * (getattr(a.row, name) / getattr(b.row, name) - 1.0))
@@ -223,25 +227,25 @@ def _shear(look: Look) -> Finding:
     return Finding(text, max(abs(x) for pair in ends.values() for x in pair) > 1.0)
 
 
-def _barus_30(look: Look) -> Finding:
+def _barus_30(query: Query) -> Finding:
     ratio = exp(0.02 * 30.0)
     return Finding(f"{ratio:.2f}", abs(ratio - 1.8) < 0.05)
 
 
 def _piezo(sign: float) -> Measure:
-    def measure(look: Look) -> Finding:
+    def measure(query: Query) -> Finding:
         changes = []
-        for p in look.pressures:
+        for p in query.pressures:
             fine = (
-                look.scope.meshes(STUDY_DENSITIES, default=8)[-1]
-                if p == look.scope.pressure(5.0)
+                query.scope.meshes(STUDY_DENSITIES, default=8)[-1]
+                if p == query.scope.pressure(5.0)
                 else 0
             )
-            d = max(fine, look.density)  # at 5 MPa there is a mesh study
-            a = look.h(d, p, sign * 100.0)
-            b = look.h(d, p, sign * 100.0, pressure_viscosity=0.0)
+            d = max(fine, query.density)  # at 5 MPa there is a mesh study
+            a = query.h(d, p, sign * 100.0)
+            b = query.h(d, p, sign * 100.0, pressure_viscosity=0.0)
             changes.append(100.0 * (a / b - 1.0))
-        text = f"p_s {numbers(look.pressures)}: {numbers(changes, '+.2f')} %"
+        text = f"p_s {numbers(query.pressures)}: {numbers(changes, '+.2f')} %"
         known = [c for c in changes if isfinite(c)]
         if sign > 0:
             return Finding(
@@ -252,15 +256,15 @@ def _piezo(sign: float) -> Measure:
     return measure
 
 
-def _piezo_pressure(look: Look) -> Finding:
-    d, off = look.density, []
+def _piezo_pressure(query: Query) -> Finding:
+    d, off = query.density, []
     for sign in (1.0, -1.0):
-        look.row(d, 5.0, sign * 100.0)
+        query.row(d, 5.0, sign * 100.0)
         pair = (
-            look.state(d, 5.0, sign * 100.0, pressure_viscosity=0.0),
-            look.state(d, 5.0, sign * 100.0),
+            query.state(d, 5.0, sign * 100.0, pressure_viscosity=0.0),
+            query.state(d, 5.0, sign * 100.0),
         )
-        off.append(difference(*pair, margin=0.1) / look.row(d, 5.0, sign * 100.0).p_max_MPa)
+        off.append(difference(*pair, margin=0.1) / query.row(d, 5.0, sign * 100.0).p_max_MPa)
     text = (
         f"largest difference in the mid contact {numbers([100 * x for x in off], '.2g')} % of p_max"
     )

@@ -8,7 +8,7 @@ from math import isfinite
 
 from softehl.cases.paper.checks import observed_order
 from softehl.cases.paper.curves import ORDERS
-from softehl.cases.paper.look import Finding, Look, Measure, counted, difference, numbers, ripple
+from softehl.cases.paper.query import Finding, Measure, Query, counted, difference, numbers, ripple
 from softehl.cases.seal.parameters import DENSITIES
 
 VISIBLE = 0.05
@@ -20,59 +20,59 @@ RIPPLE = 0.02
 _FALLING = (800.0, 400.0, 200.0, 100.0, 50.0, 25.0)
 
 
-def _index(look: Look, density: int, p_s: float, speed: float, **others: object) -> float:
-    row = look.state(density, p_s, speed, **others).row
+def _index(query: Query, density: int, p_s: float, speed: float, **others: object) -> float:
+    row = query.state(density, p_s, speed, **others).row
     return row.oscillation_index if row is not None else float("nan")
 
 
-def _onset(look: Look, density: int, p_s: float, sign: float, **others: object) -> float:
+def _onset(query: Query, density: int, p_s: float, sign: float, **others: object) -> float:
     """The fastest |U| from 800 down with a visible ripple; 0 if none, nan if not known."""
-    values = [(u, ripple(look.state(density, p_s, sign * u, **others))) for u in _FALLING]
+    values = [(u, ripple(query.state(density, p_s, sign * u, **others))) for u in _FALLING]
     seen = [u for u, rise in values if rise > RIPPLE]
     return seen[0] if seen else (0.0 if all(isfinite(i) for _, i in values) else float("nan"))
 
 
-def _refinement(look: Look) -> Finding:
-    densities = look.scope.meshes(DENSITIES, default=8)
-    rises = [ripple(look.state(d, 1.0, 400.0)) for d in densities]
-    values = [_index(look, d, 1.0, 400.0) for d in densities]
+def _refinement(query: Query) -> Finding:
+    densities = query.scope.meshes(DENSITIES, default=8)
+    rises = [ripple(query.state(d, 1.0, 400.0)) for d in densities]
+    values = [_index(query, d, 1.0, 400.0) for d in densities]
     text = f"densities {numbers(densities)}: ripple {numbers(rises, '.2g')} h*, "
     fine = [rise for d, rise in zip(densities, rises, strict=True) if d >= 4]
     words = f"{text}index of the mid contact {numbers(values, '.2g')}"
     return Finding(words, max(fine) < RIPPLE if fine else None)
 
 
-def _dip(look: Look) -> Finding:
-    densities = look.scope.meshes((4, 8, 16), default=8)
-    values = [look.row(d, 1.0, 400.0).h_min_um for d in densities]
+def _dip(query: Query) -> Finding:
+    densities = query.scope.meshes((4, 8, 16), default=8)
+    values = [query.row(d, 1.0, 400.0).h_min_um for d in densities]
     text = f"least h {numbers(values, '.4f')} um at densities {numbers(densities)}"
     return Finding(
         text, abs(values[0] - values[-1]) > 0.002 * values[-1] if len(values) > 1 else None
     )
 
 
-def _high_orders(look: Look) -> Finding:
-    d, off = look.scope.mesh(2, 2), []
+def _high_orders(query: Query) -> Finding:
+    d, off = query.scope.mesh(2, 2), []
     for kind in ("fe", "dg"):
-        pair = [look.state(d, 1.0, 400.0, reynolds=kind, pressure_order=m) for m in (5, 4)]
-        off.append(100.0 * difference(pair[0], pair[1]) / look.row(d, 1.0, 400.0).p_max_MPa)
+        pair = [query.state(d, 1.0, 400.0, reynolds=kind, pressure_order=m) for m in (5, 4)]
+        off.append(100.0 * difference(pair[0], pair[1]) / query.row(d, 1.0, 400.0).p_max_MPa)
     text = f"m_p = 4 against 5: at most {numbers(off, '.2g')} % of p_max (FE, DG)"
     return Finding(text, max(off) < 2.0)
 
 
-def _jumps(look: Look) -> Finding:
-    d = look.scope.mesh(2, 2)
-    rows = [look.state(d, 1.0, 400.0, reynolds="dg", pressure_order=m).row for m in ORDERS]
+def _jumps(query: Query) -> Finding:
+    d = query.scope.mesh(2, 2)
+    rows = [query.state(d, 1.0, 400.0, reynolds="dg", pressure_order=m).row for m in ORDERS]
     values = [r.pressure_jump_max_MPa if r else float("nan") for r in rows]
     found = counted(list(zip(values[1:], values, strict=False)), "falls with m_p")
     return Finding(f"{numbers(values, '.2g')} MPa for m_p = 1 to 5; {found.text}", found.holds)
 
 
-def _dg_no_better(look: Look) -> Finding:
-    d, rows = look.scope.mesh(8), []
+def _dg_no_better(query: Query) -> Finding:
+    d, rows = query.scope.mesh(8), []
     for sign in (1.0, -1.0):
-        fe = [_index(look, d, 5.0, sign * u) for u in _FALLING]
-        dg = [_index(look, d, 5.0, sign * u, reynolds="dg") for u in _FALLING]
+        fe = [_index(query, d, 5.0, sign * u) for u in _FALLING]
+        dg = [_index(query, d, 5.0, sign * u, reynolds="dg") for u in _FALLING]
         rows.append((fe, dg))
     text = "; ".join(
         f"{word} FE {numbers(fe, '.2g')} DG {numbers(dg, '.2g')}"
@@ -86,41 +86,41 @@ def _dg_no_better(look: Look) -> Finding:
     return Finding(f"density {d}, index at 800 to 25: {text}", holds)
 
 
-def _onset_density_8(look: Look) -> Finding:
-    d = look.scope.meshes((4, 8, 16), default=8)[-1]
-    out, back = _onset(look, d, 5.0, 1.0), _onset(look, d, 5.0, -1.0)
+def _onset_density_8(query: Query) -> Finding:
+    d = query.scope.meshes((4, 8, 16), default=8)[-1]
+    out, back = _onset(query, d, 5.0, 1.0), _onset(query, d, 5.0, -1.0)
     text = f"density {d}: first ripple above {RIPPLE:g} h* at |U| = {out:g} (out), {back:g} (in)"
     return Finding(text, None if d != 8 else out == 200.0)
 
 
-def _onset_by_density(look: Look) -> Finding:
-    densities = look.scope.meshes((4, 8, 16), default=8)
-    onsets = [_onset(look, d, 5.0, 1.0) for d in densities]
+def _onset_by_density(query: Query) -> Finding:
+    densities = query.scope.meshes((4, 8, 16), default=8)
+    onsets = [_onset(query, d, 5.0, 1.0) for d in densities]
     text = f"outstroke, p_s = 5: |U| = {numbers(onsets)} at densities {numbers(densities)}"
     return Finding(text, counted(list(zip(onsets[1:], onsets, strict=False)), "").holds)
 
 
-def _more_at_low_speed(look: Look) -> Finding:
-    d = look.scope.mesh(16)
-    values = [_index(look, d, 5.0, u) for u in _FALLING]
+def _more_at_low_speed(query: Query) -> Finding:
+    d = query.scope.mesh(16)
+    values = [_index(query, d, 5.0, u) for u in _FALLING]
     found = counted(list(itertools.pairwise(values)), "halvings over which it grows")
     return Finding(f"index {numbers(values, '.2g')}; {found.text}", found.holds)
 
 
-def _severe(look: Look) -> Finding:
-    d = look.scope.mesh(16)
-    values = [_index(look, d, p, s * 200.0) for p in (1.0, 5.0) for s in (1.0, -1.0)]
+def _severe(query: Query) -> Finding:
+    d = query.scope.mesh(16)
+    values = [_index(query, d, p, s * 200.0) for p in (1.0, 5.0) for s in (1.0, -1.0)]
     text = f"|U| = 200: p_s 1 out {values[0]:.2g} in {values[1]:.2g}; p_s 5 out {values[2]:.2g}"
     pairs = [(values[0], values[1]), (values[0], values[2]), (values[1], values[3])]
     found = counted(pairs, "comparisons that hold")
     return Finding(f"{text} in {values[3]:.2g}; {found.text}", found.holds)
 
 
-def _mild_oscillations(look: Look) -> Finding:
-    densities = look.scope.meshes((4, 8, 16), default=8)
+def _mild_oscillations(query: Query) -> Finding:
+    densities = query.scope.meshes((4, 8, 16), default=8)
     off = []
     for u in _FALLING:
-        coarse, fine = (look.state(d, 5.0, u) for d in (densities[0], densities[-1]))
+        coarse, fine = (query.state(d, 5.0, u) for d in (densities[0], densities[-1]))
         if coarse.verdict == "oscillating" and densities[-1] > densities[0]:
             off.append(100.0 * (coarse.h_star / fine.h_star - 1.0))
     text = f"h* of oscillating states of density {densities[0]} against {densities[-1]}: "
@@ -129,28 +129,28 @@ def _mild_oscillations(look: Look) -> Finding:
     return Finding(text + numbers(off, "+.2f") + " %", holds)
 
 
-def _converged(look: Look) -> float:
+def _converged(query: Query) -> float:
     """h* of the state of Fig. 16 extrapolated from the finest FE meshes, m_p = 4."""
-    densities = look.scope.meshes(DENSITIES, default=8)
-    films = [look.h(d, 1.0, 400.0) for d in densities]
+    densities = query.scope.meshes(DENSITIES, default=8)
+    films = [query.h(d, 1.0, 400.0) for d in densities]
     limit = observed_order(films)[1] if len(films) >= 3 else films[-1]
     return limit if isfinite(limit) else films[-1]
 
 
-def _errors(look: Look, density: int, orders: Sequence[int], **others: object) -> list[float]:
-    value = _converged(look)
-    films = [look.h(density, 1.0, 400.0, pressure_order=m, **others) for m in orders]
+def _errors(query: Query, density: int, orders: Sequence[int], **others: object) -> list[float]:
+    value = _converged(query)
+    films = [query.h(density, 1.0, 400.0, pressure_order=m, **others) for m in orders]
     return [100.0 * (h / value - 1.0) for h in films]
 
 
-def _order_2(look: Look) -> Finding:
-    (error,) = _errors(look, look.scope.mesh(2, 2), [2])
-    text = f"{error:+.2f} % (converged: {_converged(look):.4f} um)"
+def _order_2(query: Query) -> Finding:
+    (error,) = _errors(query, query.scope.mesh(2, 2), [2])
+    text = f"{error:+.2f} % (converged: {_converged(query):.4f} um)"
     return Finding(text, -1.5 <= error <= -0.5 if isfinite(error) else None)
 
 
-def _order_3(look: Look) -> Finding:
-    errors = _errors(look, look.scope.mesh(2, 2), [3, 4, 5])
+def _order_3(query: Query) -> Finding:
+    errors = _errors(query, query.scope.mesh(2, 2), [3, 4, 5])
     known = all(isfinite(e) for e in errors)
     return Finding(
         f"{numbers(errors, '+.2f')} % for m_p = 3, 4, 5",
@@ -158,9 +158,9 @@ def _order_3(look: Look) -> Finding:
     )
 
 
-def _dg_worse(look: Look) -> Finding:
-    d = look.scope.mesh(2, 2)
-    fe, dg = _errors(look, d, ORDERS), _errors(look, d, ORDERS, reynolds="dg")
+def _dg_worse(query: Query) -> Finding:
+    d = query.scope.mesh(2, 2)
+    fe, dg = _errors(query, d, ORDERS), _errors(query, d, ORDERS, reynolds="dg")
     text = f"density {d}, m_p = 1 to 5: FE {numbers(fe, '+.2f')} %, DG {numbers(dg, '+.2f')} %"
     held, known = (lambda pairs: (sum(abs(a) < abs(b) for a, b in pairs), len(pairs)))(
         [(a, b) for a, b in zip(fe, dg, strict=True) if isfinite(a) and isfinite(b)]
@@ -168,11 +168,11 @@ def _dg_worse(look: Look) -> Finding:
     return Finding(f"{text}; FE closer for {held} of {known}", held > known / 2 if known else None)
 
 
-def _dg_agrees(look: Look) -> Finding:
-    d, off = look.scope.mesh(8), []
+def _dg_agrees(query: Query) -> Finding:
+    d, off = query.scope.mesh(8), []
     for sign in (1.0, -1.0):
         for u in _FALLING:
-            a, b = look.h(d, 5.0, sign * u, reynolds="dg"), look.h(d, 5.0, sign * u)
+            a, b = query.h(d, 5.0, sign * u, reynolds="dg"), query.h(d, 5.0, sign * u)
             off.append(100.0 * (a / b - 1.0))
     text = f"h* DG against FE, density {d}, p_s = 5: out {numbers(off[:6], '+.2f')}, in "
     known = [x for x in off if isfinite(x)]
@@ -181,10 +181,10 @@ def _dg_agrees(look: Look) -> Finding:
     )
 
 
-def _solids(look: Look) -> Finding:
-    densities, value = look.scope.meshes((1, 2, 4)), _converged(look)
+def _solids(query: Query) -> Finding:
+    densities, value = query.scope.meshes((1, 2, 4)), _converged(query)
     rows = [
-        [100 * (look.h(d, 1.0, 400.0, solid=s) / value - 1) for d in densities]
+        [100 * (query.h(d, 1.0, 400.0, solid=s) / value - 1) for d in densities]
         for s in ("taylor", "fbar")
     ]
     text = f"errors of h* at densities {numbers(densities)}: Taylor {numbers(rows[0], '+.2f')} %, "
@@ -193,21 +193,21 @@ def _solids(look: Look) -> Finding:
     return Finding(f"{text}F-bar {numbers(rows[1], '+.2f')} %; {found.text}", found.holds)
 
 
-def _solids_oscillate_alike(look: Look) -> Finding:
-    d = look.scope.mesh(2, 2)
-    values = [_index(look, d, 1.0, 400.0, solid=s) for s in ("taylor", "fbar")]
+def _solids_oscillate_alike(query: Query) -> Finding:
+    d = query.scope.mesh(2, 2)
+    values = [_index(query, d, 1.0, 400.0, solid=s) for s in ("taylor", "fbar")]
     text = f"density {d}: index {numbers(values, '.3g')} (Taylor, F-bar)"
     known = all(isfinite(v) for v in values)
     return Finding(text, abs(values[0] - values[1]) < VISIBLE if known else None)
 
 
-def _quadrature(look: Look) -> Finding:
+def _quadrature(query: Query) -> Finding:
     cells, held = [], []
-    for d in look.scope.meshes((1, 2, 4)):
+    for d in query.scope.meshes((1, 2, 4)):
         off = []
         for m in (1, 2, 4):
             a, b = (
-                look.h(d, 1.0, 400.0, pressure_order=m, quadrature=q) for q in ("lobatto", "gauss")
+                query.h(d, 1.0, 400.0, pressure_order=m, quadrature=q) for q in ("lobatto", "gauss")
             )
             off.append(100.0 * (a / b - 1.0))
             if isfinite(off[-1]) and (d >= 4 or m > 2):
@@ -218,9 +218,9 @@ def _quadrature(look: Look) -> Finding:
     )
 
 
-def _quadrature_oscillates_alike(look: Look) -> Finding:
-    d = look.scope.mesh(2, 2)
-    values = [_index(look, d, 1.0, 400.0, quadrature=q) for q in ("gauss", "lobatto")]
+def _quadrature_oscillates_alike(query: Query) -> Finding:
+    d = query.scope.mesh(2, 2)
+    values = [_index(query, d, 1.0, 400.0, quadrature=q) for q in ("gauss", "lobatto")]
     known = all(isfinite(v) for v in values)
     text = f"density {d}: index {numbers(values, '.3g')} (Gauss, Lobatto)"
     return Finding(text, abs(values[0] - values[1]) < VISIBLE if known else None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from softehl.cases.paper.checks import STUDY_PRESSURES
 from softehl.cases.paper.item import STUDY_DENSITIES, Item, Product, Scope, Table, both
-from softehl.cases.paper.look import ripple
+from softehl.cases.paper.query import ripple
 from softehl.cases.paper.states import Request, Store, ask, setup
 from softehl.runtime.io import Cell
 

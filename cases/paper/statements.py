@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from softehl.cases.paper import blind, checks, curves, inverse, onset, profiles, tables
-from softehl.cases.paper.findings import FINDINGS, Finding, Look
+from softehl.cases.paper.findings import FINDINGS, Finding, Query
 from softehl.cases.paper.item import Item, Product, Scope, Table
 from softehl.cases.paper.states import Request, Store
 
@@ -28,7 +28,7 @@ class Statement:
 
     place: str
     words: str
-    measure: Callable[[Look], Finding]
+    measure: Callable[[Query], Finding]
 
 
 STATEMENTS = tuple(Statement(*entry) for entry in FINDINGS)
@@ -40,11 +40,11 @@ def _requests(scope: Scope) -> list[Request]:
 
 def statements(store: Store, scope: Scope) -> Product:
     """Every statement with its measured number."""
-    look = Look(store, scope)
+    query = Query(store, scope)
     rows = []
     for number, statement in enumerate(STATEMENTS, start=1):
         try:
-            finding = statement.measure(look)
+            finding = statement.measure(query)
         except ValueError as error:  # a state that it needs was not reached
             finding = Finding(str(error), None)
         words = WORDS[finding.holds]

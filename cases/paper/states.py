@@ -33,7 +33,7 @@ ENDED = ("converged", "not converged")
 PAPER: dict[str, Any] = {"mesh": "uniform", "upwinding": 0.0, "error_estimate": False}
 """What the paper does where a run by itself would do better."""
 
-CURED: dict[str, Any] = {"mesh": "graded", "upwinding": 1.0, "error_estimate": True}
+STABILISED: dict[str, Any] = {"mesh": "graded", "upwinding": 1.0, "error_estimate": True}
 """What `softehl run` does by itself."""
 
 _IN_NAME = ("density", "sealed_pressure")

@@ -16,13 +16,13 @@ import softehl
 from softehl.cases.harness import sweep
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.paper import compute as computing
-from softehl.cases.paper import page
+from softehl.cases.paper import docs_tables
 from softehl.cases.paper.catalogue import ITEMS
 from softehl.cases.paper.checks import observed_order
 from softehl.cases.paper.command import reproduce_items
 from softehl.cases.paper.inverse import film_of, largest_inlet_gradient
 from softehl.cases.paper.item import Scope
-from softehl.cases.paper.look import angle, ripple
+from softehl.cases.paper.query import angle, ripple
 from softehl.cases.paper.states import NOT_REACHED, Store, ask, merged, setup
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.state import FilmRow
@@ -44,7 +44,9 @@ def test_a_small_version_of_everything_and_nothing_twice(
     for name in ITEMS:
         assert first[f"{name}.txt"].startswith(ITEMS[name].title.encode())
         assert len(first[f"{name}.csv"].splitlines()) > 1, name
-        assert (f"{name}.png" in first) == (name.startswith("fig") or name in ("leakage", "cure"))
+        assert (f"{name}.png" in first) == (
+            name.startswith("fig") or name in ("leakage", "stabilisation")
+        )
     assert b"Mesh density 1 (paper: 16)." in first["fig7.txt"]
     assert b"oscillating: U -1600" in first["fig7.txt"]
     assert b"under-resolved: U +1600 fe m_p 1" in first["fig16.txt"]
@@ -290,13 +292,13 @@ TEMPLATE = (
 def test_the_page_takes_its_tables_from_files(tmp_path: Path) -> None:
     write_csv(tmp_path / "t.csv", ("a", "b", "verdicts"), [[1.0, 0.123456, ".o"], [2.0, 3.0, "-"]])
     (tmp_path / "c.txt").write_text("A caption.\n")
-    text = page.renewed(TEMPLATE, tmp_path)
+    text = docs_tables.renewed(TEMPLATE, tmp_path)
     assert "old" not in text
     assert "| b | verdicts |\n|---|---|\n| 0.1235 | `.o` |\n| 3 | `-` |\n" in text
     assert "\nA caption.\n" in text
-    assert page.renewed(text, tmp_path) == text
+    assert docs_tables.renewed(text, tmp_path) == text
     with pytest.raises(ValueError, match="no column 'z'; allowed: a, b, verdicts"):
-        page.renewed(TEMPLATE.replace("b,", "z,"), tmp_path)
+        docs_tables.renewed(TEMPLATE.replace("b,", "z,"), tmp_path)
 
 
 def test_bad_input_is_one_line() -> None:

@@ -1,6 +1,6 @@
 """The tables and pictures of docs/reproduction.md from the files that `softehl reproduce` wrote.
 
-`python -m softehl.cases.paper.page DIR [docs/reproduction.md]` replaces what stands between
+`python -m softehl.cases.paper.docs_tables DIR [docs/reproduction.md]` replaces what stands between
 `<!-- table NAME -->` (or `<!-- table NAME: column, column -->`, `<!-- caption NAME -->`) and
 `<!-- end -->` and copies the pictures that the page shows. The words between are written by hand.
 """

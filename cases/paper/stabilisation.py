@@ -1,4 +1,4 @@
-"""The paper's scheme beside the cured film: same density, same unknowns. Not in the paper."""
+"""The paper's scheme beside the stabilised film: same density, same unknowns. Not in the paper."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper import drawing
 from softehl.cases.paper.item import Item, Product, Scope, Table, both
-from softehl.cases.paper.states import CURED, Request, State, Store, ask, setup
+from softehl.cases.paper.states import STABILISED, Request, State, Store, ask, setup
 from softehl.runtime.io import Cell
 
 if TYPE_CHECKING:
@@ -28,49 +28,55 @@ def _requests(scope: Scope) -> list[Request]:
     speeds, density = both(scope.some_speeds()), scope.mesh(DENSITY)
     found = []
     for p_s in scope.some_pressures(PRESSURES):
-        found += [ask(setup(density, p_s), speeds), ask(setup(density, p_s, **CURED), speeds)]
-        reference = setup(_finest(scope), p_s, **CURED)
+        found += [ask(setup(density, p_s), speeds), ask(setup(density, p_s, **STABILISED), speeds)]
+        reference = setup(_finest(scope), p_s, **STABILISED)
         found.append(ask(reference, speeds))
     return found
 
 
-def cure(store: Store, scope: Scope) -> Product:
+def stabilisation(store: Store, scope: Scope) -> Product:
     """h*, oscillation and error of both schemes; profiles and curves beside each other."""
     density, rows = scope.mesh(DENSITY), list[list[Cell]]()
     for p_s in scope.some_pressures(PRESSURES):
-        paper, cured = setup(density, p_s), setup(density, p_s, **CURED)
-        reference = setup(_finest(scope), p_s, **CURED)
+        paper, stabilised = setup(density, p_s), setup(density, p_s, **STABILISED)
+        reference = setup(_finest(scope), p_s, **STABILISED)
         for u in both(scope.some_speeds()):
-            states = [store.state(which, u) for which in (paper, cured, reference)]
+            states = [store.state(which, u) for which in (paper, stabilised, reference)]
             rows.append(_row(p_s, u, *states))
     header = (
         *("sealed_pressure_MPa", "rod_speed_mm_s"),
         *("h_star_paper_um", "error_percent", "oscillation", "verdict"),
-        *("h_star_cured_um", "cured_error_percent", "estimate_percent"),
-        *("cured_oscillation", "cured_verdict", "h_star_reference_um"),
+        *("h_star_stabilised_um", "stabilised_error_percent", "estimate_percent"),
+        *("stabilised_oscillation", "stabilised_verdict", "h_star_reference_um"),
     )
     caption = (
-        f"Density {density}, the same unknowns: the paper's scheme and the cured film. Errors "
-        f"against the cured film at density {_finest(scope)}."
+        f"Density {density}, the same unknowns: the paper's scheme and the stabilised film. Errors "
+        f"against the stabilised film at density {_finest(scope)}."
     )
 
     def draw(figure: Figure) -> None:
         _draw(figure, store, scope)
 
-    return Product({"cure": Table(header, rows)}, caption, draw, (10.8, 3.1))
+    return Product({"stabilisation": Table(header, rows)}, caption, draw, (10.8, 3.1))
 
 
-def _row(p_s: float, u: float, paper: State, cured: State, reference: State) -> list[Cell]:
+def _row(p_s: float, u: float, paper: State, stabilised: State, reference: State) -> list[Cell]:
     def error(state: State) -> float:
         return 100.0 * (state.h_star / reference.h_star - 1.0)
 
     def oscillation(state: State) -> float:
         return state.row.oscillation_index if state.row else nan
 
-    estimate = cured.row.h_star_error_percent if cured.row else nan
+    estimate = stabilised.row.h_star_error_percent if stabilised.row else nan
     return [
         *(p_s, u, paper.h_star, error(paper), oscillation(paper), paper.verdict),
-        *(cured.h_star, error(cured), estimate, oscillation(cured), cured.verdict),
+        *(
+            stabilised.h_star,
+            error(stabilised),
+            estimate,
+            oscillation(stabilised),
+            stabilised.verdict,
+        ),
         reference.h_star,
     ]
 
@@ -104,8 +110,8 @@ def _profiles(axes: Axes, store: Store, density: int, p_s: float, u: float) -> N
 def _curves(axes: Axes, store: Store, scope: Scope, p_s: float) -> None:
     speeds = [-u for u in scope.some_speeds()]
     sets = [setup(scope.mesh(DENSITY), p_s, **keys) for keys in _SCHEMES]
-    reference = setup(_finest(scope), p_s, **CURED)
-    labels = (*_LABELS, f"cured, density {_finest(scope)}")
+    reference = setup(_finest(scope), p_s, **STABILISED)
+    labels = (*_LABELS, f"stabilised, density {_finest(scope)}")
     for which, label, color in zip([*sets, reference], labels, (*_COLOURS, "0.6"), strict=True):
         states = store.states(which, speeds)
         line = drawing.Line(label, [abs(u) for u in speeds], states, color)
@@ -116,8 +122,8 @@ def _curves(axes: Axes, store: Store, scope: Scope, p_s: float) -> None:
     axes.legend()
 
 
-_SCHEMES: tuple[dict[str, Any], ...] = ({}, CURED)
-_LABELS = ("paper's scheme", "cured")
+_SCHEMES: tuple[dict[str, Any], ...] = ({}, STABILISED)
+_LABELS = ("paper's scheme", "stabilised")
 _COLOURS = ("tab:red", "tab:blue")
 
-ITEMS = (Item("cure", "A film without oscillations", cure, _requests),)
+ITEMS = (Item("stabilisation", "A film without oscillations", stabilisation, _requests),)

@@ -1,4 +1,4 @@
-"""Looking up states to measure what a statement says."""
+"""Queries for states, to measure what a statement says."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Look:
+class Query:
     """States by density, p_s and U; each that is given is replaced by what the scope has."""
 
     store: Store
@@ -62,7 +62,7 @@ class Look:
         return self.state(density, p_s, speed, **others).h_star
 
 
-Measure = Callable[[Look], Finding]
+Measure = Callable[[Query], Finding]
 """How a statement is measured.  Raises ValueError where a state that it needs was not reached."""
 
 
