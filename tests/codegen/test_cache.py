@@ -203,6 +203,31 @@ def test_a_cache_that_cannot_be_written_is_replaced_with_one_warning(
     assert not first.is_relative_to(place)
 
 
+@pytest.mark.usefixtures("no_fallback")
+@pytest.mark.parametrize("inside", ["", "derived"])
+def test_a_cache_that_others_may_write_to_is_not_used(place: Path, inside: str) -> None:
+    usual = library.folder_of(Path("spring.py"))
+    (place / "cache" / inside).chmod(0o777)
+    if inside:  # its records are not believed, and nothing is added
+        assert cache.recall(next((place / "cache" / inside).iterdir()).stem) is None
+        with pytest.raises(location.CacheError, match=r"cache/derived is not used: others may"):
+            library.folder_of(Path("spring.py"))
+    else:
+        with pytest.warns(RuntimeWarning, match=r"cache is not used: others may .*chmod -R go-w"):
+            found = library.folder_of(Path("spring.py"))
+        assert not found.is_relative_to(place)
+    (place / "cache" / inside).chmod(0o755)
+    assert library.folder_of(Path("spring.py")) == usual
+
+
+def test_a_cache_of_somebody_else_is_not_used(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    library.folder_of(Path("spring.py"))
+    owner = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
+    with pytest.raises(location.CacheError, match=f"belongs to another user, number {owner}; set"):
+        location.writable()
+
+
 def test_the_place_of_the_cache(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert location.wanted() == place / "cache"
     monkeypatch.delenv("SOFTEHL_CACHE")
