@@ -73,35 +73,48 @@ class _Expansion:
     memo: dict[Node, Polynomial] = field(default_factory=dict)
     pure: dict[Node, bool] = field(default_factory=dict)
 
-    def linear(self, n: Node) -> dict[int | None, Polynomial]:
+    def linear(self, form: Node) -> dict[int | None, Polynomial]:
         """Coefficients by source id; None holds the constant part."""
+        known: dict[Node, dict[int | None, Polynomial]] = {}
+        for n in reachable([form], stop=lambda n: self.degree[n] == 0 or n.op is Op.NAME):
+            known[n] = self._linear(n, known)
+        return known[form]
+
+    def _linear(
+        self, n: Node, known: Mapping[Node, dict[int | None, Polynomial]]
+    ) -> dict[int | None, Polynomial]:
         if self.degree[n] == 0:
             return {None: self.polynomial(n)}
         match n.op:
             case Op.INPUT | Op.NAME:
                 return {n.id: {(): Fraction(1)}}
             case Op.NEG:
-                return _combined(self.linear(n.args[0]), {}, -1, -1)
+                return _combined(known[n.args[0]], {}, -1, -1)
             case Op.ADD | Op.SUB:
-                a, b = (self.linear(x) for x in n.args)
+                a, b = (known[x] for x in n.args)
                 return _combined(a, b, 1, 1 if n.op is Op.ADD else -1)
-        factor, form = n.args if self.degree[n.args[0]] == 0 else tuple(reversed(n.args))
+        factor, inner = n.args if self.degree[n.args[0]] == 0 else tuple(reversed(n.args))
         p = self.polynomial(factor)
-        return {k: product(p, q) for k, q in self.linear(form).items()}
+        return {k: product(p, q) for k, q in known[inner].items()}
 
     def polynomial(self, n: Node) -> Polynomial:
         """A value of degree 0 as a polynomial in atoms."""
         if n not in self.memo:
-            self.memo[n] = self._polynomial(n)
+            for m in reachable([n], stop=lambda m: m in self.memo or self._atom(m)):
+                if m not in self.memo:
+                    self.memo[m] = self._polynomial(m)
         return self.memo[n]
+
+    def _atom(self, n: Node) -> bool:
+        return n.op not in LINEAR or (n in self.atoms and not self._is_pure(n))
 
     def _polynomial(self, n: Node) -> Polynomial:
         self.nodes[n.id] = n
         if n.op is Op.CONST:
             return {(): n.value}
-        if n.op not in LINEAR or (n in self.atoms and not self._is_pure(n)):
+        if self._atom(n):
             return {(n.id,): Fraction(1)}
-        args = [self.polynomial(a) for a in n.args]
+        args = [self.memo[a] for a in n.args]
         if n.op is Op.MUL:
             out = product(*args)
         else:
@@ -112,11 +125,11 @@ class _Expansion:
 
     def _is_pure(self, n: Node) -> bool:
         if n not in self.pure:
-            self.pure[n] = (
-                n.op is Op.CONST
-                or _parent(n)
-                or (bool(n.args) and n.op in LINEAR and all(self._is_pure(a) for a in n.args))
-            )
+            for m in reachable([n], stop=self.pure.__contains__):
+                linear = bool(m.args) and m.op in LINEAR
+                self.pure[m] = (
+                    m.op is Op.CONST or _parent(m) or (linear and all(self.pure[a] for a in m.args))
+                )
         return self.pure[n]
 
 

@@ -22,7 +22,7 @@ from sympy.polys.matrices import DomainMatrix
 
 from softehl.codegen.derive.interfaces import Monomial, Polynomial, added, product
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.graph.traverse import Recursion, reachable, recursion
 
 _Shape = tuple[tuple[Monomial, Fraction], ...]
 """A polynomial with 1 as its first coefficient: hashable, and equal for multiples."""
@@ -256,9 +256,12 @@ class _Search:
 
     def polynomial(self, n: Node) -> Polynomial | None:
         """Exact expansion; None where it gets long."""
+        return recursion(self._polynomial(n))
+
+    def _polynomial(self, n: Node) -> Recursion[Polynomial | None]:
         if n not in self.memo:
             self._nodes[n.id] = n
-            self.memo[n] = self._expand(n)
+            self.memo[n] = yield self._expand(n)
         return self.memo[n]
 
     def _inverse_power(self, n: Node) -> Polynomial | None:
@@ -273,7 +276,7 @@ class _Search:
         self._nodes[atom.id] = atom
         return {(atom.id,) * abs(int(e)): Fraction(1)}
 
-    def _expand(self, n: Node) -> Polynomial | None:
+    def _expand(self, n: Node) -> Recursion[Polynomial | None]:
         if n.op is Op.CONST:
             return {(): n.value}
         inverse = self._inverse_power(n)
@@ -283,10 +286,12 @@ class _Search:
             self.degree[n] == 0 and n.op not in (Op.MUL, Op.NEG) and not _whole(n)
         ):
             return {(n.id,): Fraction(1)}
-        args = [self.polynomial(a) for a in n.args]
-        parts = [p for p in args if p is not None]
-        if len(parts) < len(args):
-            return None
+        parts: list[Polynomial] = []
+        for a in n.args:
+            part = yield self._polynomial(a)
+            if part is None:
+                return None
+            parts.append(part)
         if n.op in (Op.MUL, Op.POW):
             factors = parts * _whole(n) if n.op is Op.POW else parts
             out = functools.reduce(product, factors)

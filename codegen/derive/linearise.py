@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from softehl.codegen.graph.differentiate import Dependence, Given, guarded, plus
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.partials import DifferentiationError, Partials, partials
-from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.graph.traverse import Recursion, reachable, recursion
 
 
 @dataclass
@@ -47,48 +47,49 @@ class Linearisation:
     def derivative(self, n: Node, j: int) -> Node:
         """dn/d(direction j).  Varies when `n` or the direction does (then: of the summand)."""
         if n.varying and n not in self.interface:
-            return self._over(self.local(n), j)
-        return self._total(n, j)
+            return recursion(self._over(self.local(n), j))
+        return recursion(self._total(n, j))
 
-    def _total(self, n: Node, j: int) -> Node:
+    def _total(self, n: Node, j: int) -> Recursion[Node]:
         if n is self.directions[j]:
             return self.g.one
         if not self._depends(n) or n in self.directions:
             return self.g.zero
         key = (n, j)
         if key not in self._totals:
-            self._totals[key] = self._compute_total(n, j)
+            self._totals[key] = yield self._compute_total(n, j)
         return self._totals[key]
 
-    def _compute_total(self, n: Node, j: int) -> Node:
+    def _compute_total(self, n: Node, j: int) -> Recursion[Node]:
         g = self.g
         if n.varying:  # an interface node: through the next interface below it
-            return self._over(self._below(n, 0), j)
+            return (yield self._over(self._below(n, 0), j))
         if n.op is Op.SUM:
-            inner = self._over(self.local(n.args[0]), j)
+            inner = yield self._over(self.local(n.args[0]), j)
             return inner if j in self._points else g.sum(inner)
         if n.op is Op.BRANCH:
             c, a, b = n.args
-            return g.branch(c, self._total(a, j), self._total(b, j))
+            return g.branch(c, (yield self._total(a, j)), (yield self._total(b, j)))
         result = g.zero
         for a, p in self._chain(n):
-            result = plus(g, result, guarded(g, p, self._total(a, j)))
+            result = plus(g, result, guarded(g, p, (yield self._total(a, j))))
         return result
 
     def _below(self, n: Node, level: int) -> dict[Node, Node]:
         """Derivatives of a named value with respect to what lies below it."""
         return dict(self.given[n]) if n in self.given else self.local(n.args[0], level)
 
-    def _over(self, local: Mapping[Node, Node], j: int) -> Node:
+    def _over(self, local: Mapping[Node, Node], j: int) -> Recursion[Node]:
         """Chain rule over the interface: sum of d n/d z times d z/d(direction)."""
         result = self.g.zero
         for z, p in local.items():
-            if j in self._points and not z.varying and self._total(z, j) is not self.g.zero:
+            slope = yield self._total(z, j)
+            if j in self._points and not z.varying and slope is not self.g.zero:
                 raise DifferentiationError(
                     "a value summed over points may not enter a sum again when it depends on an "
                     "interpolated unknown"
                 )
-            result = plus(self.g, result, guarded(self.g, p, self._total(z, j)))
+            result = plus(self.g, result, guarded(self.g, p, slope))
         return result
 
     def _chain(self, n: Node) -> Partials:

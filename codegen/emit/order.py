@@ -83,14 +83,16 @@ def _pieces(roots: Sequence[Node]) -> list[_Piece]:
         alone = uses[n] == 1 and n not in kept and user[n].op in ADDITIONS
         return alone and (n.op is Op.MUL or (n.op in ADDITIONS and not first_difference(n)))
 
-    def terms(n: Node, sign: int, total: _Sum) -> list[_Piece]:
+    def terms(total: _Sum) -> list[_Piece]:
         out = []
-        for k, a in enumerate(n.args):
-            s = -sign if n.op is Op.SUB and k == 1 else sign
-            if inner(a) and a.op is not Op.MUL:
-                out += terms(a, s, total)
+        stack = [(total.head, 1)]
+        while stack:
+            a, sign = stack.pop()
+            if a is total.head or (inner(a) and a.op is not Op.MUL):
+                first, second = a.args
+                stack += [(second, -sign if a.op is Op.SUB else sign), (first, sign)]
             else:
-                out.append(_Piece(a, a.args if inner(a) else (a,), total, s))
+                out.append(_Piece(a, a.args if inner(a) else (a,), total, sign))
         return out
 
     pieces = []
@@ -99,7 +101,7 @@ def _pieces(roots: Sequence[Node]) -> list[_Piece]:
             continue
         if n.op in ADDITIONS:
             total = _Sum(n)
-            added = terms(n, 1, total)
+            added = terms(total)
             total.left = len(added)
             pieces += added
         else:

@@ -94,7 +94,8 @@ def depth_first(nodes: Sequence[Node], roots: Sequence[Node]) -> list[Node]:
         need[n] = max([1, *(r + k for k, r in enumerate(ranks))])
     order: list[Node] = []
     seen: set[Node] = set()
-    rest = [n for n in reversed(nodes) if n not in set(roots)]
+    ends = set(roots)
+    rest = [n for n in reversed(nodes) if n not in ends]
     stack = [*rest, *(r for r in reversed(roots) if r in inside)]
     opened: set[Node] = set()
     while stack:

@@ -15,6 +15,7 @@ from softehl.codegen.derive.outputs import Entry
 from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.schedule import If, Schedule, Statement
 from softehl.codegen.graph.graph import ELEMENTARY, FREE, Input, Node, Op
+from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 
 _LETTERS = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
@@ -63,10 +64,11 @@ class _LanePrinter(Printer):
     def is_scalar(self, n: Node) -> bool:
         """True when all lanes hold the same value."""
         if n not in self.scalar:
-            if isinstance(n.payload, Input):
-                self.scalar[n] = n.payload.array == "parameters"
-            else:
-                self.scalar[n] = all(self.is_scalar(a) for a in n.args)
+            for m in reachable([n], stop=self.scalar.__contains__):
+                if isinstance(m.payload, Input):
+                    self.scalar[m] = m.payload.array == "parameters"
+                elif m not in self.scalar:
+                    self.scalar[m] = all(self.scalar[a] for a in m.args)
         return self.scalar[n]
 
     def ref(self, n: Node) -> str:

@@ -9,7 +9,7 @@ not taken is ever evaluated.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from softehl.codegen.graph.graph import Graph, Node, Op
@@ -30,18 +30,21 @@ class Dependence:
     _known: dict[Node, bool] = field(default_factory=dict)
 
     def __call__(self, n: Node) -> bool:
-        for m in reachable([n], stop=self._known.__contains__):
-            if m not in self._known:
-                self._known[m] = self._decide(m)
-        return self._known[n]
-
-    def _decide(self, m: Node) -> bool:
-        if m in self.sources:
-            return True
-        if m in self.constant:
-            return False
-        operands: Iterable[Node] = self.given.get(m, m.args)
-        return any(self(a) for a in operands)
+        known = self._known
+        stack = [] if n in known else [n]
+        while stack:
+            m = stack[-1]
+            if m in known:
+                stack.pop()
+            elif m in self.sources or m in self.constant:
+                known[m] = m in self.sources
+            else:
+                operands = self.given.get(m, m.args)
+                unknown = [a for a in operands if a not in known]
+                stack += unknown
+                if not unknown:
+                    known[m] = any(known[a] for a in operands)
+        return known[n]
 
 
 def gradient(

@@ -10,7 +10,7 @@ import mpmath
 
 from softehl.codegen.graph.evaluate_routines import results
 from softehl.codegen.graph.graph import Input, Node, Op, Place, Routine
-from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.graph.traverse import Recursion, reachable, recursion
 
 Number = Any
 Vector = list[Number]
@@ -90,15 +90,18 @@ class Walk:
 
     def at(self, n: Node, q: int) -> Number:
         """Value of a node at point `q`."""
+        return recursion(self._at(n, q))
+
+    def _at(self, n: Node, q: int) -> Recursion[Number]:
         q = q if n.varying else 0
         key = (n, q)
         if key in self.frozen:
             return self.frozen[key]
         if key not in self.known:
-            self.known[key] = self._compute(n, q)
+            self.known[key] = yield self._compute(n, q)
         return self.known[key]
 
-    def _compute(self, n: Node, q: int) -> Number:
+    def _compute(self, n: Node, q: int) -> Recursion[Number]:
         match n.op:
             case Op.CONST:
                 return mpmath.mpf(n.value.numerator) / n.value.denominator
@@ -108,19 +111,28 @@ class Walk:
                 assert isinstance(n.payload, Input)
                 return self._input(n.payload, q)
             case Op.SUM:
-                return mpmath.fsum(self.at(n.args[0], k) for k in range(len(self.state.rule)))
+                terms = []
+                for k in range(len(self.state.rule)):
+                    terms.append((yield self._at(n.args[0], k)))
+                return mpmath.fsum(terms)
             case Op.BRANCH:
-                return self.at(n.args[1 if self.at(n.args[0], q) else 2], q)
+                taken = yield self._at(n.args[0], q)
+                return (yield self._at(n.args[1 if taken else 2], q))
             case Op.CALL:
                 assert isinstance(n.payload, Routine)
-                return results(n.payload, [self.at(a, q) for a in n.args], _local)
+                operands = []
+                for a in n.args:
+                    operands.append((yield self._at(a, q)))
+                return results(n.payload, operands, _local)
             case Op.ITEM:
                 assert isinstance(n.payload, Place)
-                return self.at(n.args[0], q)[n.payload.index]
+                return (yield self._at(n.args[0], q))[n.payload.index]
             case Op.POW:
                 e: Any = n.payload
-                return self.at(n.args[0], q) ** (mpmath.mpf(e.numerator) / e.denominator)
-        args = [self.at(a, q) for a in n.args]
+                return (yield self._at(n.args[0], q)) ** (mpmath.mpf(e.numerator) / e.denominator)
+        args = []
+        for a in n.args:
+            args.append((yield self._at(a, q)))
         return _UNARY[n.op](*args) if len(args) == 1 else _BINARY[n.op](*args)
 
     def _input(self, source: Input, q: int) -> Number:

@@ -1,10 +1,37 @@
-"""Walking a graph and building it anew: what lies below some roots, and roots of changed nodes."""
+"""Walking a graph and building it anew: what lies below some roots, and roots of changed nodes.
+
+A model may name ten thousand intermediates, each made of the one before, and Python's stack does
+not hold as many calls.  What is recursive by nature is therefore written as a generator that
+yields its inner calls, and run by `recursion`, which keeps the stack in a list.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
 from softehl.codegen.graph.graph import FREE, Graph, Node, Op
+
+T = TypeVar("T")
+Recursion = Generator[Any, T, T]
+"""A recursive function under way: `value = yield function(arguments)` is a call of itself."""
+
+
+def recursion(outermost: Recursion[T]) -> T:
+    """The result of a recursive function, however deep its calls."""
+    stack: list[Recursion[Any]] = [outermost]
+    value: Any = None
+    while stack:
+        try:
+            inner = stack[-1].send(value)
+        except StopIteration as done:
+            stack.pop()
+            value = done.value
+        else:
+            stack.append(inner)
+            value = None
+    result: T = value
+    return result
 
 
 def reachable(roots: Iterable[Node], stop: Callable[[Node], bool] | None = None) -> list[Node]:

@@ -12,6 +12,7 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.traverse import Recursion, recursion
 
 
 class ModelError(ValueError):
@@ -67,19 +68,17 @@ class Lowering:
         self.g = graph
         self.bound = bound
         self._memo: dict[Any, Node] = {}
-        self._rules: list[tuple[Any, Callable[[Any], Node]]] = [
-            (sp.Symbol, self._symbol),
-            (sp.Rational, lambda e: self.g.const(Fraction(int(e.p), int(e.q)))),
+        self._rules: list[tuple[Any, Callable[[Any], Recursion[Node]]]] = [
             (sp.Add, self._add),
             (sp.Mul, self._mul),
-            (sp.exp, lambda e: self.g.call(Op.EXP, self(e.args[0]))),
+            (sp.exp, lambda e: self._call(Op.EXP, e)),
             (sp.Pow, self._pow),
             (sp.Piecewise, lambda e: self._piecewise(list(e.args), e)),
             ((sp.Max, sp.Min), self._extremum),
-            (sp.Abs, lambda e: self._absolute(self(e.args[0]))),
-            (sp.sign, lambda e: self._step(self(e.args[0]), (-1, 0, 1))),
-            (sp.Heaviside, lambda e: self._step(self(e.args[0]), (0, e.args[1], 1))),
-            (sp.atan2, lambda e: self.g.node(Op.ATAN2, (self(e.args[0]), self(e.args[1])))),
+            (sp.Abs, self._absolute),
+            (sp.sign, lambda e: self._step(e.args[0], (-1, 0, 1))),
+            (sp.Heaviside, lambda e: self._step(e.args[0], (0, e.args[1], 1))),
+            (sp.atan2, self._arctangent),
             (sp.core.relational.Relational, self._relation),
             ((sp.And, sp.Or, sp.Not), self._logic),
             (sp.ITE, self._choice),
@@ -87,15 +86,27 @@ class Lowering:
 
     def __call__(self, expression: Any) -> Node:
         try:
+            return recursion(self._lower(expression))
+        except RecursionError:
+            raise ModelError(
+                "an expression is nested too deeply for SymPy: name its parts with m.define"
+            ) from None
+
+    def _lower(self, expression: Any) -> Recursion[Node]:
+        try:
             e = sp.sympify(expression)
         except (sp.SympifyError, TypeError, ValueError):
             raise ModelError(f"{expression!r} is no mathematical expression") from None
         found = self._memo.get(e)
         if found is None:
-            found = self._memo[e] = self._convert(e)
+            found = self._memo[e] = yield self._convert(e)
         return found
 
-    def _convert(self, e: Any) -> Node:
+    def _convert(self, e: Any) -> Recursion[Node]:
+        if isinstance(e, sp.Symbol):
+            return self._symbol(e)
+        if isinstance(e, sp.Rational):
+            return self.g.const(Fraction(int(e.p), int(e.q)))
         if e is sp.pi:
             return self.g.pi()
         if e is sp.E:
@@ -104,10 +115,10 @@ class Lowering:
             raise ModelError(f"{e} is a rounded number; write an exact one, e.g. Rational(1, 3)")
         for kind, rule in self._rules:
             if isinstance(e, kind):
-                return rule(e)
+                return (yield rule(e))
         operation = _FUNCTIONS.get(type(e))
         if operation is not None:
-            return self.g.call(operation, self(e.args[0]))
+            return (yield self._call(operation, e))
         if isinstance(e, sp.MatrixBase):
             raise ModelError(f"a matrix of shape {e.shape} where a scalar is needed")
         if e is sp.I or isinstance(e, (sp.re, sp.im, sp.conjugate)):
@@ -121,19 +132,20 @@ class Lowering:
             raise ModelError(f"symbol {e} is not declared in the model")
         return self.bound[e]
 
-    def _add(self, e: Any) -> Node:
+    def _add(self, e: Any) -> Recursion[Node]:
         result = self.g.zero
         for term in e.args:
-            result = self.g.add(result, self(term))
+            result = self.g.add(result, (yield self._lower(term)))
         return result
 
-    def _mul(self, e: Any) -> Node:
+    def _mul(self, e: Any) -> Recursion[Node]:
         top, bottom = self.g.one, self.g.one
         for factor in e.args:
             if isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp < 0:
-                bottom = self.g.mul(bottom, self(factor.base**-factor.exp))
+                inverted = yield self._lower(factor.base**-factor.exp)
+                bottom = self.g.mul(bottom, inverted)
             else:
-                top = self.g.mul(top, self(factor))
+                top = self.g.mul(top, (yield self._lower(factor)))
         return self.g.div(top, self._divisor(bottom, e))
 
     def _divisor(self, n: Node, e: Any) -> Node:
@@ -144,46 +156,60 @@ class Lowering:
             raise ModelError(f"{e} divides by zero")
         return n
 
-    def _pow(self, e: Any) -> Node:
+    def _pow(self, e: Any) -> Recursion[Node]:
         base, exponent = e.base, e.exp
         if isinstance(base, sp.Abs) and isinstance(exponent, sp.Rational):
             # SymPy makes |x|^(2/3) of (x^2)^(1/3); the square needs no branch
             base, exponent = base.args[0] ** 2, exponent / 2
-        base = self(base)
+        base = yield self._lower(base)
         if exponent.is_negative:
             self._divisor(base, e)
         if isinstance(exponent, sp.Rational):
             return self.g.power(base, Fraction(int(exponent.p), int(exponent.q)))
-        return self.g.call(Op.EXP, self.g.mul(self(exponent), self.g.call(Op.LOG, base)))
+        power = yield self._lower(exponent)
+        return self.g.call(Op.EXP, self.g.mul(power, self.g.call(Op.LOG, base)))
 
-    def _piecewise(self, pairs: list[Any], whole: Any) -> Node:
+    def _piecewise(self, pairs: list[Any], whole: Any) -> Recursion[Node]:
         value, condition = pairs[0].args
         if condition is sp.true:
-            return self(value)
+            return (yield self._lower(value))
         if len(pairs) == 1:
             raise ModelError(f"a branch without a last condition: {whole}; end it with (.., True)")
-        return self.g.branch(self(condition), self(value), self._piecewise(pairs[1:], whole))
+        decides, then = (yield self._lower(condition)), (yield self._lower(value))
+        return self.g.branch(decides, then, (yield self._piecewise(pairs[1:], whole)))
 
-    def _extremum(self, e: Any) -> Node:
-        result = self(e.args[0])
-        for other in (self(a) for a in e.args[1:]):
+    def _extremum(self, e: Any) -> Recursion[Node]:
+        result = yield self._lower(e.args[0])
+        for a in e.args[1:]:
+            other = yield self._lower(a)
             less = self.g.compare(Op.LT, result, other)
             pair = (other, result) if isinstance(e, sp.Max) else (result, other)
             result = self.g.branch(less, *pair)
         return result
 
-    def _absolute(self, a: Node) -> Node:
+    def _absolute(self, e: Any) -> Recursion[Node]:
+        a = yield self._lower(e.args[0])
         return self.g.branch(self.g.compare(Op.LT, a, self.g.zero), self.g.neg(a), a)
 
-    def _step(self, a: Node, values: tuple[Any, Any, Any]) -> Node:
+    def _call(self, op: Op, e: Any) -> Recursion[Node]:
+        return self.g.call(op, (yield self._lower(e.args[0])))
+
+    def _arctangent(self, e: Any) -> Recursion[Node]:
+        y, x = (yield self._lower(e.args[0])), (yield self._lower(e.args[1]))
+        return self.g.node(Op.ATAN2, (y, x))
+
+    def _step(self, argument: Any, values: tuple[Any, Any, Any]) -> Recursion[Node]:
         """One value below zero, one at zero, one above."""
-        below, at, above = (self(v) for v in values)
+        a = yield self._lower(argument)
+        below = yield self._lower(values[0])
+        at = yield self._lower(values[1])
+        above = yield self._lower(values[2])
         zero = self.g.zero
         upper = self.g.branch(self.g.compare(Op.LT, zero, a), above, at)
         return self.g.branch(self.g.compare(Op.LT, a, zero), below, upper)
 
-    def _relation(self, e: Any) -> Node:
-        a, b = self(e.lhs), self(e.rhs)
+    def _relation(self, e: Any) -> Recursion[Node]:
+        a, b = (yield self._lower(e.lhs)), (yield self._lower(e.rhs))
         match e.rel_op:
             case "<":
                 return self.g.compare(Op.LT, a, b)
@@ -197,16 +223,16 @@ class Lowering:
                 return self.g.compare(Op.EQ, a, b)
         return self.g.node(Op.NOT, (self.g.compare(Op.EQ, a, b),))
 
-    def _logic(self, e: Any) -> Node:
+    def _logic(self, e: Any) -> Recursion[Node]:
         if isinstance(e, sp.Not):
-            return self.g.node(Op.NOT, (self(e.args[0]),))
+            return self.g.node(Op.NOT, ((yield self._lower(e.args[0])),))
         op = Op.AND if isinstance(e, sp.And) else Op.OR
-        result, *rest = (self(a) for a in e.args)
-        for other in rest:
-            result = self.g.node(op, (result, other))
+        result = yield self._lower(e.args[0])
+        for a in e.args[1:]:
+            result = self.g.node(op, (result, (yield self._lower(a))))
         return result
 
-    def _choice(self, e: Any) -> Node:
+    def _choice(self, e: Any) -> Recursion[Node]:
         """What SymPy makes of a condition on a branch: (c and a) or (not c and b)."""
         c, a, b = e.args
-        return self(sp.Or(sp.And(c, a), sp.And(sp.Not(c), b)))
+        return (yield self._lower(sp.Or(sp.And(c, a), sp.And(sp.Not(c), b))))

@@ -15,7 +15,7 @@ import mpmath
 
 from softehl.codegen.graph.arithmetic import number
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
-from softehl.codegen.graph.traverse import operations, reachable, rewrite
+from softehl.codegen.graph.traverse import Recursion, operations, reachable, recursion, rewrite
 from softehl.codegen.optimise.signatures import merge_equal
 from softehl.codegen.optimise.sums import common_sums
 
@@ -108,8 +108,13 @@ def _uses(roots: Roots) -> Counter[Node]:
 def _chain(n: Node, ops: tuple[Op, ...], uses: Counter[Node]) -> list[Node]:
     """Operands of a chain of `ops` whose inner results nobody else uses."""
     out: list[Node] = []
-    for a in n.args:
-        out += _chain(a, ops, uses) if a.op in ops and uses[a] == 1 else [a]
+    stack = [*reversed(n.args)]
+    while stack:
+        a = stack.pop()
+        if a.op in ops and uses[a] == 1:
+            stack += reversed(a.args)
+        else:
+            out.append(a)
     return out
 
 
@@ -154,15 +159,22 @@ Term = tuple[int, list[Node]]
 def _terms(n: Node, sign: int, uses: Counter[Node]) -> list[Term]:
     """Signed products whose sum is `n`."""
     out: list[Term] = []
-    for k, a in enumerate(n.args):
-        s = -sign if (n.op is Op.SUB and k == 1) else sign
+    stack = _signed(n, sign)
+    while stack:
+        s, a = stack.pop()
         if a.op in (Op.ADD, Op.SUB) and uses[a] == 1:
-            out += _terms(a, s, uses)
+            stack += _signed(a, s)
         elif a.op is Op.MUL and uses[a] == 1:
             out.append((s, _chain(a, (Op.MUL,), uses)))
         else:
             out.append((s, [a]))
     return out
+
+
+def _signed(n: Node, sign: int) -> list[tuple[int, Node]]:
+    """The operands of a sum or difference with their signs, the last one first."""
+    a, b = n.args
+    return [(-sign if n.op is Op.SUB else sign, b), (sign, a)]
 
 
 def _as_it_was(g: Graph, n: Node, new: dict[Node, Node]) -> Node:
@@ -220,27 +232,33 @@ def assume(g: Graph, roots: Roots) -> Roots:
     """Inside one side of a branch its condition is known: drop inner branches on it."""
     memo: dict[tuple[Node, tuple[tuple[Node, bool], ...]], Node] = {}
 
-    def visit(n: Node, known: tuple[tuple[Node, bool], ...]) -> Node:
+    def visit(n: Node, known: tuple[tuple[Node, bool], ...]) -> Recursion[Node]:
         key = (n, known)
         if key not in memo:
-            memo[key] = build(n, known)
+            memo[key] = yield build(n, known)
         return memo[key]
 
-    def build(n: Node, known: tuple[tuple[Node, bool], ...]) -> Node:
+    def build(n: Node, known: tuple[tuple[Node, bool], ...]) -> Recursion[Node]:
         if n.op is not Op.BRANCH:
-            return g.rebuild(n.op, tuple(visit(a, known) for a in n.args), n.payload)
-        c, a, b = n.args
+            args = []
+            for a in n.args:
+                args.append((yield visit(a, known)))
+            return g.rebuild(n.op, args, n.payload)
+        c, then, otherwise = n.args
         for condition, holds in known:
             if condition is c:
-                return visit(a if holds else b, known)
+                return (yield visit(then if holds else otherwise, known))
         order = tuple(sorted((*known, (c, True)), key=lambda k: k[0].id))
         negated = tuple(sorted((*known, (c, False)), key=lambda k: k[0].id))
-        return g.branch(visit(c, known), visit(a, order), visit(b, negated))
+        decides = yield visit(c, known)
+        return g.branch(decides, (yield visit(then, order)), (yield visit(otherwise, negated)))
 
-    has_branch = any(n.op is Op.BRANCH for n in reachable(roots))
-    for n in reachable(roots) if has_branch else ():
-        visit(n, ())  # ascending order keeps the recursion shallow
-    return [visit(r, ()) for r in roots] if has_branch else roots
+    nodes = reachable(roots)
+    if all(n.op is not Op.BRANCH for n in nodes):
+        return roots
+    for n in nodes:
+        recursion(visit(n, ()))  # in ascending order, as every pass goes
+    return [memo[r, ()] for r in roots]
 
 
 def literals(g: Graph, roots: Roots) -> Roots:

@@ -86,7 +86,9 @@ def _linear(g: Graph, n: Node, inner: set[Node], new: dict[Node, Node]) -> dict[
     """Coefficients of a maximal sum over its terms; all constants are one term, times +1 or -1."""
     out: dict[Node, Fraction] = {}
 
-    def walk(m: Node, c: Fraction) -> None:
+    stack = [(n, Fraction(1))]
+    while stack:
+        m, c = stack.pop()
         if m is not n and m not in inner:
             value = new[m]
             while value.op is Op.NEG or _scaled(value):
@@ -99,14 +101,12 @@ def _linear(g: Graph, n: Node, inner: set[Node], new: dict[Node, Node]) -> dict[
                 c, value = c * value.value, g.one
             out[value] = out.get(value, Fraction(0)) + c
         elif _scaled(m):
-            walk(m.args[1], c * m.args[0].value)
+            stack.append((m.args[1], c * m.args[0].value))
         elif m.op is Op.NEG:
-            walk(m.args[0], -c)
+            stack.append((m.args[0], -c))
         else:
-            walk(m.args[0], c)
-            walk(m.args[1], -c if m.op is Op.SUB else c)
-
-    walk(n, Fraction(1))
+            stack.append((m.args[1], -c if m.op is Op.SUB else c))
+            stack.append((m.args[0], c))
     constant = out.pop(g.one, Fraction(0))
     if constant:
         out[g.const(abs(constant))] = Fraction(1 if constant > 0 else -1)
