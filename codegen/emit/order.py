@@ -15,6 +15,7 @@ from collections import Counter, OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from heapq import heappop, heappush
 
 from softehl.codegen.graph.graph import FREE, Graph, Node, Op
 from softehl.codegen.graph.traverse import reachable
@@ -27,6 +28,8 @@ LATENCY = {Op.RECIP: 26, Op.RCBRT: 60, Op.CBRT: 60, Op.SQRT: 40, Op.LOG: 100, Op
 """Half cycles (two pieces start in a cycle) until a result is there."""
 USUAL_LATENCY = 8
 LONGEST_WAIT = 12
+CANDIDATES = 1_500_000
+"""Pieces that are compared in all: in very long code only those written first are candidates."""
 
 # What a piece costs, in operands fetched: measured on the solids of `models`.
 LAST_USE = -1.0
@@ -44,6 +47,7 @@ class _Sum:
     head: Node
     left: int = 0
     partial: Node | None = None
+    waiting: list[_Piece] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +124,8 @@ class _Scheduler:
     clock: int = 0
 
     def __post_init__(self) -> None:
+        self._window = max(8, CANDIDATES // max(len(self.pieces), 1))
+        self._later: list[tuple[float, _Piece]] = []
         self._printed: set[Node] = set()
         # how early the model's author, or the chain rule, wrote a value
         ids = sorted(self.pieces, key=lambda p: p.node.id)
@@ -135,7 +141,16 @@ class _Scheduler:
             for a in missing:
                 self._waiting.setdefault(a, []).append(p)
             if not missing:
-                self.ready[p] = None
+                self._offer(p)
+
+    def _offer(self, p: _Piece) -> None:
+        """A piece whose operands are known: ready, unless its sum must begin with another one."""
+        if p.total is not None and p.total.partial is None and p.sign < 0:
+            p.total.waiting.append(p)
+        elif len(self.ready) < self._window:
+            self.ready[p] = None
+        else:
+            heappush(self._later, (self._place[p], p))
 
     def step(self) -> None:
         """Take the cheapest piece that is ready."""
@@ -154,7 +169,9 @@ class _Scheduler:
         for waiting in self._waiting.pop(done, []) if done is not None else []:
             self._missing[waiting] -= 1
             if not self._missing[waiting]:
-                self.ready[waiting] = None
+                self._offer(waiting)
+        while self._later and len(self.ready) < self._window:
+            self.ready[heappop(self._later)[1]] = None
 
     def _cost(self, p: _Piece) -> float:
         cost, arrival = DRIFT * self._place[p], self.clock
@@ -166,8 +183,7 @@ class _Scheduler:
             arrival = max(arrival, self._arrival.get(a, 0))
         if p.total is not None:
             if p.total.partial is None:
-                # A sum starts with a term of positive sign: there always is one.
-                cost += OPENING if p.sign > 0 else float("inf")
+                cost += OPENING
             else:
                 cost += PARTIAL_SUM * (p.total not in self.registers)
                 cost += FINISHING * (p.total.left == 1)
@@ -185,7 +201,10 @@ class _Scheduler:
         self._print(term)
         total = p.total
         if total.partial is None:
+            # A sum starts with a term of positive sign: there always is one.
             total.partial = term
+            for waiting in total.waiting:
+                self._offer(waiting)
         else:
             total.partial = (g.add if p.sign > 0 else g.sub)(total.partial, term)
             self._print(total.partial)

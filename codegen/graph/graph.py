@@ -65,6 +65,7 @@ ELEMENTARY = frozenset(
     {Op.TAN, Op.ASIN, Op.ACOS, Op.ATAN, Op.SINH, Op.COSH, Op.TANH},
 )
 """Functions of one argument that are those of the C library and nothing more."""
+_CALLS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS, *ELEMENTARY})
 FREE = frozenset({Op.CONST, Op.PI, Op.INPUT, Op.NAME})
 """Operations that cost nothing at run time."""
 
@@ -136,6 +137,15 @@ class Graph:
         self._table: dict[tuple[Op, tuple[int, ...], Payload], Node] = {}
         self.zero = self.const(0)
         self.one = self.const(1)
+        self._makers: dict[Op, Callable[..., Node]] = {
+            Op.ADD: self.add,
+            Op.SUB: self.sub,
+            Op.MUL: self.mul,
+            Op.NEG: self.neg,
+            Op.RECIP: self.recip,
+            Op.BRANCH: self.branch,
+            Op.SUM: self.sum,
+        }
 
     def __len__(self) -> int:
         return len(self._table)
@@ -315,23 +325,12 @@ class Graph:
         if op is Op.NAME:
             assert isinstance(payload, str)
             return self.name(payload, args[0])
-        maker = self._makers().get(op)
+        maker = self._makers.get(op)
         if maker is not None:
             return maker(*args)
-        if op in (Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS, *ELEMENTARY):
+        if op in _CALLS:
             return self.call(op, args[0])
         return self.node(op, tuple(args), payload)
-
-    def _makers(self) -> dict[Op, Callable[..., Node]]:
-        return {
-            Op.ADD: self.add,
-            Op.SUB: self.sub,
-            Op.MUL: self.mul,
-            Op.NEG: self.neg,
-            Op.RECIP: self.recip,
-            Op.BRANCH: self.branch,
-            Op.SUM: self.sum,
-        }
 
 
 def _ordered(a: Node, b: Node) -> tuple[Node, Node]:

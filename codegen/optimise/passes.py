@@ -6,7 +6,6 @@ runs them.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,6 +15,7 @@ import mpmath
 from softehl.codegen.graph.arithmetic import number
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
 from softehl.codegen.graph.traverse import Recursion, operations, reachable, recursion, rewrite
+from softehl.codegen.optimise.factors import chain, factor, product, uses
 from softehl.codegen.optimise.signatures import merge_equal
 from softehl.codegen.optimise.sums import common_sums
 
@@ -98,121 +98,17 @@ def _integer_power(g: Graph, a: Node, n: int) -> Node:
     return g.mul(square, a) if n % 2 else square
 
 
-def _uses(roots: Roots) -> Counter[Node]:
-    uses: Counter[Node] = Counter(roots)
-    for n in reachable(roots):
-        uses.update(n.args)
-    return uses
-
-
-def _chain(n: Node, ops: tuple[Op, ...], uses: Counter[Node]) -> list[Node]:
-    """Operands of a chain of `ops` whose inner results nobody else uses."""
-    out: list[Node] = []
-    stack = [*reversed(n.args)]
-    while stack:
-        a = stack.pop()
-        if a.op in ops and uses[a] == 1:
-            stack += reversed(a.args)
-        else:
-            out.append(a)
-    return out
-
-
 def invariants_first(g: Graph, roots: Roots) -> Roots:
     """Reorder products: constants, then what does not vary with the point, then the rest."""
-    uses = _uses(roots)
+    counted = uses(roots)
     new: dict[Node, Node] = {}
     for n in reachable(roots):
         if n.op is Op.MUL:
-            factors = [new[f] for f in _chain(n, (Op.MUL,), uses)]
-            new[n] = _product(g, factors)
+            factors = [new[f] for f in chain(n, (Op.MUL,), counted)]
+            new[n] = product(g, factors)
         else:
             new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
     return [new[r] for r in roots]
-
-
-def _product(g: Graph, factors: list[Node]) -> Node:
-    ranked = sorted(factors, key=lambda f: (f.op is not Op.CONST, f.varying, f.id))
-    result = g.one
-    for f in ranked:
-        result = g.mul(result, f)
-    return result
-
-
-def factor(g: Graph, roots: Roots) -> Roots:
-    """Common factors: a b + a c becomes a (b + c), the most frequent factor first."""
-    uses = _uses(roots)
-    new: dict[Node, Node] = {}
-    for n in reachable(roots):
-        if n.op in (Op.ADD, Op.SUB):
-            terms = [(s, [new[f] for f in fs]) for s, fs in _terms(n, 1, uses)]
-            shared = _most_shared(terms)
-            new[n] = _factored(g, terms) if shared else _as_it_was(g, n, new)
-        else:
-            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
-    return [new[r] for r in roots]
-
-
-Term = tuple[int, list[Node]]
-
-
-def _terms(n: Node, sign: int, uses: Counter[Node]) -> list[Term]:
-    """Signed products whose sum is `n`."""
-    out: list[Term] = []
-    stack = _signed(n, sign)
-    while stack:
-        s, a = stack.pop()
-        if a.op in (Op.ADD, Op.SUB) and uses[a] == 1:
-            stack += _signed(a, s)
-        elif a.op is Op.MUL and uses[a] == 1:
-            out.append((s, _chain(a, (Op.MUL,), uses)))
-        else:
-            out.append((s, [a]))
-    return out
-
-
-def _signed(n: Node, sign: int) -> list[tuple[int, Node]]:
-    """The operands of a sum or difference with their signs, the last one first."""
-    a, b = n.args
-    return [(-sign if n.op is Op.SUB else sign, b), (sign, a)]
-
-
-def _as_it_was(g: Graph, n: Node, new: dict[Node, Node]) -> Node:
-    """A sum keeps its order unless there is something to gain: order is rounding."""
-    return g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
-
-
-def _most_shared(terms: list[Term]) -> Node | None:
-    """The factor of most terms, None where no two terms share one."""
-    count: Counter[Node] = Counter()
-    for _, factors in terms:
-        count.update(list(dict.fromkeys(factors)))
-    best = max(count, key=lambda f: (count[f], -f.id))
-    return best if count[best] > 1 and best.payload != 1 else None
-
-
-def _factored(g: Graph, terms: list[Term]) -> Node:
-    best = _most_shared(terms)
-    if best is None:
-        return _sum(g, [(s, _product(g, fs)) for s, fs in terms])
-    inside: list[Term] = []
-    outside: list[Term] = []
-    for s, fs in terms:
-        if best in fs:
-            rest = list(fs)
-            rest.remove(best)
-            inside.append((s, rest or [g.one]))
-        else:
-            outside.append((s, fs))
-    grouped = g.mul(best, _factored(g, inside))
-    return _sum(g, [(1, grouped)], _factored(g, outside) if outside else g.zero)
-
-
-def _sum(g: Graph, terms: list[tuple[int, Node]], start: Node | None = None) -> Node:
-    result = g.zero if start is None else start
-    for s, n in sorted(terms, key=lambda t: (t[1].varying, -t[0])):
-        result = g.add(result, n) if s > 0 else g.sub(result, n)
-    return result
 
 
 def inverses(g: Graph, roots: Roots) -> Roots:
