@@ -14,7 +14,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.io import replacing
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.mesh import meant
+from softehl.runtime.names import meant
 from softehl.runtime.solve.solution import Point
 
 if TYPE_CHECKING:

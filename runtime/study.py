@@ -27,7 +27,8 @@ from softehl.runtime.fem.unknowns import Elements, Numbering, Slot, slots
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.march import Clock, March, Method
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate, meant
+from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
+from softehl.runtime.names import meant
 from softehl.runtime.result import Result
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.continuation import Continuation

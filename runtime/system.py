@@ -167,9 +167,7 @@ class System:
             numbers = [given[name] for name in block.kernel.parameters]
             parameters[block.name] = np.array([v(step.t) if callable(v) else v for v in numbers])
         layout = self.numbering.layout
-        return Problem(
-            assembler, layout, parameters, dict.fromkeys(layout.names, 1.0), fixed, values
-        )
+        return Problem(assembler, layout, parameters, fixed=fixed, values=values)
 
     def _data(self, page: Block, step: Step) -> Array | None:
         """Data of the elements of a page, (n, k), in the kernel's order."""

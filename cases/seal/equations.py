@@ -32,8 +32,9 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.contact import Obstacle, contact_data, tributary_areas
 from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.fem.guards import KeepsOrientation, StaysPositive
 from softehl.runtime.fem.layered import Layer
-from softehl.runtime.fem.problem import KeepsOrientation, Problem, StaysPositive
+from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.sections import Disc, SectionMesh
 
 _STEP = 0.9  # of its thickness a film may lose in an iteration
@@ -80,6 +81,7 @@ class SealSystem:
             layout=numbering.layout,
             parameters={},
             scales={field.name: field.scale(p) for field in fields},
+            absolute=True,
             guards=(KeepsOrientation(*cells),),
         )
         system = cls(p, section, numbering, present, obstacles, problem)

@@ -6,7 +6,7 @@ is then a gather, a kernel call and an `add.at` for each piece of a block of lik
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.checks import not_finite, require_sound_elements
 from softehl.runtime.fem.pattern import Pattern, build_pattern
 from softehl.runtime.kernels import Rule
 
@@ -90,6 +91,8 @@ class ElementBlock:
     rule: quadrature rule, None for the kernel's own. constant: the tangent depends on parameters
     alone, so that it is evaluated once for each set of them. point_data: (n, points, k) values at
     the quadrature points, such as the history of the steps before, or None.
+    check_orientation: elements that are inside out are refused; False for a page whose nodes have
+    another order than VTK's.
     """
 
     name: str
@@ -100,6 +103,7 @@ class ElementBlock:
     rule: Rule | None = None
     constant: bool = False
     point_data: Array | None = None
+    check_orientation: bool = True
 
     def residual(self, x: Array, parameters: Array) -> Array:
         """Element residuals (n, ndof) at the global vector x."""
@@ -140,16 +144,19 @@ class Memo:
     """What assembly has computed before and may be asked for again: it saves time only.
 
     tangents: block name -> the latest parameters of a constant tangent, the positions of its
-    entries and their values. crosses: prescribed unknowns -> see `Assembler.cross`.
+    entries and their values. crosses: prescribed unknowns -> see `Assembler.cross`. loose: names of
+    blocks -> unknowns that none of them has. reach: see `Assembler.reach`.
     """
 
     tangents: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
     crosses: dict[bytes, Integers] = field(default_factory=dict)
+    loose: dict[frozenset[str], Integers] = field(default_factory=dict)
+    reach: Array | None = None
 
     def without(self, name: str) -> Memo:
         """A copy that knows nothing of one block's tangent."""
         tangents = {n: known for n, known in self.tangents.items() if n != name}
-        return Memo(tangents, dict(self.crosses))
+        return replace(self, tangents=tangents, crosses=dict(self.crosses))
 
     def keep_cross(self, key: bytes, places: Integers) -> None:
         """Remember the positions of a set of unknowns; the oldest of too many is forgotten."""
@@ -174,10 +181,15 @@ class Assembler:
 
     @classmethod
     def build(cls, size: int, blocks: Sequence[ElementBlock]) -> Assembler:
-        """Assembler of blocks over `size` unknowns; ValueError if two blocks share a name."""
+        """Assembler of blocks over `size` unknowns.
+
+        Raises ValueError if two blocks share a name, and for elements that are inside out.
+        """
         names = [block.name for block in blocks]
         if len(set(names)) < len(names):
             raise ValueError(f"two blocks have the same name: {', '.join(names)}")
+        for block in blocks:
+            require_sound_elements(block)
         return cls(size, tuple(blocks), build_pattern(size, [block.dofs for block in blocks]))
 
     def block(self, name: str) -> ElementBlock:
@@ -202,6 +214,54 @@ class Assembler:
             if block.name in parameters:
                 self._add_residual(total, block, x, parameters[block.name])
         return total
+
+    def residual_and_size(self, x: Array, parameters: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Sum of the element residuals, and of their magnitudes: both (size,).
+
+        At an equilibrium the second is the size of the loads, reactions and internal forces.
+        """
+        total, size = np.zeros(self.size), np.zeros(self.size)
+        for block in self.blocks:
+            if block.name in parameters:
+                local = block.residual(x, parameters[block.name]).ravel()
+                np.add.at(total, block.dofs.ravel(), local)
+                np.add.at(size, block.dofs.ravel(), np.abs(local))
+        return total, size
+
+    def loose(self, names: Iterable[str]) -> Integers:
+        """Unknowns that no element of the blocks of these names has, rising."""
+        key = frozenset(names)
+        if key not in self.memo.loose:
+            present = np.zeros(self.size, dtype=bool)
+            for block in self.blocks:
+                if block.name in key:
+                    present[block.dofs] = True
+            self.memo.loose[key] = np.flatnonzero(~present)
+        return self.memo.loose[key]
+
+    def reach(self) -> Array:
+        """Largest coordinate of the elements that each unknown occurs in, (size,).
+
+        Where kernels add displacements to coordinates, a displacement is lost in the rounding of
+        this number.
+        """
+        if self.memo.reach is None:
+            reach = np.zeros(self.size)
+            for block in self.blocks:
+                flat = np.abs(block.coordinates).reshape(len(block.dofs), -1)
+                largest = flat.max(axis=1, initial=0.0)
+                np.maximum.at(reach, block.dofs, largest[:, None])
+            self.memo.reach = reach
+        return self.memo.reach
+
+    def not_finite(self, x: Array, parameters: Mapping[str, Array]) -> str:
+        """The element whose residual or tangent at x is not finite, for messages; empty if none."""
+        for block in self.blocks:
+            if block.name in parameters:
+                found = not_finite(block, *block.tangent(x, parameters[block.name]))
+                if found:
+                    return found
+        return ""
 
     def linearise(
         self, x: Array, parameters: Mapping[str, Array]

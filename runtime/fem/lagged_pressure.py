@@ -76,6 +76,14 @@ class LaggedPressure:
         """See `Problem`."""
         return self.problem.step_limit(x, dx)
 
+    def name_of(self, number: int) -> str:
+        """See `Problem`."""
+        return self.problem.name_of(number)
+
+    def where_not_finite(self, x: Array) -> str:
+        """See `Problem`."""
+        return self.problem.where_not_finite(x)
+
     def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
         """R(x), (n,), and the tangent with p_e in its geometric part, (n, n)."""
         excess = self.pressures - element_pressures(self.problem, self.solid, x)

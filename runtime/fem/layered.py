@@ -11,7 +11,8 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.problem import Guard, Problem
+from softehl.runtime.fem.guards import Guard
+from softehl.runtime.fem.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,14 @@ class Layered:
     def step_limit(self, x: Array, dx: Array) -> float:
         """See `Problem`."""
         return self.problem.step_limit(x, dx)
+
+    def name_of(self, number: int) -> str:
+        """See `Problem`."""
+        return self.problem.name_of(number)
+
+    def where_not_finite(self, x: Array) -> str:
+        """See `Problem`."""
+        return self.problem.where_not_finite(x)
 
     def admissible(self, x: Array) -> Array:
         """x with the prescribed values."""

@@ -1,95 +1,111 @@
-"""A nonlinear problem as the solvers see it: residual, tangent, norm and admissible steps.
+"""A nonlinear problem: assembled blocks, prescribed unknowns, reference sizes, and guards.
 
-A `Problem` never changes; a load step is another problem that shares blocks and pattern.
+It satisfies the solvers' `MeasuredProblem` and `NamedProblem`. What continuation changes are
+parameters, prescribed values and guards: `with_parameters` and `with_fixed` give another problem on
+the same assembler.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.assembly import Assembler
+from softehl.runtime.fem.checks import (
+    ProblemError,
+    contradiction,
+    in_order,
+    require_known,
+    unknown_name,
+)
 from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.fem.guards import Guard
+from softehl.runtime.names import listed
 
-
-class Guard(Protocol):
-    """Keeps the iterates of Newton's method in the set where the equations make sense."""
-
-    def limit(self, x: Array, dx: Array) -> float:
-        """Largest admissible fraction of the step dx from x, in (0, 1]."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class StaysPositive:
-    """Quantities x[dofs] + offsets, such as film thicknesses, may lose one `fraction` in a step."""
-
-    dofs: Integers
-    offsets: Array
-    fraction: float = 0.9
-
-    def limit(self, x: Array, dx: Array) -> float:
-        """See `Guard`: the distance to the boundary, fraction of it at most."""
-        value, change = x[self.dofs] + self.offsets, dx[self.dofs]
-        falling = (change < 0.0) & (value > 0.0)
-        if not falling.any():
-            return 1.0
-        return min(1.0, self.fraction * float(np.min(value[falling] / -change[falling])))
-
-
-@dataclass(frozen=True, eq=False)
-class KeepsOrientation:
-    """Quadrilaterals must not turn inside out, nor radii negative: the step is halved until not.
-
-    coordinates: (n, 8) reference (z, r) of the corners; dofs: (n, 8) their displacements.
-    """
-
-    coordinates: Array
-    dofs: Integers
-    halvings: int = 8
-
-    def limit(self, x: Array, dx: Array) -> float:
-        """See `Guard`."""
-        corners, change = self.coordinates + x[self.dofs], dx[self.dofs]
-        fraction = 1.0
-        for _ in range(self.halvings):
-            if self._admissible(corners + fraction * change):
-                return fraction
-            fraction *= 0.5
-        return fraction
-
-    def _admissible(self, corners: Array) -> bool:
-        points = corners.reshape(-1, 4, 2)
-        forward = np.roll(points, -1, axis=1) - points
-        backward = np.roll(points, 1, axis=1) - points
-        jacobian = forward[..., 0] * backward[..., 1] - forward[..., 1] * backward[..., 0]
-        return bool(jacobian.min() > 0.0 and points[..., 1].min() > 0.0)
+_ROUNDING = 8.0 * np.finfo(np.float64).eps
+"""What the residual of an element may be off by, relative to the stiffness times the largest number
+that its kernel adds: a few roundings."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Assembled equations with prescribed unknowns; satisfies the solvers' NonlinearProblem.
+    """Assembled equations with prescribed unknowns.
 
-    parameters: block name -> parameter array; a block that is not named is switched off.
+    parameters: block name -> parameters, (k,) in the order of the kernel or a mapping by name (put
+    in order here); a block that is not named is switched off.
+    scales: field -> reference size of its residuals, one or one for each: a force (N), a flux
+    (mm^2/s), a gap times area (mm^3). They may be left out: residuals are measured by the loads,
+    reactions and internal forces of their field, with which a scale that is given must agree: the
+    stricter of both counts.
     fixed, values: unknowns that are prescribed, and to what (same length). Their equations are
     x = value, and they are eliminated from the others.
-    scales: field -> reference size of its residuals, one or one for each: a force (N), a flux
-    (mm^2/s), a gap times area (mm^3); `norm` is then 1 for a residual of the size of the
-    reference load.
+    absolute: residuals are measured by `scales` alone, of which every field needs one, however
+    small the loads are: for families of problems that are solved to one accuracy.
+
+    Raises ProblemError for unknown names, parameters that are missing or not finite, and for an
+    unknown that is prescribed to two values.
     """
 
     assembler: Assembler
     layout: DofLayout
-    parameters: Mapping[str, Array]
-    scales: Mapping[str, float | Array]
+    parameters: Mapping[str, Any]
+    scales: Mapping[str, float | Array] = field(default_factory=dict)
     fixed: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     values: Array = field(default_factory=lambda: np.empty(0))
     guards: tuple[Guard, ...] = ()
+    absolute: bool = False
+
+    def __post_init__(self) -> None:
+        """Put parameters in order and refuse what makes no sense; see the class."""
+        names = [block.name for block in self.assembler.blocks]
+        require_known("block", self.parameters, names)
+        require_known("field", self.scales, self.layout.names)
+        if self.layout.total != self.assembler.size:
+            raise ProblemError(
+                f"the layout has {self.layout.total} unknowns, the assembler {self.assembler.size}"
+            )
+        missing = [name for name in self.layout.names if name not in self.scales]
+        if self.absolute and missing:
+            raise ProblemError(f"absolute scales: {listed(missing)} has none; give one for each")
+        ordered = {n: in_order(self.assembler.block(n), v) for n, v in self.parameters.items()}
+        object.__setattr__(self, "parameters", ordered)
+        self._require_prescribed()
+
+    def _require_prescribed(self) -> None:
+        fixed, n = self.fixed, self.layout.total
+        if np.shape(fixed) != np.shape(self.values) or np.ndim(fixed) != 1:
+            raise ProblemError(
+                f"fixed has shape {np.shape(fixed)} and values {np.shape(self.values)}: they are "
+                "lists of one length"
+            )
+        if len(fixed) and not 0 <= fixed.min() <= fixed.max() < n:
+            raise ProblemError(f"fixed: unknowns are numbered from 0 to {n - 1}")
+        if not np.isfinite(self.values).all():
+            first = int(fixed[~np.isfinite(self.values)][0])
+            raise ProblemError(f"{self.name_of(first)} is prescribed to a value that is not finite")
+        found = contradiction(fixed, self.values)
+        if found:
+            number, one, other = found
+            raise ProblemError(
+                f"{self.name_of(number)} is prescribed twice, to {one:g} and to {other:g}"
+            )
+
+    def name_of(self, number: int) -> str:
+        """An unknown for messages: its number, field, element and place."""
+        layout = self.layout
+        field_name = next(n for n in layout.names if number < layout.part(n).stop)
+        active = [block for block in self.assembler.blocks if block.name in self.parameters]
+        place = unknown_name([*active, *self.assembler.blocks], number)
+        return f"unknown {number} of field {field_name!r}{place}"
+
+    def where_not_finite(self, x: Array) -> str:
+        """The element whose residual or tangent is not finite at x, (n,); empty if none is."""
+        return self.assembler.not_finite(x, self.parameters)
 
     def residual(self, x: Array) -> Array:
         """R(x), (n,): internal minus external virtual work; x - value for prescribed unknowns."""
@@ -120,18 +136,68 @@ class Problem:
         return r, self._eliminate(K)
 
     def norm(self, r: Array) -> float:
-        """Root of the sum over fields of |R / scale|^2, 2-norms."""
-        parts = [
-            np.linalg.norm(r[self.layout.part(name)] / scale) for name, scale in self.scales.items()
-        ]
-        return float(np.linalg.norm(parts))
+        """Root of the sum over fields of |R / scale|^2, 2-norms; every field needs a scale."""
+        return float(np.linalg.norm(self.scaled(r)))
 
     def scaled(self, r: Array) -> Array:
         """Residual (n,) over the reference size of its field; `norm` is the 2-norm of it."""
         result = np.zeros_like(r)
-        for name, scale in self.scales.items():
-            result[self.layout.part(name)] = r[self.layout.part(name)] / scale
+        for name in self.layout.names:
+            if name not in self.scales:
+                raise ProblemError(f"field {name!r} has no scale: give one, it is needed here")
+            result[self.layout.part(name)] = r[self.layout.part(name)] / self.scales[name]
         return result
+
+    def measure(self, x: Array, K: csc_array[np.float64] | None) -> float:
+        """Dimensionless size of the residual at x, (n,), inf where it is not finite.
+
+        Residuals of a field count relative to its loads, reactions and internal forces at x, and
+        prescribed unknowns relative to their values. With K, a tangent near x, what rounding may
+        have caused does not count. With `absolute` scales it is the norm.
+        Raises ProblemError if an unknown occurs in no block that is switched on.
+        """
+        self._require_determined()
+        if self.absolute:
+            r = self.residual(x)
+            return self.norm(r) if np.isfinite(r).all() else np.inf
+        r, size = self.assembler.residual_and_size(x, self.parameters)
+        if not np.isfinite(r).all():
+            return np.inf
+        noise = np.zeros_like(r)
+        if K is not None:
+            noise = _ROUNDING * np.asarray(abs(K) @ (np.abs(x) + self.assembler.reach()))
+        free: Flags = np.ones(len(r), dtype=bool)
+        free[self.fixed] = False
+        wanted = x.copy()
+        wanted[self.fixed] = self.values
+        parts = []
+        for name in self.layout.names:
+            part = self.layout.part(name)
+            parts.append(self._relative(name, r, size, noise, free))
+            parts.append(
+                _ratio(x[part] - wanted[part], np.maximum(np.abs(x), np.abs(wanted))[part])
+            )
+        return float(np.linalg.norm(parts))
+
+    def _relative(self, name: str, r: Array, size: Array, noise: Array, free: Flags) -> float:
+        """Size of the residuals r, (n,), of a field, relative to what it is measured by."""
+        part = self.layout.part(name)
+        own = free[part]
+        defect = np.maximum(np.abs(r[part]) - noise[part], 0.0)[own]
+        found = _ratio(defect, size[part])
+        if name in self.scales:
+            scale = np.broadcast_to(self.scales[name], own.shape)[own]
+            found = max(found, float(np.linalg.norm(defect / scale)))
+        return found
+
+    def _require_determined(self) -> None:
+        loose = np.setdiff1d(self.assembler.loose(self.parameters), self.fixed)
+        if len(loose):
+            others = f" (and {len(loose) - 1} more)" if len(loose) > 1 else ""
+            raise ProblemError(
+                f"{self.name_of(int(loose[0]))}{others} occurs in no block that is switched on: "
+                "prescribe it, or give its block parameters"
+            )
 
     def step_limit(self, x: Array, dx: Array) -> float:
         """Largest fraction of the step that every guard admits."""
@@ -167,15 +233,15 @@ class Problem:
         return self.assembler.block(name).fields(x, self.parameters[name])
 
     def _changed(self, name: str, values: Mapping[str, float]) -> Array:
-        names = self.assembler.block(name).kernel.parameters
-        unknown = set(values) - set(names)
-        if unknown:
-            raise KeyError(f"block {name!r} has no parameter {', '.join(sorted(unknown))}")
-        old = self.parameters.get(name)
-        if old is None and set(values) != set(names):
-            raise KeyError(f"block {name!r} is off: give all of {', '.join(names)}")
-        before = np.zeros(len(names)) if old is None else old
-        return np.array([values.get(n, b) for n, b in zip(names, before, strict=True)])
+        require_known("block", [name], [block.name for block in self.assembler.blocks])
+        block = self.assembler.block(name)
+        names, old = block.kernel.parameters, self.parameters.get(name)
+        require_known(f"parameter of block {name!r}", values, names)
+        if old is None:
+            if set(values) != set(names):
+                raise ProblemError(f"block {name!r} is off: give all of {listed(names)}")
+            return in_order(block, values)
+        return in_order(block, {**dict(zip(names, old, strict=True)), **values})
 
     def _eliminate(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
         """K with the rows and columns of prescribed unknowns replaced by those of the identity."""
@@ -184,3 +250,9 @@ class Problem:
         K.data[self.assembler.cross(self.fixed)] = 0.0
         K.data[self.assembler.pattern.diagonal[self.fixed]] = 1.0
         return K
+
+
+def _ratio(defect: Array, size: Array) -> float:
+    """2-norm of a defect over that of what it is measured by; 0 where there is no defect."""
+    off = float(np.linalg.norm(defect))
+    return off / float(np.linalg.norm(size)) if off > 0.0 else 0.0

@@ -9,8 +9,7 @@ Node orders are those of VTK and meshio, as in `runtime.mesh.cells`.
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
+from softehl.runtime.names import meant
 
 Faces: TypeAlias = Mapping[str, Integers]
 """Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
@@ -259,12 +259,6 @@ class Mesh:
         if not any(map(len, found.values())):
             raise MeshError(f"side {name!r}: no face of the boundary has all its nodes there")
         return {kind: faces for kind, faces in found.items() if len(faces)}
-
-
-def meant(given: object, known: Iterable[str]) -> str:
-    """A hint at the name that was probably meant, or nothing."""
-    close = difflib.get_close_matches(str(given), list(known), n=1)
-    return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def _parent_place(cell: Cell, places: Array, place: Array) -> Array | None:

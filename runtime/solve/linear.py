@@ -18,7 +18,14 @@ SparseMatrix: TypeAlias = "csc_array[np.float64] | csc_matrix[np.float64]"
 
 
 class SingularMatrix(ArithmeticError):  # noqa: N818 (named after what it is)
-    """The matrix has no usable factors; Newton turns it into Status.SINGULAR."""
+    """The matrix has no usable factors; Newton turns it into Status.SINGULAR.
+
+    row: a row of zeros, if there is one.
+    """
+
+    def __init__(self, message: str, row: int | None = None) -> None:
+        super().__init__(message)
+        self.row = row
 
 
 class Factors(Protocol):
@@ -131,5 +138,5 @@ def checked_row_sums(K: SparseMatrix) -> Array:
     sums = np.bincount(K.indices, weights=np.abs(K.data), minlength=K.shape[0])
     if not sums.all():
         row = int(np.flatnonzero(sums == 0.0)[0])
-        raise SingularMatrix(f"row {row} of the matrix is zero")
+        raise SingularMatrix(f"row {row} of the matrix is zero", row)
     return np.asarray(sums, dtype=np.float64)

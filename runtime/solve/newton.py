@@ -17,6 +17,7 @@ from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMat
 from softehl.runtime.solve.solution import Solution, Status
 from softehl.runtime.solve.superlu import SuperLU
 
+_HARDLY_LESS = 0.5  # of the norm before: Newton does better unless rounding is all that is left
 _SUFFICIENT_DECREASE = 1e-4  # Armijo's constant on the norm, the customary value
 
 
@@ -57,6 +58,31 @@ class EvolvingProblem(NonlinearProblem, Protocol):
         ...
 
 
+@runtime_checkable
+class MeasuredProblem(NonlinearProblem, Protocol):
+    """A problem that measures its residuals by its own terms; Newton then asks it, not `norm`."""
+
+    def measure(self, x: Array, K: SparseMatrix | None) -> float:
+        """Dimensionless size of R(x), (n,), inf if it is not finite.
+
+        With K, a tangent near x, what rounding may have caused does not count.
+        """
+        ...
+
+
+@runtime_checkable
+class NamedProblem(NonlinearProblem, Protocol):
+    """A problem that knows names for messages."""
+
+    def name_of(self, number: int) -> str:
+        """What an unknown is."""
+        ...
+
+    def where_not_finite(self, x: Array) -> str:
+        """Where the equations are not finite at x, (n,); empty if they are."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class NewtonState:
     """Everything an iteration needs and changes; `status` is None while it may go on.
@@ -80,7 +106,8 @@ class NewtonState:
 class Newton:
     """Settings of Newton's method; `solve` is init, then step until terminate decides.
 
-    tolerance: converged when problem.norm(R) <= tolerance.
+    tolerance: converged when the dimensionless residual, `measure` of the problem or else its
+        `norm`, is at most this.
     max_iterations: of one solve.
     stagnation: rounding may hold the norm just above the tolerance. The solve also counts as
         converged when a norm fails to decrease while it and its predecessor are below
@@ -126,7 +153,11 @@ class Newton:
     def init(self, problem: NonlinearProblem, x0: Array) -> NewtonState:
         """The state before the first iteration."""
         x = np.array(x0, dtype=np.float64)
-        return NewtonState(x, (_norm_at(problem, x),))
+        state = NewtonState(x, (_norm_at(problem, x),))
+        if math.isfinite(state.norms[0]):
+            return state
+        where = _where(problem, x)
+        return _end(state, Status.NOT_FINITE, f"the residual at the start is not finite{where}")
 
     def step(self, problem: NonlinearProblem, state: NewtonState) -> NewtonState:
         """One iteration: factorise, solve, advance; a failure is written into the state."""
@@ -135,16 +166,14 @@ class Newton:
         try:
             dx = -self.linear.factorise(K).solve(r)
         except SingularMatrix as error:
-            return _end(state, Status.SINGULAR, str(error))
-        return self._advance(problem, state, dx)
+            return _end(state, Status.SINGULAR, f"{error}{_which(problem, state.x, error)}")
+        return self._advance(problem, state, dx, K)
 
     def terminate(self, state: NewtonState) -> NewtonState:
         """The state with `status` set if the solve is over."""
         norm = state.norms[-1]
         if state.status is not None:
             return state
-        if not math.isfinite(norm):
-            return _end(state, Status.NOT_FINITE, "the residual at the start is not finite")
         if norm <= self.tolerance:
             return _end(state, Status.CONVERGED, f"norm {norm:.1e}")
         if self._stagnates(state.norms):
@@ -161,7 +190,9 @@ class Newton:
         before, now = norms[-2:]
         return before <= now <= self.stagnation * self.tolerance
 
-    def _advance(self, problem: NonlinearProblem, state: NewtonState, dx: Array) -> NewtonState:
+    def _advance(
+        self, problem: NonlinearProblem, state: NewtonState, dx: Array, K: SparseMatrix
+    ) -> NewtonState:
         """Go along dx as far as the problem admits; shorter while the residual is refused."""
         fraction = min(problem.step_limit(state.x, dx), 1.0)  # in this order nan stays nan
         if not fraction > 0.0:
@@ -177,8 +208,15 @@ class Newton:
             fraction *= 0.5
         if not math.isfinite(best_norm):
             message = f"the residual along the Newton step is not finite, down to {fraction:.1e}"
-            return _end(state, Status.NOT_FINITE, message)
-        return replace(state, x=best, norms=(*state.norms, best_norm))
+            return _end(state, Status.NOT_FINITE, message + _where(problem, x))
+        state = replace(state, x=best, norms=(*state.norms, best_norm))
+        if best_norm > _HARDLY_LESS * state.norms[-2] and self._is_rounding(problem, best, K):
+            return _end(state, Status.CONVERGED, f"norm {best_norm:.1e}, all of it rounding")
+        return state
+
+    def _is_rounding(self, problem: NonlinearProblem, x: Array, K: SparseMatrix) -> bool:
+        """Whether nothing is left of the residual at x but what rounding may have caused."""
+        return isinstance(problem, MeasuredProblem) and problem.measure(x, K) <= self.tolerance
 
     def _acceptable(self, norm: float, before: float, fraction: float) -> bool:
         if not math.isfinite(norm):
@@ -188,9 +226,25 @@ class Newton:
 
 def _norm_at(problem: NonlinearProblem, x: Array) -> float:
     """Norm of the residual at x, inf if either is not finite."""
+    if isinstance(problem, MeasuredProblem):
+        norm = problem.measure(x, None)
+        return norm if math.isfinite(norm) else math.inf
     r = problem.residual(x)
     norm = float(problem.norm(r)) if np.isfinite(r).all() else math.inf
     return norm if math.isfinite(norm) else math.inf
+
+
+def _where(problem: NonlinearProblem, x: Array) -> str:
+    """Where the equations are not finite at x, for messages."""
+    found = problem.where_not_finite(x) if isinstance(problem, NamedProblem) else ""
+    return f": {found}" if found else ""
+
+
+def _which(problem: NonlinearProblem, x: Array, error: SingularMatrix) -> str:
+    """The unknown that no equation determines, or the element that spoils the matrix."""
+    if error.row is not None and isinstance(problem, NamedProblem):
+        return f": no equation determines {problem.name_of(error.row)}"
+    return _where(problem, x)
 
 
 def _end(state: NewtonState, status: Status, message: str) -> NewtonState:

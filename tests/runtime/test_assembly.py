@@ -9,9 +9,11 @@ import pytest
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem import assembly
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.fem.checks import ProblemError
 from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.fem.guards import KeepsOrientation, StaysPositive
 from softehl.runtime.fem.pattern import build_pattern
-from softehl.runtime.fem.problem import KeepsOrientation, Problem, StaysPositive
+from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.newton import Newton
 from tests.runtime.springs import Spring
 
@@ -192,9 +194,9 @@ def test_changing_parameters_leaves_the_problem_as_it_was(rng: np.random.Generat
     assert "b" not in other.parameters
     assert problem.parameters["a"].tolist() == [1.5, 0.0]
     assert other.assembler is problem.assembler
-    with pytest.raises(KeyError, match="no parameter viscosity"):
+    with pytest.raises(ProblemError, match="no parameter of block 'a' 'viscosity'"):
         problem.with_parameters(a={"viscosity": 1.0})
-    with pytest.raises(KeyError, match="give all of stiffness, unused"):
+    with pytest.raises(ProblemError, match="give all of stiffness, unused"):
         other.with_parameters(b={"stiffness": 1.0})
 
 
