@@ -26,7 +26,7 @@ ORDER = {
         *("pipeline", "models", "tools"),
     ),
     "runtime": (
-        *("arrays", "tuning", "library", "io", "kernels", "mesh", "fem", "solve"),
+        *("arrays names", "tuning", "library", "io", "kernels", "mesh", "fem", "solve"),
         *("system", "result", "march", "study", "engines"),
     ),
     "cases": ("harness", "seal", "oring slider", "paper", "shipped", "cli document"),
@@ -34,7 +34,7 @@ ORDER = {
 """Folders and files of a room, each of which imports only those before it; some are one level."""
 PENDING: dict[str, str] = {}
 """Rooms that are still being put in order, and why."""
-SOLVERS = ("newton", "continuation", "linear", "solution", "pardiso", "modified_newton", "schur")
+SOLVERS = sorted(path.stem for path in (ROOT / "runtime" / "solve").glob("*.py"))
 NOT_FOR_SOLVERS = ("runtime.mesh", "runtime.fem", "cases", "codegen")
 HEAVY = ("sympy", "mpmath", "jax")
 
