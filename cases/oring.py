@@ -51,10 +51,6 @@ class ORingCase(Case[ORing, FilmRow]):
         """See :class:`Case`."""
         return piece.stroke
 
-    def label(self, key: float) -> str:
-        """See :class:`Case`."""
-        return f"U = {key:+g} mm/s"
-
     def tables(self, rows: Sequence[FilmRow]) -> Mapping[str, Sequence[Record]]:
         """See :class:`Case`."""
         return {"leakage": net_leakage(rows)}

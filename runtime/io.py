@@ -103,6 +103,13 @@ def read_columns(path: Path, header: Sequence[str]) -> dict[str, Array]:
     return {name: table[:, i].copy() for i, name in enumerate(header)}
 
 
+def read_table(path: Path) -> dict[str, Array]:
+    """As :func:`read_columns`, with the columns that the file has.  Raises OSError, ValueError."""
+    with path.open(encoding="utf-8", newline="") as file:
+        header = next(csv.reader(file), [])
+    return read_columns(path, header)
+
+
 def write_json(path: Path, value: object) -> None:
     """Write JSON atomically; a number that is not finite becomes null (JSON has no NaN)."""
     write_text(path, json.dumps(_plain(value), indent=1, allow_nan=False) + "\n")

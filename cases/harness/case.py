@@ -63,10 +63,6 @@ class Case(Generic[P, R]):
         chosen = [{self.list_key: tuple(share)} for share in shares if share]
         return [parameters.model_copy(update=update) for update in chosen]
 
-    def label(self, key: float) -> str:
-        """A row of which nothing is known but its key, in words."""
-        return f"{self.list_key} {key:g}"
-
     def piece_name(self, piece: P) -> str:
         """What tells a piece from those that run beside it."""
         return str(self.requested(piece))
@@ -81,7 +77,7 @@ class Case(Generic[P, R]):
 
     def named(self, rows: Sequence[R]) -> str:
         """Some rows in words."""
-        return ", ".join(self.label(row.key) for row in rows)
+        return ", ".join(row.label(row.key) for row in rows)
 
     def complaints(
         self, parameters: P, rows: Sequence[R], rejected: Sequence[R], advice: str

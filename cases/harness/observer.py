@@ -52,6 +52,7 @@ class Outcome:
     states: what the observer was told, in the words of the case.  unknowns: their numbers, "total"
     and those of parts.  kernel_signatures: kernel name -> signature of the compiled kernel.
     solvers: "linear" -> the linear solver in use, "solver" -> the way that was asked for.
+    stages: their cost; empty where the observer was told all that is to be recorded.
     """
 
     states: tuple[Any, ...]

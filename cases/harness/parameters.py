@@ -1,12 +1,29 @@
 """Parameters of a case: data with a default, a unit, bounds and a meaning for every key."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 _BOUNDS = {"gt": "> {}", "ge": ">= {}", "lt": "< {}", "le": "<= {}"}
+
+
+def _different(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    if len(set(numbers)) < len(numbers):
+        raise ValueError("a number is given twice")
+    if 0.0 in numbers:
+        raise ValueError("a number is 0")
+    return numbers
+
+
+# strict again on the item: the list itself is lax so that a TOML array becomes a tuple
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Nonzeros = Annotated[
+    tuple[Number, ...], Field(min_length=1, strict=False), AfterValidator(_different)
+]
+"""One or more different numbers that are not 0."""
 
 
 class Parameters(BaseModel):
@@ -18,6 +35,16 @@ class Parameters(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Describe every key once its type is known."""
+        for name, field in cls.model_fields.items():
+            extra = field.json_schema_extra
+            assert isinstance(extra, dict), f"{name} is not declared by key()"
+            extra["bounds"] = bounds = extra["bounds"] or _values(field.annotation)
+            unit = f" [{extra['unit']}]" if extra["unit"] else ""
+            field.description = f"{extra['meaning']}{unit}" + (f"; {bounds}" if bounds else "")
 
 
 @dataclass(frozen=True)
@@ -34,19 +61,30 @@ class Key:
 def key(default: Any, meaning: str, *, unit: str = "", bounds: str = "", **limits: Any) -> Any:
     """Declare a field of a parameter set.
 
-    unit: empty for a number without.  bounds: what is allowed, in words; from the limits if left
-    out.  limits: gt, ge, lt, le and whatever else `pydantic.Field` takes.
+    unit: empty for a number without.  bounds: what is allowed, in words; from limits and type if
+    left out.  limits: gt, ge, lt, le and whatever else `pydantic.Field` takes.
     """
     given = [text.format(limits[name]) for name, text in _BOUNDS.items() if name in limits]
     bounds = bounds or " and ".join(given)
-    described = meaning + (f" [{unit}]" if unit else "") + (f"; {bounds}" if bounds else "")
     extra: dict[str, Any] = {"unit": unit, "bounds": bounds, "meaning": meaning}
-    return Field(default=default, description=described, json_schema_extra=extra, **limits)
+    return Field(default=default, json_schema_extra=extra, **limits)
+
+
+def _values(kind: Any) -> str:
+    """What a type allows, in words, if it is one of a few values or a list of numbers."""
+    if kind is bool:
+        return "true or false"
+    if get_origin(kind) is tuple:
+        return "a list of different numbers, none 0"
+    if get_origin(kind) is not Literal:
+        return ""
+    *others, last = map(json.dumps, get_args(kind))
+    return f"{', '.join(others)} or {last}"
 
 
 def keys_of(kind: type[Parameters]) -> Iterator[Key]:
     """The keys of a parameter class, in order."""
     for name, field in kind.model_fields.items():
         extra = field.json_schema_extra
-        assert isinstance(extra, dict), f"{name} is not declared by key()"
+        assert isinstance(extra, dict)
         yield Key(name, field.default, *(str(extra[k]) for k in ("unit", "bounds", "meaning")))

@@ -135,7 +135,7 @@ class RunRecord:
                 "unknowns": dict(outcome.unknowns),
                 "solvers": dict(outcome.solvers),
             }
-        self._stages = [stage for outcome in outcomes for stage in outcome.stages]
+        self._stages = [stage for outcome in outcomes for stage in outcome.stages] or None
 
     def save(self, status: str, message: str) -> None:
         """Write the further tables of the case that have rows, then run.json."""

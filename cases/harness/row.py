@@ -90,16 +90,29 @@ class Record:
 class Row(Record):
     """A row of curve.csv.  A case derives its own, with `verdict` as the last column.
 
+    The first column with a head is the key: one of the values that the run was asked for.
+
     files: names of the files that belong to a row, with {} for :attr:`name`.
     """
 
     verdict: str
     files: ClassVar[tuple[str, ...]] = ()
 
+    @classmethod
+    def key_column(cls) -> Column:
+        """The column of the key."""
+        return next(column for column in cls.columns() if column.head)
+
     @property
     def key(self) -> float:
         """What tells this row from the others of its run: one of the values asked for."""
-        raise NotImplementedError
+        return float(getattr(self, self.key_column().name))
+
+    @classmethod
+    def label(cls, key: float) -> str:
+        """A row of which nothing is known but its key, in words."""
+        column = cls.key_column()
+        return f"{column.head} = {column.show(key)} {column.unit}".rstrip()
 
     @property
     def name(self) -> str:
@@ -108,8 +121,8 @@ class Row(Record):
 
     @property
     def order(self) -> tuple[Any, ...]:
-        """Sort key of the table."""
-        return (self.key,)
+        """Sort key of the table; as it is, positive keys come first, and large ones."""
+        return self.key < 0, -abs(self.key)
 
     @property
     def usable(self) -> bool:
@@ -119,7 +132,7 @@ class Row(Record):
     @property
     def line(self) -> str:
         """The row in one line, as it is shown when it is there."""
-        return f"{self.name}: {self.verdict}"
+        return f"{self.label(self.key)}: {self.verdict}"
 
     @classmethod
     def file_patterns(cls) -> tuple[str, ...]:

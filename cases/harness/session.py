@@ -165,7 +165,7 @@ def _gaps(record: RunRecord) -> list[str]:
     """The requested states that are not results, and why not."""
     run, rows, rejected = record.run, record.curve.rows, record.rejected.rows
     there = {row.key for row in [*rows, *rejected]}
-    missed = [run.case.label(k) for k in run.case.requested(run.parameters) if k not in there]
+    missed = [run.case.row.label(k) for k in run.case.requested(run.parameters) if k not in there]
     gaps = [f"not reached: {', '.join(missed)}"] if missed else []
     advice = " ".join(sorted(record.advice))
     return [*gaps, *run.case.complaints(run.parameters, rows, rejected, advice)]

@@ -34,18 +34,14 @@ class ORing(Parameters):
     reynolds: Literal["fe", "dg"] = key(
         "fe", "treatment of the Reynolds equation", bounds='"fe" (continuous pressure) or "dg"'
     )
-    quadrature: Literal["gauss", "lobatto"] = key(
-        "gauss", "quadrature rule of the film", bounds='"gauss" or "lobatto"'
-    )
+    quadrature: Literal["gauss", "lobatto"] = key("gauss", "quadrature rule of the film")
     quadrature_points: int | None = key(
         None, "points of the film rule", bounds="2 to 128, left out = automatic", ge=2, le=128
     )
     upwinding: float = key(
         1.0, "strength c of the bubble-load upwinding", bounds=">= 0, 0 = the paper's scheme", ge=0
     )
-    error_estimate: bool = key(
-        True, "whether the error of h* is estimated, on a graded mesh", bounds="true or false"
-    )
+    error_estimate: bool = key(True, "whether the error of h* is estimated, on a graded mesh")
     tolerance: float | None = key(
         None,
         "largest estimated error of h*, reached by finer meshes",
@@ -71,9 +67,7 @@ class ORing(Parameters):
     pressure_viscosity: float = key(
         0.02, "pressure-viscosity coefficient alpha of (13)", unit="1/MPa", ge=0
     )
-    shear_traction: bool = key(
-        True, "whether the shear stress (17) acts on the seal", bounds="true or false"
-    )
+    shear_traction: bool = key(True, "whether the shear stress (17) acts on the seal")
     rotation: Literal["fixed", "free"] = key(
         "fixed", "mean rotation of the section", bounds='"fixed" (held at zero) or "free"'
     )

@@ -94,11 +94,6 @@ class FilmRow(Row):
     verdict: str = column("", "`ok`, `oscillating` or `under-resolved`; `collapsed` is no result")
 
     @property
-    def key(self) -> float:
-        """The rod speed U."""
-        return self.rod_speed_mm_s
-
-    @property
     def name(self) -> str:
         """Sealed pressure and rod speed."""
         return f"{number_text(self.sealed_pressure_MPa)}_{number_text(self.rod_speed_mm_s)}"
