@@ -264,8 +264,9 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
     entries = manifest(directory)
     if name not in entries:
         raise MissingKernelsError(f"no kernel {name!r}; there are {', '.join(entries)}")
+    library = library_of(directory)
     try:
-        return _kernel(name, entries[name], library_of(directory))
+        return _kernel(name, entries[name], library)
     except (KeyError, TypeError, ValueError):
         raise damaged_manifest(directory) from None
 

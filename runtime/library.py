@@ -133,7 +133,7 @@ def _library_of(directory: Path) -> Library:
         reason = " ".join(str(error).split())
         expected = isinstance(error, tuning.NotTunedError) and error.expected
     if not (directory / DIGEST).exists():
-        raise MissingKernelsError(f"the kernels are not built: {reason}")
+        raise MissingKernelsError(f"the kernels are not built, nor are there plain ones: {reason}")
     if not expected and multiprocessing.parent_process() is None:
         print(f"softehl: the plain kernels are used: {reason}", file=sys.stderr)
     return replace(_opened(directory / LIBRARY, directory), kind="plain", reason=reason)
@@ -150,7 +150,7 @@ def _opened(path: Path, directory: Path, remedy: str = "") -> Library:
         _ffi.cdef(_declarations(directory), override=True)
         library = Library(directory, _ffi.dlopen(str(path)), path)
         current = library.current
-    except (OSError, AttributeError, cffi.CDefError) as error:
+    except (OSError, AttributeError, UnicodeError, cffi.CDefError) as error:
         reason = " ".join(str(error).split())
         raise StaleKernelsError(f"{path} cannot be used ({reason}): {remedy}") from None
     if not current:

@@ -31,24 +31,24 @@ class NotTunedError(RuntimeError):
 
 def tuned() -> Path:
     """Path of the library tuned to this processor, built if need be; NotTunedError if not."""
-    wish = os.environ.get("SOFTEHL_KERNELS", "tuned")
+    wish = os.environ.get("SOFTEHL_KERNELS") or "tuned"
     if wish == "plain":
-        raise NotTunedError("SOFTEHL_KERNELS is 'plain'", expected=True)
+        raise NotTunedError("SOFTEHL_KERNELS asks for the plain ones", expected=True)
     if wish != "tuned":
         raise NotTunedError(f"SOFTEHL_KERNELS is {wish!r}, must be 'tuned' or 'plain'")
     if getattr(sys, "frozen", False) or not sys.executable:
         raise NotTunedError("this is no ordinary Python, which could build them", expected=True)
     places = [str(_PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(places)}
+    paths = {"PYTHONPATH": os.pathsep.join(places), "PYTHONIOENCODING": "utf-8:surrogateescape"}
     try:
         with subprocess.Popen(
             [sys.executable, *_BUILD],
-            env=environment,
+            env={**os.environ, **paths},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            text=True,
-            errors="replace",
+            encoding="utf-8",
+            errors="surrogateescape",
         ) as process:
             out, err = _awaited(process)
     except OSError as error:

@@ -30,6 +30,7 @@ values = kernel.residual(numpy.zeros((1, 2)), numpy.zeros((1, 3)), **given)
 library = library_of()
 print(values.shape, library.kind, library.path, sep="|")
 """
+UTF8 = {"PYTHONIOENCODING": "utf-8:surrogateescape"}
 SLOW_COMPILER = """#!/bin/sh
 case "$*" in *-dM*) ;; *) echo $$ >> "{log}"; sleep 0.5;; esac
 exec {cc} "$@"
@@ -75,10 +76,11 @@ def using(place: Path, **environment: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-P", "-c", USE],
         cwd="/",
-        env={**os.environ, "PYTHONPATH": str(place), **environment},
+        env={**os.environ, "PYTHONPATH": str(place), **UTF8, **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
+        errors="surrogateescape",
     )
 
 
@@ -124,19 +126,26 @@ def test_without_a_compiler_the_plain_library_serves_silently(wheel: Path, tmp_p
     assert contents(wheel) == before
 
 
-def test_a_checkout_without_a_compiler_says_what_to_do(checkout: Path, tmp_path: Path) -> None:
-    process = using(checkout, **without_compiler(tmp_path))
+def missing(process: subprocess.Popen[str]) -> str:
+    """What the error says where no kernels can be had."""
     _, err = process.communicate(timeout=300)
-    assert process.returncode != 0
-    last = err.splitlines()[-1]
-    assert last.startswith("softehl.runtime.library.MissingKernelsError: the kernels are not built")
+    assert process.returncode == 1
+    kind, _, message = err.splitlines()[-1].partition(": ")
+    assert kind == "softehl.runtime.library.MissingKernelsError"
+    assert message.startswith("the kernels are not built, nor are there plain ones: ")
+    return message
+
+
+def test_a_checkout_without_a_compiler_says_what_to_do(checkout: Path, tmp_path: Path) -> None:
+    last = missing(using(checkout, **without_compiler(tmp_path)))
     assert last.endswith("no C compiler: 'cc' is not on the PATH; install one, or set CC to one")
 
 
-def test_the_plain_library_can_be_asked_for(wheel: Path, cache: Path) -> None:
+def test_the_plain_library_can_be_asked_for(wheel: Path, checkout: Path, cache: Path) -> None:
     kind, _, said = used(using(wheel, SOFTEHL_KERNELS="plain"))
     assert (kind, said) == ("plain", "")
     assert not cache.exists()
+    assert missing(using(checkout, SOFTEHL_KERNELS="plain")).endswith("asks for the plain ones")
     kind, _, said = used(using(wheel, SOFTEHL_KERNELS="quick"))
     assert kind == "plain"
     assert "SOFTEHL_KERNELS is 'quick', must be 'tuned' or 'plain'" in said
@@ -306,6 +315,20 @@ def test_a_damaged_plain_library_is_refused_and_not_loaded(
     _, err = process.communicate(timeout=300)
     assert process.returncode == 1
     assert "the digest beside it is damaged: install softehl anew" in err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [(b"m\xc3\xbcller's cache", "tuned"), (b"no utf-8 \xff", "plain")]
+)
+def test_the_cache_may_have_any_name(
+    wheel: Path, tmp_path: Path, name: bytes, expected: str
+) -> None:
+    """In an old locale too; cffi loads nothing from a folder whose name is not UTF-8."""
+    place = tmp_path / os.fsdecode(name)
+    kind, path, said = used(using(wheel, SOFTEHL_CACHE=str(place), LC_ALL="C"))
+    assert kind == expected
+    assert path.is_relative_to(place) == (kind == "tuned")
+    assert len(said.splitlines()) == (kind == "plain")
 
 
 @pytest.mark.parametrize("umask", [0o022, 0o002])
