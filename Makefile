@@ -28,7 +28,7 @@ help:
 	@echo "make clean    remove the environment and everything built"
 
 oring: $(VENV)/.kernels
-	$(BIN)/softehl run oring --out $(OUT)
+	$(BIN)/softehl run oring --overwrite --out $(OUT)
 
 test: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m pytest -n 2

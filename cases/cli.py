@@ -30,7 +30,7 @@ _NAMES = ", ".join(SHIPPED)
     "folder",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Folder for the files, results/<case> if left out. An earlier run in it is replaced.",
+    help="Folder for the files, results/<case> if left out.",
 )
 @click.option(
     "--tolerance",
@@ -38,6 +38,7 @@ _NAMES = ", ".join(SHIPPED)
     help="Largest estimated error of h*, as in 1%: speeds that miss it run on finer meshes.",
 )
 @click.option("--resume", is_flag=True, help="Keep the rows that DIR has and run the others.")
+@click.option("--overwrite", is_flag=True, help="Begin anew in a DIR that holds a run.")
 @click.option(
     "--jobs",
     metavar="N",
@@ -52,18 +53,21 @@ def run(
     folder: Path | None,
     tolerance: str | None,
     resume: bool,
+    overwrite: bool,
     jobs: int,
     quiet: bool,
 ) -> int:
     """Run a case."""
     from softehl.cases.harness.case_file import read_case
+    from softehl.cases.harness.earlier import existing_of
     from softehl.cases.harness.session import run_case
 
     if tolerance is not None:
         assignments = (*assignments, f"tolerance={tolerance.strip().removesuffix('%')}")
     read = read_case(case, SHIPPED, assignments)
     target = Path("results", read.case.name) if folder is None else folder
-    return run_case(read, target, resume=resume, jobs=jobs, quiet=quiet)
+    existing = existing_of(resume=resume, overwrite=overwrite)
+    return run_case(read, target, existing, jobs=jobs, quiet=quiet)
 
 
 @click.command(

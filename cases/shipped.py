@@ -45,13 +45,15 @@ def solve_cases(
     executor: Executor | None = None,
     *,
     resume: bool = False,
+    overwrite: bool = False,
 ) -> list[Curve]:
     """Run every parameter set into a folder of its own below `folder`; curves in the same order.
 
     cases: parameter sets, or folder name -> parameter set; without names a folder is called after
     all that is not at its default, such as `density=4-sealed_pressure=2`. executor: any
     `concurrent.futures.Executor` (its workers must see the same file system), None to run one after
-    the other in this process. resume: keep the rows that the folders have.
+    the other in this process. resume: keep the rows that the folders have;
+    overwrite: begin anew there; without both a folder that holds a run is refused.
 
     What runs leave for each other is shared (the contact states of an O-ring in `folder/contacts`).
     A run that does not reach everything is no error: see `Curve.complaints`. Raises BadInput, also
@@ -59,5 +61,7 @@ def solve_cases(
     given up, what was reached is saved.
     """
     from softehl.cases.harness import sweep
+    from softehl.cases.harness.earlier import existing_of
 
-    return sweep.solve_all(sweep.named(cases, case_of), Path(folder), executor, resume=resume)
+    existing = existing_of(resume=resume, overwrite=overwrite)
+    return sweep.solve_all(sweep.named(cases, case_of), Path(folder), executor, existing)

@@ -24,6 +24,7 @@ Shipped = Mapping[str, str]
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _SHOWN = 60
+_LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end
 
 
 def read_case(given: str, shipped: Shipped, assignments: Iterable[str] = ()) -> Run:
@@ -65,7 +66,7 @@ def read_assignment(text: str) -> tuple[str, object]:
 def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     """The case name and the remaining keys of a TOML file."""
     try:
-        table = tomllib.loads(Path(given).read_text(encoding="utf-8"))
+        table = tomllib.loads(_text(Path(given)))
     except FileNotFoundError:
         raise BadInput(
             f"no case or file {given!r}{_meant(given, shipped)}; "
@@ -81,6 +82,15 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
         allowed = " or ".join(f'case = "{known}"' for known in shipped)
         raise BadInput(f"{given}: {shown}{_meant(str(name), shipped)}; allowed: {allowed}")
     return name, table
+
+
+def _text(path: Path) -> str:
+    """What a file holds.  Raises OSError, and ValueError for a file that is no text or too long."""
+    with path.open("rb") as file:
+        content = file.read(_LARGEST + 1)
+    if len(content) > _LARGEST:
+        raise ValueError(f"it is longer than {_LARGEST} bytes")
+    return content.decode("utf-8")
 
 
 def _validate(

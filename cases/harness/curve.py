@@ -1,9 +1,10 @@
 """The rows of a run as a table on disk, with the files of each of them."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from softehl.cases.harness.files import write_content
+from softehl.cases.harness.files import file_digest, write_content
 from softehl.cases.harness.observer import State
 from softehl.cases.harness.row import Row
 from softehl.runtime.io import read_csv, write_csv
@@ -18,6 +19,7 @@ class CurveFolder(Generic[R]):
         self.path = path
         self.kind = kind
         self.rows: list[R] = []
+        self.digests: dict[str, str] = {}
 
     def load(self) -> None:
         """Take over the rows whose files are there.  Raises OSError, ValueError."""
@@ -33,10 +35,17 @@ class CurveFolder(Generic[R]):
         self.path.mkdir(parents=True, exist_ok=True)
         for name, content in zip(row.file_names(), state.contents, strict=True):
             write_content(self.path / name, content)
+            self.digests[name] = file_digest(self.path / name)
         others = [other for other in self.rows if other.key != row.key]
         self.rows = sorted([*others, row], key=lambda r: r.order)
         self.save()
         return row
+
+    def keep(self, rows: Iterable[R]) -> None:
+        """Take over rows that are known to be good, with their files."""
+        self.rows = sorted(rows, key=lambda r: r.order)
+        names = [name for row in self.rows for name in row.file_names()]
+        self.digests = {name: file_digest(self.path / name) for name in names}
 
     def drop(self, key: float) -> None:
         """Take a row out of the curve; its files stay until they are written again."""

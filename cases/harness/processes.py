@@ -7,6 +7,7 @@ which are raised here as what they are.
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from multiprocessing.connection import wait
@@ -18,7 +19,10 @@ R = TypeVar("R")
 
 
 def processes(count: int) -> ProcessPoolExecutor:
-    """Fresh processes on this machine, of one thread each, that end when this one is killed."""
+    """An executor of fresh processes on this machine, of one thread each.
+
+    They end when this one does, however it does, and leave Ctrl-C to it.
+    """
     # several processes of several threads each would only get in each other's way
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     context = multiprocessing.get_context("spawn")
@@ -46,6 +50,7 @@ def completed(
 
 def _end_with_parent() -> None:
     """Let this process end when the one that started it does, however it does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends it to all of us
     parent = multiprocessing.parent_process()
     if parent is not None:
         Thread(target=_end_after, args=(parent.sentinel,), daemon=True).start()

@@ -12,15 +12,23 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from softehl.cases.harness.case import AnyCase, Run
 from softehl.cases.harness.curve import CurveFolder
+from softehl.cases.harness.earlier import (
+    Earlier,
+    Existing,
+    holds_a_run,
+    kernel_signatures,
+    read_earlier,
+)
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.files import Content, write_content
+from softehl.cases.harness.lock import FolderLock
 from softehl.cases.harness.observer import Outcome, StageRecord, State
 from softehl.cases.harness.row import Record, Row
-from softehl.runtime.io import read_json, write_csv, write_json
+from softehl.runtime.io import write_csv, write_json
 from softehl.runtime.library import library_of
 
 _OURS = ("run.json", "curve.csv")
@@ -64,26 +72,45 @@ class StageLog:
 
 
 class RunRecord:
-    """Everything a run writes, kept up to date while it runs.
+    """Everything a run writes, kept up to date while it runs; a context that locks the folder.
 
     Nothing is created before the first call of :meth:`begin`; bad input leaves no trace.
     """
 
-    def __init__(self, folder: Path, run: Run, *, resume: bool) -> None:
-        """Look at what is in `folder`.  Raises BadInput if it cannot hold or resume this run."""
+    def __init__(self, folder: Path, run: Run, existing: Existing) -> None:
+        """Look at what is in `folder`.
+
+        existing: what to do with an earlier run there. Raises BadInput if the folder cannot hold
+        or resume this run, or another one is under way there.
+        """
         self.folder = folder
         self.run = run
         self.curve = CurveFolder(folder, run.case.row)
         self.rejected = CurveFolder(folder / "rejected", run.case.row)
         self.advice: set[str] = set()
         self._began: float | None = None
-        self._earlier: dict[str, Any] = {}
+        self._earlier = Earlier()
+        self._existing = existing
+        self._lock = FolderLock(folder)
         self._size: dict[str, Any] = dict.fromkeys(_SIZE)
         self._logs: list[StageLog] = []
         self._stages: list[StageRecord] | None = None
         _require_folder(folder)
-        if resume:
-            self._take_over()
+        if holds_a_run(folder):
+            self._take(existing)
+
+    def __enter__(self) -> Self:
+        """The folder is locked as soon as it is there."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Release the folder."""
+        self._lock.release()
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What of an earlier run could not be believed, and is computed again."""
+        return self._earlier.doubts
 
     @property
     def began(self) -> bool:
@@ -95,9 +122,13 @@ class RunRecord:
         if self.began:
             return
         self.folder.mkdir(parents=True, exist_ok=True)
+        self._lock.take()
+        if self._existing == "refuse" and holds_a_run(self.folder):
+            raise self._refusal()  # somebody else was faster
         self._began = time.perf_counter()
-        if not self._earlier:
+        if not self._earlier.content:
             _remove_earlier(self.folder, self.run.case)
+        self._size["kernels"] = kernel_signatures()  # which of them are used is known in the end
         # what is rejected is tried again, also by a resumed run
         _remove_earlier(self.rejected.path, self.run.case)
         self.curve.save()
@@ -129,6 +160,8 @@ class RunRecord:
     def set_outcomes(self, outcomes: Sequence[Outcome]) -> None:
         """What is known only at the end: the size, the kernels and the cost of each stage."""
         for outcome in outcomes:
+            if not outcome.kernel_signatures:
+                continue
             self._size = {
                 "kernels": dict(outcome.kernel_signatures),
                 "kernel_library": library_of().kind,
@@ -151,11 +184,11 @@ class RunRecord:
             "parameters": self.run.parameters.model_dump(),
             "versions": _versions(),
             **self._size,
-            "seconds": seconds + self._earlier.get("seconds", 0.0),
-            "stages": [*self._earlier.get("stages", ()), *map(_stage_json, stages)],
+            "seconds": seconds + self._earlier.seconds,
+            "stages": [*self._earlier.stages, *map(_stage_json, stages)],
             **{name: [record.as_dict() for record in some] for name, some in tables.items()},
-            "states": [_row_json(row, ".") for row in self.curve.rows],
-            "rejected": [_row_json(row, "rejected") for row in self.rejected.rows],
+            "states": [_row_json(row, self.curve, ".") for row in self.curve.rows],
+            "rejected": [_row_json(r, self.rejected, "rejected") for r in self.rejected.rows],
         }
         write_json(self.folder / "run.json", content)
 
@@ -164,37 +197,30 @@ class RunRecord:
             cells = [record.cells() for record in records]
             write_csv(self.folder / f"{name}.csv", records[0].header(), cells)
 
-    def _take_over(self) -> None:
-        """Read an earlier run of the same parameters."""
-        path = self.folder / "run.json"
+    def _refusal(self) -> BadInput:
+        return BadInput(
+            f"{self.folder} holds an earlier run; --resume keeps its rows, --overwrite begins "
+            "anew, --out names another folder"
+        )
+
+    def _take(self, existing: Existing) -> None:
+        """Resume an earlier run, leave it to be overwritten, or refuse."""
+        if existing == "refuse":
+            raise self._refusal()
         try:
-            if not path.exists():
-                return
-            self._earlier = read_json(path)
-            self._size = {key: self._earlier.get(key) for key in self._size}
-            self.curve.load()
-        except (OSError, ValueError, TypeError) as error:
-            raise BadInput(f"--resume: cannot read the earlier run: {error}") from None
-        difference = _difference(self._earlier, self.run)
-        if difference:
-            raise BadInput(
-                f"--resume: {self.folder} holds a run with other parameters: {difference}; "
-                f"allowed to differ: {', '.join(self.run.case.selection)}"
-            )
-
-
-def _difference(earlier: Mapping[str, Any], run: Run) -> str:
-    """What an earlier run has otherwise than this one, in words; empty if nothing."""
-    if earlier.get("case") != run.case.name:
-        return f"case = {earlier.get('case')!r}, now {run.case.name!r}"
-    before = earlier.get("parameters")
-    if not isinstance(before, dict):
-        return "it names none"
-    now = run.parameters.model_dump(mode="json")
-    for key in [*now, *before]:
-        if key not in run.case.selection and before.get(key) != now.get(key):
-            return f"{key} = {before.get(key)!r}, now {now.get(key)!r}"
-    return ""
+            self._lock.take()
+        except OSError as error:
+            raise BadInput(f"cannot write to {self.folder}: {error.strerror}") from None
+        if existing == "resume":
+            try:
+                version = _versions()["softehl"]
+                self._earlier = read_earlier(self.folder, self.run, version)
+            except BaseException:
+                self._lock.release()
+                raise
+            content = self._earlier.content
+            self._size = {key: content.get(key) for key in self._size}
+            self.curve.keep(self._earlier.rows)
 
 
 def _require_folder(folder: Path) -> None:
@@ -218,8 +244,10 @@ def _remove_earlier(folder: Path, case: AnyCase) -> None:
             path.unlink()
 
 
-def _row_json(row: Row, folder: str) -> dict[str, Any]:
-    return row.as_dict() | {"files": [str(Path(folder, file)) for file in row.file_names()]}
+def _row_json(row: Row, curve: CurveFolder[Any], folder: str) -> dict[str, Any]:
+    names = row.file_names()
+    digests = {name: curve.digests.get(name) for name in names}
+    return row.as_dict() | {"files": [str(Path(folder, n)) for n in names], "digests": digests}
 
 
 def _stage_json(stage: StageRecord) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import click
 
 from softehl.cases.harness import table
 from softehl.cases.harness.case import Run
+from softehl.cases.harness.earlier import Existing
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.files import Content
 from softehl.cases.harness.observer import Observer, Outcome, State
@@ -18,37 +19,39 @@ from softehl.cases.harness.record import RunRecord, StageLog
 from softehl.cases.harness.workers import solve_side_by_side
 from softehl.runtime.kernels import MissingKernelsError, StaleKernelsError
 from softehl.runtime.solve.backends import MissingBackend
+from softehl.runtime.solve.solution import Status
 
 NOT_CONVERGED = 3
 """Exit code of a run that did not reach everything it was asked for."""
 
 
-def run_case(run: Run, folder: Path, *, resume: bool, jobs: int, quiet: bool) -> int:
+def run_case(run: Run, folder: Path, existing: Existing, *, jobs: int, quiet: bool) -> int:
     """Run a case into a folder; return the exit code, 0 or :data:`NOT_CONVERGED`.
 
-    Raises BadInput where the parameters, the folder or the kernels cannot be used.
+    existing: what to do with an earlier run there. Raises BadInput where the parameters, the
+    folder or the kernels cannot be used.
     """
-    with make_display(quiet=quiet) as display:
-        record, complaints = record_run(run, folder, resume=resume, jobs=jobs, display=display)
-    with _writing(folder):
-        return _finish(record, complaints, quiet=quiet)
+    with RunRecord(folder, run, existing) as record:
+        for doubt in record.doubts:
+            click.echo(f"softehl: {doubt}", err=True)
+        with make_display(quiet=quiet) as display:
+            complaints = compute(record, jobs=jobs, display=display)
+        with _writing(folder):
+            return _finish(record, complaints, quiet=quiet)
 
 
-def record_run(
-    run: Run, folder: Path, *, resume: bool, jobs: int, display: Display
-) -> tuple[RunRecord, list[str]]:
-    """Run a case into a folder; return its record and what it did not reach, in words.
+def compute(record: RunRecord, *, jobs: int, display: Display) -> list[str]:
+    """Run a case into its folder; return what it did not reach, in words.
 
     Raises BadInput like :func:`run_case`.
     """
-    record = RunRecord(folder, run, resume=resume)
-    outcomes: list[Outcome] = []
+    run, outcomes = record.run, list[Outcome]()
     with _recorded(record):
         for parameters in run.case.rounds(run.parameters):
             pieces = run.case.pieces(parameters, record.curve.rows, jobs)
             outcomes += _solve(run, pieces, record, display, jobs)
-    with _writing(folder):
-        return record, _conclude(record, outcomes)
+    with _writing(record.folder):
+        return _conclude(record, outcomes)
 
 
 def _solve(
@@ -57,7 +60,13 @@ def _solve(
     """Run parameter sets one after the other or, with jobs > 1, side by side."""
     reporters = [Reporter(record, display, run.case.piece_name(piece)) for piece in pieces]
     if jobs > 1 and len(pieces) > 1:
-        return solve_side_by_side(run.solve, pieces, reporters)
+        outcomes = solve_side_by_side(run.solve, pieces, reporters)
+        return [
+            replace(outcome, message=f"{reporter.worker}: {outcome.message}")
+            if outcome.status is Status.KILLED
+            else outcome
+            for outcome, reporter in zip(outcomes, reporters, strict=True)
+        ]
     return [run.solve(*pair) for pair in zip(pieces, reporters, strict=True)]
 
 

@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.harness.case import AnyCase, Run
+from softehl.cases.harness.earlier import Existing
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters
 from softehl.cases.harness.processes import completed
 from softehl.cases.harness.progress import Display
-from softehl.cases.harness.session import record_run
+from softehl.cases.harness.record import RunRecord
+from softehl.cases.harness.session import compute
 from softehl.runtime.io import number_text
 
 _LONGEST = 120
@@ -24,11 +26,11 @@ _LONGEST = 120
 
 @dataclass(frozen=True)
 class Task:
-    """A curve that is to be computed: the run, its folder, whether to keep what that has."""
+    """A curve that is to be computed: the run, its folder, what to do with what that has."""
 
     run: Run
     folder: Path
-    resume: bool
+    existing: Existing
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,7 @@ def solve_all(
     runs: Mapping[str, tuple[AnyCase, Parameters]],
     folder: Path,
     executor: Executor | None,
-    *,
-    resume: bool,
+    existing: Existing,
 ) -> list[Curve]:
     """Run every case with its parameters into the folder of its name; curves in the same order.
 
@@ -63,7 +64,7 @@ def solve_all(
     """
     base = folder.absolute()  # a worker may have another working directory
     tasks = [
-        Task(Run(case, parameters, shared_folder(case, base)), base / name, resume)
+        Task(Run(case, parameters, shared_folder(case, base)), base / name, existing)
         for name, (case, parameters) in runs.items()
     ]
     curves = {curve.folder: curve for curve in solved(tasks, executor)}
@@ -83,11 +84,9 @@ def solved(tasks: Sequence[Task], executor: Executor | None) -> Iterator[Curve]:
 
 def solve_task(task: Task) -> Curve:
     """Run one curve into its folder; this is what a worker does.  Raises BadInput."""
-    record, complaints = record_run(
-        task.run, task.folder, resume=task.resume, jobs=1, display=Display()
-    )
-    rows, parameters = tuple(record.curve.rows), task.run.parameters
-    return Curve(parameters, task.folder, rows, tuple(complaints))
+    with RunRecord(task.folder, task.run, task.existing) as record:
+        complaints = compute(record, jobs=1, display=Display())
+    return Curve(task.run.parameters, task.folder, tuple(record.curve.rows), tuple(complaints))
 
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:
@@ -108,14 +107,30 @@ def named(
     given: Iterable[Parameters] | Mapping[str, Parameters],
     case_of: Callable[[Parameters], AnyCase],
 ) -> dict[str, tuple[AnyCase, Parameters]]:
-    """Folder name -> case and parameters.  BadInput for two of one name, and for one too long."""
+    """Folder name -> case and parameters.
+
+    Raises BadInput for two of one name, for one too long, and for one that is no plain name.
+    """
     if isinstance(given, Mapping):
-        return {name: (case_of(parameters), parameters) for name, parameters in given.items()}
+        pairs = [(case_of(parameters), parameters) for parameters in given.values()]
+        for name, (case, _) in zip(given, pairs, strict=True):
+            _require_plain(name, case)
+        return dict(zip(given, pairs, strict=True))
     pairs = [(case_of(parameters), parameters) for parameters in given]
     found = {_name(*pair): pair for pair in pairs}
     if len(found) < len(pairs):
         raise BadInput("two curves would have the same folder; allowed: a dict of named cases")
     return found
+
+
+def _require_plain(name: object, case: AnyCase) -> None:
+    """Raise BadInput unless a name is one component of a path, and none that has a meaning."""
+    wrong = not isinstance(name, str) or name != name.strip() or name in ("", ".", "..")
+    if wrong or set(str(name)) & {"/", "\\", "\0"} or name == case.shared:
+        taken = f", and {case.shared!r} is taken" if case.shared else ""
+        raise BadInput(f"{name!r} is no name for a curve; allowed: a plain folder name{taken}")
+    if len(str(name)) > _LONGEST:
+        raise BadInput(f"the name {str(name)[:20]}... is too long; allowed: {_LONGEST} letters")
 
 
 def _name(case: AnyCase, parameters: Parameters) -> str:

@@ -6,6 +6,7 @@ from itertools import groupby
 
 from rich.box import SIMPLE
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -18,14 +19,35 @@ _WIDTH = 110
 
 
 def print_rows(case: AnyCase, rows: Sequence[Row], rejected: Sequence[Row] = ()) -> None:
-    """Print the rows to stdout, at full width where stdout is not a terminal."""
-    _print(rows_table(case, rows, rejected), _WIDTH)
+    """Print the rows to stdout, at full width where stdout is not a terminal.
+
+    Where a terminal is too narrow the last columns are left out, and named: digits never are.
+    """
+    console, left = Console(), 0
+    width = console.width if console.is_terminal else 10 * _WIDTH
+    wide = console.options.update(width=10 * _WIDTH)
+    heads = _heads(case.row)
+    while len(heads) - left > 1:
+        table = rows_table(case, rows, rejected, without=left)
+        if Measurement.get(console, wide, table).minimum <= width:
+            break
+        left += 1
+    _print(rows_table(case, rows, rejected, without=left), _WIDTH)
+    if left:
+        names = ", ".join(columns[0].head for columns in heads[len(heads) - left :])
+        console.print(f"not shown, the terminal is too narrow: {names}", highlight=False)
 
 
-def rows_table(case: AnyCase, rows: Sequence[Row], rejected: Sequence[Row] = ()) -> Table:
-    """The rows as a table; a rejected one is flagged and shows no number but the first."""
+def rows_table(
+    case: AnyCase, rows: Sequence[Row], rejected: Sequence[Row] = (), *, without: int = 0
+) -> Table:
+    """The rows as a table; a rejected one is flagged and shows no number but the first.
+
+    without: how many of the last columns before the verdict are left out.
+    """
     ordered = sorted([*rows, *rejected], key=lambda row: row.order)
     heads = _heads(case.row)
+    heads = heads[: len(heads) - without]
     table = Table(
         title=Text(case.caption(ordered)), box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False
     )

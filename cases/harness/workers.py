@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
@@ -12,6 +13,7 @@ from softehl.cases.harness.case import Solve
 from softehl.cases.harness.files import Content
 from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.processes import processes
+from softehl.runtime.solve.solution import Status
 
 _INTERVAL = 0.1  # seconds between looks at whether a process still works
 
@@ -40,23 +42,34 @@ def solve_side_by_side(
 ) -> list[Outcome]:
     """Run each parameter set in its own process; the outcomes in the order of `pieces`.
 
-    The observers are called in this process.  solve must cross by pickle.  Raises what a run
-    raises, RuntimeError if a process dies; the other runs then end at their next step.
+    The observers are called in this process.  solve must cross by pickle.  A process that the
+    system ends is an outcome that says so; the others go on.  Raises what a run raises; the other
+    runs then end at their next step.
     """
-    workers = []
-    with processes(len(pieces)) as pool:
-        try:
-            for piece, observer in zip(pieces, observers, strict=True):
-                receiver, sender = Pipe(duplex=False)
-                future = pool.submit(_work, solve, piece, sender)
-                workers.append(_Worker(observer, receiver, sender, future))
-            return _collect(workers)
-        except BrokenProcessPool:
-            raise RuntimeError("a run side by side ended without an outcome") from None
-        finally:
-            for worker in workers:  # nobody listens any more: the next call fails
-                worker.sender.close()
-                worker.receiver.close()
+    with ExitStack() as stack:
+        workers = []
+        for piece, observer in zip(pieces, observers, strict=True):
+            # a pool each: where one process dies, its whole pool is lost
+            pool = stack.enter_context(processes(1))
+            receiver, sender = Pipe(duplex=False)
+            future = pool.submit(_work, solve, piece, sender)
+            workers.append(_Worker(observer, receiver, sender, future))
+            stack.callback(receiver.close)  # nobody listens any more: the next call fails
+            stack.callback(sender.close)
+        return _collect(workers)
+
+
+def _outcome(worker: _Worker) -> Outcome:
+    try:
+        return worker.future.result()
+    except BrokenProcessPool:
+        return Outcome(
+            states=(),
+            status=Status.KILLED,
+            message="its process was ended from outside (killed, or out of memory)",
+            unknowns={},
+            kernel_signatures={},
+        )
 
 
 def _collect(workers: Sequence[_Worker]) -> list[Outcome]:
@@ -72,9 +85,15 @@ def _collect(workers: Sequence[_Worker]) -> list[Outcome]:
                 speaking[receiver].listen()
             except EOFError:  # it has ended; how is known to the future
                 del speaking[receiver]
-        outcomes = [worker.future.result() for worker in workers if worker.future.done()]
+        for worker in workers:
+            if worker.future.done() and not isinstance(_error(worker), BrokenProcessPool):
+                worker.future.result()  # what a run raises ends the others
         if not working and not ready:
-            return outcomes
+            return [_outcome(worker) for worker in workers]
+
+
+def _error(worker: _Worker) -> BaseException | None:
+    return worker.future.exception()
 
 
 def _work(solve: Solve, piece: Any, sender: "Connection[Any, Any]") -> Outcome:

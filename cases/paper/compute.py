@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from softehl.cases.harness.case import Run
+from softehl.cases.harness.earlier import Existing
 from softehl.cases.harness.processes import processes
 from softehl.cases.harness.sweep import Curve, Task, shared_folder, solved
 from softehl.cases.oring import CASE
@@ -24,9 +25,10 @@ def compute(requests: Sequence[Request], store: Store, *, resume: bool, jobs: in
     A run that does not reach a speed is no error: its states say so. Raises BadInput for kernels
     that are to be built or folders that cannot be written to.
     """
+    existing: Existing = "resume" if resume else "overwrite"
     waiting = [r for r in requests if not (resume and is_complete(r, store))]
     tasks = [
-        Task(_run(request, store, resume), store.run_folder(request.setup), resume)
+        Task(_run(request, store, resume), store.run_folder(request.setup), existing)
         for request in waiting
     ]
     with _progress(len(tasks)) as advance, _executor(jobs) as executor:

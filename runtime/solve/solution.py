@@ -25,6 +25,7 @@ class Status(enum.Enum):
     SINGULAR = "singular tangent"
     NOT_FINITE = "residual not finite"
     STEP_TOO_SMALL = "continuation step too small"
+    KILLED = "ended from outside"
 
     @property
     def advice(self) -> str:
@@ -48,6 +49,7 @@ _ADVICE = {
         "Take a smaller step; check that the start is admissible (positive Jacobian, positive "
         "film thickness) and that step_limit keeps it so."
     ),
+    Status.KILLED: "Give it more memory or fewer processes at a time.",
     Status.STEP_TOO_SMALL: (
         "The path may end or turn back here (limit point: follow it by arc length), or the mesh "
         "is too coarse for this parameter; otherwise allow smaller steps."

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softehl import SymPyNeededError, __version__, with_sympy
+from softehl.cases.harness.process import Ended, readers_that_leave, signals
 
 if TYPE_CHECKING:
     import click
@@ -18,22 +19,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     # One thread a process, before NumPy is loaded: the systems are small, the runs are parallel.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    try:
-        code = _commands().main(
-            None if arguments is None else list(arguments),
-            prog_name="softehl",
-            standalone_mode=False,
-        )
-    except click.ClickException as error:
-        click.echo(f"softehl: {' '.join(error.format_message().split())}", err=True)
-        return error.exit_code
-    except SymPyNeededError as error:
-        click.echo(f"softehl: {error}", err=True)
-        return 2
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("softehl: interrupted; what was reached is saved", err=True)
-        return 130
-    return code if isinstance(code, int) else 0
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever a user shows elsewhere
+    with signals(), readers_that_leave():
+        try:
+            code = _commands().main(
+                None if arguments is None else list(arguments),
+                prog_name="softehl",
+                standalone_mode=False,
+            )
+        except click.ClickException as error:
+            click.echo(f"softehl: {' '.join(error.format_message().split())}", err=True)
+            return error.exit_code
+        except SymPyNeededError as error:
+            click.echo(f"softehl: {error}", err=True)
+            return 2
+        except (click.Abort, KeyboardInterrupt):
+            click.echo("softehl: interrupted; what was reached is saved", err=True)
+            return 130
+        except Ended as end:
+            click.echo(f"softehl: ended by {end}; what was reached is saved", err=True)
+            return 128 + end.number
+        return code if isinstance(code, int) else 0
 
 
 def _commands() -> "click.Group":

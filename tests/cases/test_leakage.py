@@ -52,7 +52,7 @@ def test_the_worse_verdict_of_the_two_is_kept() -> None:
 
 def test_a_run_of_both_strokes_writes_the_table(tmp_path: Path) -> None:
     run = Run(CASE, ORing(speeds=(400.0, 100.0)))
-    record = RunRecord(tmp_path / "both", run, resume=False)
+    record = RunRecord(tmp_path / "both", run, "refuse")
     observer = Teller(Reporter(record, Display(), "both"))
     for speed in (400.0, -400.0, 100.0):
         observer.film_state(film_state(run.parameters, speed))

@@ -240,7 +240,7 @@ def test_a_sweep_on_dask(serial: list[Curve], tmp_path: Path) -> None:
 
 def test_one_curve_of_each_section_comes_first() -> None:
     cases = [*SWEEP, case(density=2, stroke="in"), case(density=2, mu_1=3.0)]
-    tasks = [Task(Run(CASE, c), Path(str(n)), False) for n, c in enumerate(cases)]
+    tasks = [Task(Run(CASE, c), Path(str(n)), "refuse") for n, c in enumerate(cases)]
     assert [task.folder.name for task in in_order(tasks)] == ["4", "5", "0", "2", "1", "3"]
 
 

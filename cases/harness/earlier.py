@@ -1,0 +1,177 @@
+"""What an earlier run left in a folder, and which of its rows can be believed.
+
+A row is kept if `curve.csv` and `run.json` say the same of it, value by value, and its files are
+those that were written. Anything else is computed again, and the user is told.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from softehl.cases.harness.case import Run
+from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.files import file_digest
+from softehl.cases.harness.row import Row
+from softehl.runtime.io import read_csv, read_json
+from softehl.runtime.library import GENERATED, manifest
+
+Existing: TypeAlias = Literal["refuse", "resume", "overwrite"]
+"""What to do with an earlier run in a folder."""
+
+
+def existing_of(*, resume: bool, overwrite: bool) -> Existing:
+    """From both options.  Raises BadInput where both are given."""
+    if resume and overwrite:
+        raise BadInput("--resume keeps what --overwrite replaces; allowed: one of them")
+    return "resume" if resume else "overwrite" if overwrite else "refuse"
+
+
+ANEW = "--overwrite begins anew"
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """An earlier run: what run.json says of it, the rows that are kept, and words on the others."""
+
+    content: Mapping[str, Any] = field(default_factory=dict)
+    rows: tuple[Any, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def seconds(self) -> float:
+        """Time that it took."""
+        seconds = self.content.get("seconds", 0.0)
+        return float(seconds) if isinstance(seconds, int | float) else 0.0
+
+    @property
+    def stages(self) -> tuple[Any, ...]:
+        """What run.json says of its stages."""
+        stages = self.content.get("stages", ())
+        return tuple(stages) if isinstance(stages, list) else ()
+
+
+def holds_a_run(folder: Path) -> bool:
+    """Whether there is anything of a run in a folder."""
+    return any((folder / name).exists() for name in ("run.json", "curve.csv"))
+
+
+def kernel_signatures() -> dict[str, str]:
+    """Kernel -> signature, of all that ship."""
+    return {name: entry["signature"] for name, entry in manifest(GENERATED).items()}
+
+
+def read_earlier(folder: Path, run: Run, version: str | None) -> Earlier:
+    """The earlier run in a folder, to be resumed by this one; nothing where there is none.
+
+    Raises BadInput where it is another one, of another version, or cannot be read.
+    """
+    if not holds_a_run(folder):
+        return Earlier()
+    try:
+        content = read_json(folder / "run.json")
+        states = _states(content)
+    except FileNotFoundError:
+        raise BadInput(f"--resume: {folder} has a curve.csv and no run.json; {ANEW}") from None
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise BadInput(
+            f"--resume: {folder / 'run.json'} is damaged ({_shortened(error)}); {ANEW}"
+        ) from None
+    difference = _difference(content, run, version)
+    if difference:
+        raise BadInput(
+            f"--resume: {folder} holds a run with {difference}; allowed to differ: "
+            f"{', '.join(run.case.selection) or 'nothing'}; {ANEW}"
+        )
+    rows, doubts = _believed(folder, run, states)
+    return Earlier(content, tuple(rows), tuple(doubts))
+
+
+def _states(content: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The rows of run.json.  Raises ValueError."""
+    states = content.get("states")
+    if not isinstance(states, list) or not all(isinstance(s, dict) for s in states):
+        raise ValueError("it names no states")
+    return states
+
+
+def _difference(content: Mapping[str, Any], run: Run, version: str | None) -> str:
+    """What an earlier run has otherwise than this one, in words; empty if nothing."""
+    if content.get("case") != run.case.name:
+        return f"other parameters: case = {content.get('case')!r}, now {run.case.name!r}"
+    before, now = content.get("parameters"), run.parameters.model_dump(mode="json")
+    if not isinstance(before, dict):
+        return "other parameters: it names none"
+    for key in [*now, *before]:
+        if key not in run.case.selection and before.get(key) != now.get(key):
+            return f"other parameters: {key} = {before.get(key)!r}, now {now.get(key)!r}"
+    versions, kernels = content.get("versions"), content.get("kernels")
+    used = versions.get("softehl") if isinstance(versions, dict) else None
+    if used != version:
+        return f"another version: softehl {used}, now {version}"
+    known = kernel_signatures()
+    if not isinstance(kernels, dict) or not kernels:
+        return "unknown kernels"
+    other = [name for name, signature in kernels.items() if known.get(name) != signature]
+    return f"other kernels: {', '.join(map(str, other))}" if other else ""
+
+
+def _believed(
+    folder: Path, run: Run, states: Sequence[Mapping[str, Any]]
+) -> tuple[list[Row], list[str]]:
+    """Rows that can be kept, and words on those that cannot."""
+    kept, doubts = [], []
+    try:
+        table = read_csv(folder / "curve.csv", run.case.row.header())
+    except (OSError, ValueError) as error:
+        table, damage = [], _shortened(error)
+        if states:
+            doubts.append(f"curve.csv cannot be read ({damage}): its rows are computed again")
+    rows: list[Row] = []
+    for number, cells in enumerate(table, start=1):
+        try:
+            rows.append(run.case.row.parse(cells))
+        except (ValueError, TypeError, OverflowError):
+            doubts.append(f"line {number + 1} of curve.csv is no row: it is computed again")
+    count = Counter(row.key for row in rows)
+    for row in rows:
+        reason = "it is there twice" if count[row.key] > 1 else _disbelief(folder, row, states)
+        if reason:
+            doubts.append(f"{run.case.label(row.key)}: {reason}; computed again")
+        else:
+            kept.append(row)
+    return kept, list(dict.fromkeys(doubts))
+
+
+def _disbelief(folder: Path, row: Row, states: Sequence[Mapping[str, Any]]) -> str:
+    """Why a row of curve.csv cannot be believed, empty if it can."""
+    given = _plain(row.as_dict())
+    same = [state for state in states if {k: state.get(k) for k in given} == given]
+    if not same:
+        return "curve.csv and run.json differ"
+    digests = same[0].get("digests")
+    for name in row.file_names():
+        wanted = digests.get(name) if isinstance(digests, dict) else None
+        try:
+            found = file_digest(folder / name)
+        except OSError:
+            return f"{name} is missing"
+        if found != wanted:
+            return f"{name} is not what was written"
+    return ""
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values as run.json has them: what is not finite is null."""
+    return {
+        key: None if isinstance(value, float) and not isfinite(value) else value
+        for key, value in json.loads(json.dumps(values)).items()
+    }
+
+
+def _shortened(error: BaseException) -> str:
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 120 else f"{text[:117]}..."
