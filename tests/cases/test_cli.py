@@ -17,6 +17,7 @@ import pytest
 import softehl
 from softehl.cases import oring
 from softehl.cases.harness import observer as harness
+from softehl.cases.harness.earlier import kernel_signatures
 from softehl.cases.harness.record import RunRecord
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import NOT_CONVERGED
@@ -54,6 +55,7 @@ FILES = {
     *(f"profile_1_{u}.csv" for u in (400, 100, -400, -100)),
     *(f"section_1_{u}.vtu" for u in (400, 100, -400, -100)),
 }
+USED = {"film": kernel_signatures()["film"]}
 
 
 Solve = Callable[[ORing, Observer], harness.Outcome]
@@ -132,7 +134,7 @@ def solve(parameters: ORing, observer: Observer) -> Outcome:
 def outcome(*states: FilmState, status: Status = Status.CONVERGED, message: str = "") -> Outcome:
     stage = StageRecord("contact", 0.5, 4, 3, ((1.0, 1e-2, 1e-5),), (1.0,), place(1.0, "out"))
     unknowns = {"total": 1234, "pressure": 109}
-    return Outcome(states, status, message, unknowns, {"film": "abc"}, (stage,))
+    return Outcome(states, status, message, unknowns, USED, (stage,))
 
 
 def solve_roughly(parameters: ORing, observer: Observer) -> Outcome:
@@ -181,6 +183,11 @@ def solve_and_die(parameters: ORing, observer: Observer) -> Outcome:
     """One state, then the end of the process without any clean-up."""
     observer.film_state(film_state(parameters, max(parameters.speeds)))
     os._exit(9)
+
+
+def solve_instroke_dies(parameters: ORing, observer: Observer) -> Outcome:
+    """Outstroke as it should be, instroke killed after its first state."""
+    return (solve if parameters.stroke == "out" else solve_and_die)(parameters, observer)
 
 
 def solve_without_kernels(parameters: ORing, observer: Observer) -> Outcome:
@@ -336,7 +343,7 @@ def test_run_json(here: Path, invoke: Invoke) -> None:
     parameters = ORing(density=4, speeds=(400.0, 100.0)).model_dump()
     assert content["parameters"] == {**parameters, "speeds": [400.0, 100.0]}
     assert (content["case"], content["status"]) == ("oring", "converged")
-    assert content["kernels"] == {"film": "abc"}
+    assert content["kernels"] == USED
     assert content["kernel_library"] == library_of().kind
     assert content["unknowns"] == {"total": 1234, "pressure": 109}
     assert {"python", "numpy", "scipy", "softehl"} <= set(content["versions"])
@@ -421,8 +428,13 @@ def test_side_by_side_kernel_error(here: Path, invoke: Invoke) -> None:
 
 
 def test_side_by_side_death(here: Path, invoke: Invoke) -> None:
-    with pytest.raises(RuntimeError, match="ended without an outcome"):
-        invoke("run", "oring", *FAST, "--jobs", "2", solver=solve_and_die)
+    code, _, err = invoke("run", "oring", *FAST, "--jobs", "2", solver=solve_instroke_dies)
+    folder = here / "results" / "oring"
+    assert code == 3
+    assert "ended from outside: in: its process was ended from outside" in err[-1]
+    assert "not reached: U = -100 mm/s" in err[-1]
+    assert speeds(folder) == [400.0, 100.0, -400.0], "what the others and it had is kept"
+    assert run_json(folder)["status"] == "not converged"
 
 
 def test_not_converged(here: Path, invoke: Invoke) -> None:
@@ -456,7 +468,7 @@ def test_a_collapsed_film_is_no_result(here: Path, invoke: Invoke) -> None:
     assert flagged[0].split() == ["+100", *"--------", "COLLAPSED"]
     assert "collapsed film, not a result: U = +100 mm/s. Use a finer mesh." in err[-1]
     assert [state["verdict"] for state in run_json(folder)["rejected"]] == [COLLAPSED]
-    assert invoke(*arguments)[0] == 0
+    assert invoke(*arguments, "--resume")[0] == 0
     assert names(folder / "rejected") == set()
 
 
@@ -526,23 +538,14 @@ def test_resume_refuses_other_parameters(here: Path, invoke: Invoke) -> None:
     assert before == {name: (here / "a" / name).read_bytes() for name in names(here / "a")}
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("run.json", "{"),
-        ("run.json", "[]"),
-        ("curve.csv", "a,b\n"),
-        ("curve.csv", HEADER + "\n1\n"),
-    ],
-)
-def test_resume_refuses_what_it_cannot_read(
-    name: str, content: str, here: Path, invoke: Invoke
-) -> None:
+@pytest.mark.parametrize("content", ["{", "[]", "{}", '{"states": 3}', '{"states": [1]}', "\udcff"])
+def test_resume_refuses_a_record_it_cannot_read(content: str, here: Path, invoke: Invoke) -> None:
     invoke("run", "oring", *FAST, "--out", "a")
-    (here / "a" / name).write_text(content)
+    (here / "a" / "run.json").write_bytes(content.encode(errors="surrogateescape"))
     code, _, err = invoke("run", "oring", *FAST, "--out", "a", "--resume")
     assert (code, len(err)) == (2, 1)
-    assert "cannot read the earlier run" in err[0]
+    assert "run.json is damaged" in err[0]
+    assert "--overwrite begins anew" in err[0]
 
 
 def test_resume_of_nothing_is_a_run(here: Path, invoke: Invoke) -> None:
@@ -550,10 +553,17 @@ def test_resume_of_nothing_is_a_run(here: Path, invoke: Invoke) -> None:
     assert names(here / "results" / "oring") == FILES
 
 
-def test_a_new_run_replaces_the_earlier_one(here: Path, invoke: Invoke) -> None:
+def test_a_new_run_replaces_the_earlier_one_only_where_it_may(here: Path, invoke: Invoke) -> None:
     invoke("run", "oring", "--set", "speeds=[25]", "--out", "a")
     (here / "a" / "notes.txt").write_text("mine")
-    assert invoke("run", "oring", *FAST, "--out", "a")[0] == 0
+    before = {name: (here / "a" / name).read_bytes() for name in names(here / "a")}
+    code, _, err = invoke("run", "oring", *FAST, "--out", "a")
+    assert (code, len(err)) == (2, 1)
+    assert "a holds an earlier run; --resume keeps its rows, --overwrite begins anew" in err[0]
+    assert before == {name: (here / "a" / name).read_bytes() for name in names(here / "a")}
+    code, _, err = invoke("run", "oring", *FAST, "--out", "a", "--overwrite", "--resume")
+    assert (code, len(err)) == (2, 1)
+    assert invoke("run", "oring", *FAST, "--out", "a", "--overwrite")[0] == 0
     assert names(here / "a") == {*FILES, "notes.txt"}
 
 
