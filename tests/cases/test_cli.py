@@ -187,7 +187,10 @@ def solve_and_die(parameters: ORing, observer: Observer) -> Outcome:
 
 def solve_instroke_dies(parameters: ORing, observer: Observer) -> Outcome:
     """Outstroke as it should be, instroke killed after its first state."""
-    return (solve if parameters.stroke == "out" else solve_and_die)(parameters, observer)
+    if parameters.stroke == "out":
+        return solve(parameters, observer)
+    observer.film_state(film_state(parameters, -max(parameters.speeds)))
+    os._exit(9)
 
 
 def solve_without_kernels(parameters: ORing, observer: Observer) -> Outcome:
