@@ -80,13 +80,14 @@ def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
     numbers = (dofs.separate_dofs if dg else dofs.chain_dofs)(p.segments, m_p, nodes.size)
     layout = dofs.DofLayout.of(displacement=nodes.size, pressure=numbers.max() + 1 - nodes.size)
     blocks = [chain_block("film", nodes, numbers, rules.film_rule(m_p))]
+    parameters = {"film": np.append(oil, [p.cavitation_penalty, 1.0, 1.0])}
     if dg:
+        parameters["film_facet"] = oil
         sides = np.hstack([numbers[:-1], numbers[1:]])
         blocks.append(chain_block("film_facet", nodes, sides, rules.facet_rule(m_p)))
     ends = np.array([p.start_pressure, p.end_pressure])
     if p.pressure_viscosity and not alpha:
         ends = -np.expm1(-p.pressure_viscosity * ends) / p.pressure_viscosity
-    parameters = {"film": np.append(oil, [p.cavitation_penalty, 1.0, 1.0]), "film_facet": oil}
     scales = {"pressure": 0.5 * abs(speed) * nodes[:, 1].min()}
     problem = Problem(Assembler.build(layout.total, blocks), layout, parameters, scales)
     return problem.with_fixed([layout.dofs("displacement"), numbers[[0, -1], [0, -1]]], [0.0, ends])
