@@ -1,9 +1,8 @@
-"""First stage: the mesh of a section and its contact state, by whichever way leads there cheaply.
+"""First stage: the mesh of a section and its contact state, by the cheapest route that succeeds.
 
 A path from rest is followed on a coarse mesh, unless another run has left a state to start from;
 finer and graded meshes start from a coarser or a uniform one and are corrected by Newton's method.
-Where a way does not lead to the end, the next one begins on a finer mesh, the last of them on the
-mesh itself.
+Where a route fails the next one begins on a finer mesh, the last of them on the mesh itself.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ GUIDE = 2
 
 @dataclass(frozen=True)
 class ContactRoute:
-    """Ways to a contact state.
+    """Routes to a contact state.
 
     follow: solves a stage from a start. newton: corrector of stored states. contacts: states of
     uniform meshes that runs leave for each other.
@@ -46,7 +45,7 @@ class ContactRoute:
         return self._graded(p) if p.mesh == "graded" else self._uniform(p)
 
     def _uniform(self, p: ORing) -> State | StageFailed:
-        """By way of coarser meshes; on the mesh itself if that is asked for or the ways fail."""
+        """From coarser meshes; on the mesh itself if that is asked for or the others fail."""
         if p.solver == "auto":
             coarser = list(_doublings(1, p.density // 2))
             stored = self.contacts.densities(p, (*coarser, p.density))

@@ -2,7 +2,7 @@
 
 A state is a file, named by all that it depends on. It is never trusted: it is where Newton's
 method starts on the section's own equations, which a state that belongs to them fulfils already.
-A wrong or damaged file can cost a few iterations, never a result. Files are written atomically;
+A wrong or damaged file costs a few iterations and cannot change a result. Files are written atomically;
 processes that need the same state at the same time each find it for themselves.
 """
 
@@ -34,7 +34,7 @@ WITHOUT_INFLUENCE = (
 )
 """Parameters that the contact stage does not know."""
 
-_ITERATIONS = 10  # a state of another section is not worth more
+_ITERATIONS = 10  # a state that needs more belongs to another section
 
 
 def contact_key(parameters: ORing) -> str:

@@ -27,7 +27,7 @@ from softehl.runtime.solve.steps import StepRule
 METHOD = "modified Newton on the Schur complement of the section"
 
 _NEAR = 0.3  # residual at which the section is in equilibrium well enough to be condensed
-_LOOSE = 1e-3  # of the states on the way from contact to film, which are no results
+_LOOSE = 1e-3  # between contact and film, whose states are not results
 _FIRM = 1e-6  # of the state from which speeds fall: a section is condensed there that is at rest
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
 _SHEAR_STEPS = StepRule(1.0, 0.05, target_iterations=8)
@@ -135,7 +135,7 @@ class FastFilm:
         return cls(system, system.film_layer(), SchurCorrector(linear, near=_NEAR, finish=finish))
 
     def weight(self, stage: Stage) -> Stage:
-        """The stage from contact to film, to a tolerance that is enough for a way."""
+        """The stage from contact to film, to a loose tolerance: its states are not results."""
         return self._stage(stage, self.corrector.with_tolerance(_LOOSE), _WEIGHT_STEPS)
 
     def shear(self, stage: Stage) -> Stage:

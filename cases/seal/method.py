@@ -163,7 +163,7 @@ class SealRun:
         """Look at a film of falling speed; one at a requested speed becomes a state."""
         system, x = self.system, point.solution.x
         if progress.slowest is not None and not film.speed < progress.slowest[0].speed:
-            return  # where another way of solving begins
+            return  # a slower film is known already
         progress.slowest = film, x
         problem = system.film_problem(film)
         progress.verdict = progress.verdict.after(film_numbers(system, problem, film, x))
@@ -239,7 +239,7 @@ def run(
     found = route.contact(parameters)
     if isinstance(found, StageFailed):
         state.failures.append(found.explain("contact", rotation))
-        return _outcome(build_system(parameters), driver, state)  # for its size: none was settled
+        return _outcome(build_system(parameters), driver, state)  # its size alone is reported
     seal = _begun(FilmPath(found[0], settings, driver), found[1], observer, state)
     strokes: tuple[Stroke, ...] = ("out", "in")
     for stroke in strokes if parameters.stroke == "both" else (parameters.stroke,):

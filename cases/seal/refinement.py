@@ -47,7 +47,7 @@ class _Carrier:
 
 
 def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
-    """The sharpest way there is: between meshes whose nodes are shared, or by local splines."""
+    """The most accurate transfer: exact between meshes that share nodes, else by local splines."""
     density = old.mesh.arc // LONG
     if old.section.disc == new.section.disc and new.mesh.arc == 2 * old.mesh.arc:
         return _Carrier(

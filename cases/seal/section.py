@@ -21,7 +21,7 @@ from softehl.runtime.mesh.sections import Disc, SectionMesh, disc_mesh
 
 @dataclass(frozen=True, eq=False)
 class SealSection:
-    """A meshed section that nothing has moved yet; lengths in mm.
+    """A meshed section in its reference configuration; lengths in mm.
 
     disc: how the mesh is laid out.
     """

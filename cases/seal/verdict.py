@@ -1,4 +1,4 @@
-"""Whether a film on the path of falling speed can be believed, from its numbers alone."""
+"""Whether a film on the path of falling speed can be trusted, from its numbers alone."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def fewest_inlet_segments(reynolds: str, m_p: int) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether the films met so far on a path of falling speed can be believed.
+    """Whether the films met so far on a path of falling speed can be trusted.
 
     reference: maximum contact pressure without film, MPa. last: the latest film. collapsed: what
     gave a spurious collapsed film away, if anything did: a pressure well above the contact's, a
