@@ -2,8 +2,8 @@
 
 A state is a file, named by all that it depends on. It is never trusted: it is where Newton's
 method starts on the section's own equations, which a state that belongs to them fulfils already.
-A wrong or damaged file costs a few iterations and cannot change a result. Files are written atomically;
-processes that need the same state at the same time each find it for themselves.
+A wrong or damaged file costs a few iterations and cannot change a result. Files are written
+atomically; processes that need the same state at the same time each find it for themselves.
 """
 
 from __future__ import annotations
