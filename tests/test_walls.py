@@ -26,7 +26,7 @@ ORDER = {
         *("pipeline", "models", "tools"),
     ),
     "runtime": (
-        *("arrays names", "tuning", "library", "io", "kernels", "mesh", "fem", "solve"),
+        *("arrays names", "tuning", "library", "io", "calls", "kernels", "mesh", "fem", "solve"),
         *("system", "result", "march", "study", "engines"),
     ),
     "cases": ("harness", "seal", "oring slider", "paper", "shipped", "cli document"),
