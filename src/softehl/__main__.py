@@ -89,11 +89,11 @@ def _commands() -> "click.Group":
         from softehl.codegen.tools.table import kernels
         from softehl.runtime.library import KernelError, library_of
 
-        code = kernels()
         try:
             library = library_of()
         except KernelError as error:
             raise BadInput(str(error)) from None
+        code = kernels()
         why = f" ({library.reason})" if library.reason else ""
         click.echo(f"{library.kind} library{why}: {library.path}")
         return code

@@ -16,6 +16,7 @@ from softehl.codegen.graph.spec import check
 from softehl.codegen.graph.traverse import operations, reachable
 from softehl.codegen.models import ALL
 from softehl.codegen.optimise import passes
+from softehl.codegen.optimise.factors import factor
 from softehl.codegen.optimise.passes import STANDARD, Pass
 from softehl.codegen.optimise.sums import common_sums
 from tests.codegen.workshop import close, inputs, same_value, unknowns
@@ -197,17 +198,17 @@ def test_common_factors_leave_shared_products_and_plain_sums_alone() -> None:
     g = Graph()
     x, y, z = unknowns(g, 3)
     plain = g.add(g.mul(x, y), g.call(Op.SIN, z))
-    assert passes.factor(g, [plain]) == [plain]
+    assert factor(g, [plain]) == [plain]
     shared = g.mul(x, y)
     roots = [g.add(shared, g.mul(x, z)), g.call(Op.EXP, shared)]
-    assert passes.factor(g, roots) == roots, "x y is needed anyway"
+    assert factor(g, roots) == roots, "x y is needed anyway"
 
 
 def test_a_factor_alone_counts_as_times_one() -> None:
     g = Graph()
     x, y = unknowns(g, 2)
     root = g.add(x, g.mul(x, y))
-    assert passes.factor(g, [root]) == [g.mul(x, g.add(g.one, y))]
+    assert factor(g, [root]) == [g.mul(x, g.add(g.one, y))]
     assert costs(g, "common factors", root) == (2, 2, 2, 2)
 
 
