@@ -177,7 +177,7 @@ class Newton:
         if norm <= self.tolerance:
             return _end(state, Status.CONVERGED, f"norm {norm:.1e}")
         if self._stagnates(state.norms):
-            return _end(state, Status.CONVERGED, f"norm {norm:.1e}, held up by rounding")
+            return _end(state, Status.CONVERGED, f"norm {norm:.1e}, limited by rounding")
         if norm > self.divergence * max(1.0, state.norms[0]):
             return _end(state, Status.DIVERGED, f"norm {norm:.1e} from {state.norms[0]:.1e}")
         if state.iterations >= self.max_iterations:

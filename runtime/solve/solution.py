@@ -128,7 +128,7 @@ class LimitPoint:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A followed path: every converged point, in order, and how the walk ended.
+    """A followed path: every converged point, in order, and how it ended.
 
     points: converged points; only the last two keep their x unless everything was asked for.
     status, message: CONVERGED if the end was reached, else why not and which parameter was.

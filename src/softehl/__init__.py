@@ -23,18 +23,22 @@ if TYPE_CHECKING:
     from softehl.codegen.language.elements.cells import element
     from softehl.codegen.language.model import Model
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
+    from softehl.runtime.fem.checks import ProblemError
     from softehl.runtime.fem.dofs import DofLayout
     from softehl.runtime.fem.problem import Problem
     from softehl.runtime.kernels import Kernel
     from softehl.runtime.mesh.mesh import Mesh
+    from softehl.runtime.solve.arclength import Arclength
     from softehl.runtime.solve.continuation import Continuation
     from softehl.runtime.solve.newton import Newton
     from softehl.runtime.solve.solution import Branch, Solution, Status
+    from softehl.runtime.solve.steps import StepRule
     from softehl.runtime.study import Study
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "Arclength": "softehl.runtime.solve.arclength",
     "Assembler": "softehl.runtime.fem.assembly",
     "Branch": "softehl.runtime.solve.solution",
     "Continuation": "softehl.runtime.solve.continuation",
@@ -49,9 +53,11 @@ _PUBLIC = {
     "Observer": "softehl.cases.seal.state",
     "Outcome": "softehl.cases.seal.state",
     "Problem": "softehl.runtime.fem.problem",
+    "ProblemError": "softehl.runtime.fem.checks",
     "Silent": "softehl.cases.seal.state",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
+    "StepRule": "softehl.runtime.solve.steps",
     "Study": "softehl.runtime.study",
     "main": "softehl.__main__",
     "run_oring": "softehl.cases.seal.method:run",
@@ -68,6 +74,7 @@ _MODELLING = {
 """What a model page needs; these import SymPy."""
 
 __all__ = [
+    "Arclength",
     "Assembler",
     "Branch",
     "Continuation",
@@ -84,9 +91,11 @@ __all__ = [
     "Observer",
     "Outcome",
     "Problem",
+    "ProblemError",
     "Silent",
     "Solution",
     "Status",
+    "StepRule",
     "Study",
     "element",
     "kinematics",
