@@ -13,7 +13,7 @@ from scipy.sparse import csc_array, hstack, vstack
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.continuation import ProblemAt
 from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
-from softehl.runtime.solve.newton import Newton, NonlinearProblem
+from softehl.runtime.solve.newton import MeasuredProblem, Newton, NonlinearProblem
 from softehl.runtime.solve.predictor import admissible_fraction
 from softehl.runtime.solve.record import OnPoint, Record
 from softehl.runtime.solve.solution import Branch, LimitPoint, Solution, Status
@@ -106,6 +106,14 @@ class _Corrector:
     def norm(self, r: Array) -> float:
         problem = self._problem(self.base)
         return max(problem.norm(r[:-1]), abs(float(r[-1])))
+
+    def measure(self, y: Array, K: SparseMatrix | None) -> float:
+        problem, off = self._problem(y), abs(float(self._plane(y)[0]))
+        if isinstance(problem, MeasuredProblem):
+            inner = None if K is None else csc_array(csc_array(K)[:-1, :-1])
+            return max(problem.measure(y[:-1], inner), off)
+        r = problem.residual(y[:-1])
+        return max(problem.norm(r), off) if np.isfinite(r).all() else math.inf
 
     def step_limit(self, y: Array, dy: Array) -> float:
         return self._problem(y).step_limit(y[:-1], dy[:-1])

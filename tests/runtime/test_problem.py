@@ -19,8 +19,10 @@ from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Status
+from softehl.runtime.solve.steps import StepRule
 from tests.cases.oring_cases import oring
 from tests.runtime.springs import Spring
 
@@ -269,6 +271,39 @@ def test_a_tangent_that_is_not_finite_names_the_element() -> None:
     solution = Newton().solve(p, np.zeros(2))
     assert solution.status is Status.SINGULAR
     assert "not finite: element 0 of block 'bad'" in solution.message
+
+
+# --- paths ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Arch(Spring):
+    """u^3 - 3 u^2 + 2.5 u, which is largest at u = 1 - 1 / sqrt(6)."""
+
+    parameters: tuple[str, ...] = ()
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        return dofs**3 - 3.0 * dofs**2 + 2.5 * dofs
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        return self.residual(coordinates, dofs), (3.0 * dofs**2 - 6.0 * dofs + 2.5)[:, :, None]
+
+
+def test_a_path_of_problems_is_followed_by_arc_length_without_scales() -> None:
+    place = np.zeros((1, 1), dtype=np.int64)
+    kernels = {"a": Arch(), "f": Force()}
+    blocks = [ElementBlock(n, kernel, np.zeros((1, 0)), place) for n, kernel in kernels.items()]
+    p = Problem(Assembler.build(1, blocks), DofLayout.of(u=1), {"a": [], "f": [0.0]})
+    arc = Arclength(Newton(), StepRule(0.05, 1e-4, 0.1))
+    branch = arc.follow(
+        lambda force: p.with_parameters(f={"force": force}),
+        0.0,
+        np.zeros(1),
+        until=lambda branch: len(branch.limit_points) == 2,
+    ).raise_for_status()
+    for fold, u in zip(branch.limit_points, (1 - 6**-0.5, 1 + 6**-0.5), strict=True):
+        assert fold.x[0] == pytest.approx(u, abs=1e-6)
+        assert fold.parameter == pytest.approx(u**3 - 3 * u**2 + 2.5 * u, abs=1e-9)
 
 
 # --- the criterion -------------------------------------------------------------------------------
