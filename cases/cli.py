@@ -62,9 +62,8 @@ def run(
     from softehl.cases.harness.earlier import existing_of
     from softehl.cases.harness.session import run_case
 
-    if tolerance is not None:
-        assignments = (*assignments, f"tolerance={tolerance.strip().removesuffix('%')}")
-    read = read_case(case, SHIPPED, assignments)
+    options = {} if tolerance is None else {"tolerance": tolerance.strip().removesuffix("%")}
+    read = read_case(case, SHIPPED, assignments, options)
     target = Path("results", read.case.name) if folder is None else folder
     existing = existing_of(resume=resume, overwrite=overwrite)
     return run_case(read, target, existing, jobs=jobs, quiet=quiet)

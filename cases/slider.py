@@ -88,8 +88,7 @@ def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
     ends = np.array([p.start_pressure, p.end_pressure])
     if p.pressure_viscosity and not alpha:
         ends = -np.expm1(-p.pressure_viscosity * ends) / p.pressure_viscosity
-    scales = {"pressure": 0.5 * abs(speed) * nodes[:, 1].min()}
-    problem = Problem(Assembler.build(layout.total, blocks), layout, parameters, scales)
+    problem = Problem(Assembler.build(layout.total, blocks), layout, parameters, {})
     return problem.with_fixed([layout.dofs("displacement"), numbers[[0, -1], [0, -1]]], [0.0, ends])
 
 

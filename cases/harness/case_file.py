@@ -11,6 +11,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import ValidationError
@@ -27,15 +28,24 @@ _SHOWN = 60
 _LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end
 
 
-def read_case(given: str, shipped: Shipped, assignments: Iterable[str] = ()) -> Run:
+def read_case(
+    given: str,
+    shipped: Shipped,
+    assignments: Iterable[str] = (),
+    options: Mapping[str, str] = MappingProxyType({}),
+) -> Run:
     """Read the case `given` (a shipped name or a TOML file) and apply KEY=VALUE `assignments`.
 
-    Raises BadInput.
+    options: keys that have an option of their own, as they were typed.  Raises BadInput.
     """
-    case, from_file = find_case(given, shipped)
-    from_line = dict(read_assignment(text) for text in assignments)
-    origins = dict.fromkeys(from_file, given) | dict.fromkeys(from_line, "--set")
-    return Run(case, _validate(case.parameters, from_file | from_line, origins))
+    case, values = find_case(given, shipped)
+    origins = dict.fromkeys(values, given)
+    typed = [(text, "--set") for text in assignments]
+    typed += [(f"{key}={text}", f"--{key}") for key, text in options.items()]
+    for text, origin in typed:
+        key, values[key] = read_assignment(text, origin)
+        origins[key] = origin
+    return Run(case, _validate(case.parameters, values, origins))
 
 
 def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:
@@ -44,11 +54,11 @@ def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:
     return load_case(shipped[name]), table
 
 
-def read_assignment(text: str) -> tuple[str, object]:
+def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
     """Split KEY=VALUE and read VALUE as a TOML value; a bare word is a string.  BadInput."""
     key, equals, value = (part.strip() for part in text.partition("="))
     if not key or not equals:
-        raise BadInput(f"--set {_shorten(text)}: allowed is KEY=VALUE, as in length=4")
+        raise BadInput(f"{origin} {_shorten(text)}: allowed is KEY=VALUE, as in length=4")
     try:
         table = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
@@ -58,7 +68,7 @@ def read_assignment(text: str) -> tuple[str, object]:
     if _BARE_WORD.fullmatch(value):
         return key, value
     raise BadInput(
-        f"--set {key}: {_shorten(value)!r} is not a TOML value; "
+        f"{origin} {key}: {_shorten(value)!r} is not a TOML value; "
         f'allowed are a number, true or false, a word, "text" or a list as in [400, 100]'
     )
 

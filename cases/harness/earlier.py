@@ -140,7 +140,7 @@ def _believed(
     for row in rows:
         reason = "it is there twice" if count[row.key] > 1 else _disbelief(folder, row, states)
         if reason:
-            doubts.append(f"{run.case.label(row.key)}: {reason}; computed again")
+            doubts.append(f"{row.label(row.key)}: {reason}; computed again")
         else:
             kept.append(row)
     return kept, list(dict.fromkeys(doubts))

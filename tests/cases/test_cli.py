@@ -257,7 +257,8 @@ BAD = {
     "negative pressure": (["oring", "--set", "sealed_pressure=-1"], "sealed_pressure = -1"),
     "nan pressure": (["oring", "--set", "sealed_pressure=nan"], "sealed_pressure = NaN"),
     "no tolerance": (["oring", "--tolerance", "small"], 'tolerance = "small"'),
-    "zero tolerance": (["oring", "--tolerance", "0%"], "tolerance = 0"),
+    "zero tolerance": (["oring", "--tolerance", "0%"], "--tolerance: tolerance = 0"),
+    "no tolerance there": (["slider", "--tolerance", "1%"], "--tolerance: unknown key"),
     "uniform tolerance": (
         ["oring", "--tolerance", "1%", "--set", "mesh=uniform"],
         "needs an estimate",
