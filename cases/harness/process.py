@@ -37,7 +37,7 @@ def signals() -> Iterator[None]:
 
 
 class _Stream:
-    """A stream whose reader may leave, as in `softehl run oring | head -1`: the run goes on."""
+    """A stream whose reader may leave, as in `softehl run CASE | head -1`: the run goes on."""
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream
