@@ -7,6 +7,9 @@ import re
 from itertools import groupby
 from typing import Any
 
+from docutils import nodes
+from latex2mathml.converter import convert
+
 import softehl
 
 project = "softehl"
@@ -21,7 +24,9 @@ nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]
 """Types of other packages have no page here; links in the text are checked by MyST."""
 
+myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
+html_math_renderer = "mathml"
 myst_links_external_new_tab = True
 
 autodoc_member_order = "bysource"
@@ -61,6 +66,17 @@ def _as_plain_text(
     lines[:] = result
 
 
+def _inline(writer: Any, node: nodes.math) -> None:
+    writer.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def _display(writer: Any, node: nodes.math_block) -> None:
+    writer.body.append(convert(node.astext(), display="block"))
+    raise nodes.SkipNode
+
+
 def setup(app: Any) -> None:
-    """Sphinx calls this."""
+    """Sphinx calls this; formulas become MathML here, so that no script draws them."""
+    app.add_html_math_renderer("mathml", (_inline, None), (_display, None))
     app.connect("autodoc-process-docstring", _as_plain_text)
