@@ -62,7 +62,8 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 
 docs: $(VENV)/.docs
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	$(BIN)/python -m sphinx -W --keep-going -q -b html -c docs . build/docs
+	@echo build/docs/docs/index.html
 
 pictures: $(VENV)/.kernels
 	$(BIN)/python docs/pictures.py

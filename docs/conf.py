@@ -1,6 +1,6 @@
-"""The pages of this folder as a site: `make docs` writes it to build/docs.
+"""The pages of this folder, and some beside it, as a site: `make docs` writes it to build/docs.
 
-Nothing comes from the network, neither while it is built nor when it is read.
+The source is the whole repository, so that links are the same here and there.  Nothing comes from the network, neither while it is built nor when it is read.
 """
 
 import re
@@ -18,7 +18,9 @@ copyright = "softehl developers, BSD-3-Clause"
 version = release = softehl.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
-exclude_patterns = ["_build", "models"]
+root_doc = "docs/index"
+include_patterns = ["docs/*.md", "benchmarks/README.md", "CONTRIBUTING.md", "CHANGELOG.md"]
+exclude_patterns = [".*", "build", "cases", "codegen", "results", "runtime", "src", "tests"]
 default_role = "literal"
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]

@@ -16,13 +16,20 @@ def test_tables_are_current(page: Path) -> None:
     assert renewed(text) == text, "run `python -m softehl.cases.document`"
 
 
+def table_of(text: str, what: str, name: str) -> str:
+    return text.partition(f"<!-- {what} {name} -->")[2].partition("<!-- end -->")[0]
+
+
 @pytest.mark.parametrize("name", SHIPPED)
-def test_the_columns_of_every_case_are_documented(name: str) -> None:
+def test_columns_and_keys_of_every_case_are_documented(name: str) -> None:
     text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
-    assert f"<!-- columns {name} -->" in text
-    for column in load_case(SHIPPED[name]).row.columns():
-        assert text.count(f"| `{column.name}` |") == 1
+    case = load_case(SHIPPED[name])
+    columns, keys = (table_of(text, what, name) for what in ("columns", "keys"))
+    for column in case.row.columns():
+        assert columns.count(f"| `{column.name}` |") == 1
         assert column.meaning
+    for key in keys_of(case.parameters):
+        assert keys.count(f"| `{key.name}` |") == 1
 
 
 @pytest.mark.parametrize("name", SHIPPED)

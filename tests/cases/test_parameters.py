@@ -1,6 +1,5 @@
 """The parameter set of the O-ring: Table 1, limits, case files and `--set`."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -134,11 +133,3 @@ def test_case_file_and_set(tmp_path: Path) -> None:
 def test_several_complaints_are_counted() -> None:
     with pytest.raises(BadInput, match=r"density = 3: .* \(and 1 more\); allowed: .*1, 2, 4, 8"):
         read_case("oring", SHIPPED, ["density=3", "sealed_pressure=-1", "speeds=[1]"])
-
-
-def test_the_readme_has_the_table_of_keys() -> None:
-    readme = Path(__file__).parents[2].joinpath("README.md").read_text(encoding="utf-8")
-    for key, field in ORing.model_fields.items():
-        default = "-" if field.default is None else f"`{json.dumps(field.default)}`"
-        meaning = str(field.description).replace("|", "&#124;")
-        assert f"| `{key}` | {default} | {meaning} |\n" in readme

@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 import pytest
 
 import softehl
+from tests.docs.pages import Reader, blocks
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("benchmarks/*.md")])
@@ -72,6 +73,29 @@ def test_every_page_is_on_the_front_page() -> None:
     assert listed == {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"}
 
 
+@pytest.mark.parametrize("page", PAGES, ids=is_named)
+def test_pictures_are_small_and_described(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    shown = re.findall(r"!\[([^\]]*)\]\(([^)]+)\)", text)
+    shown += [
+        (alt, name) for name, alt in re.findall(r'<img src="([^"]+)"[^>]* alt="([^"]*)"', text)
+    ]
+    assert text.count("<img ") + text.count("![") == len(shown)
+    for alt, name in shown:
+        assert alt, f"{name} has no words for who cannot see it"
+        assert (page.parent / name).stat().st_size < 150_000, name
+
+
+def test_the_readme_does_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    reader, found = Reader(ROOT / "docs" / "models"), blocks((ROOT / "README.md").read_text())
+    assert [block.kind for block in found] == ["python", "text"]
+    assert found[0].text.count("\n") <= 25
+    for block in found:
+        reader.read(block)
+    assert (tmp_path / "beam.vtu").exists()
+
+
 def test_every_public_name_is_described() -> None:
     page = (ROOT / "docs" / "api.md").read_text()
     described = set(re.findall(r"^\.\. auto\w+:: softehl\.(?:[\w.]+\.)?(\w+)$", page, re.MULTILINE))
@@ -81,13 +105,13 @@ def test_every_public_name_is_described() -> None:
 @pytest.mark.slow
 def test_the_site_needs_nothing_from_elsewhere(tmp_path: Path) -> None:
     pytest.importorskip("sphinx", reason="the extra `docs` is not installed")
-    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", "docs", str(tmp_path)]
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", "-c", "docs", ".", str(tmp_path)]
     subprocess.run(command, cwd=ROOT, check=True, timeout=300)
-    for page in tmp_path.glob("*.html"):
+    for page in tmp_path.rglob("*.html"):
         loaded = re.findall(r"<(?:script|img|link)[^>]*(?:src|href)=\"([^\"]+)\"", page.read_text())
         assert loaded
         assert [name for name in loaded if "//" in name] == []
     found = set(
-        re.findall(r'id="(?:module-)?softehl\.([\w.]+)"', (tmp_path / "api.html").read_text())
+        re.findall(r'id="(?:module-)?softehl\.([\w.]+)"', (tmp_path / "docs" / "api.html").read_text())
     )
     assert set(softehl.__all__) <= {name.rpartition(".")[2] for name in found}
