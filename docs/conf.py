@@ -1,6 +1,7 @@
 """The pages of this folder, and some beside it, as a site: `make docs` writes it to build/docs.
 
-The source is the whole repository, so that links are the same here and there.  Nothing comes from the network, neither while it is built nor when it is read.
+The source is the whole repository, so that links are the same in the site and beside it.  Nothing
+comes from the network, neither while it is built nor when it is read.
 """
 
 import re

@@ -105,13 +105,12 @@ def test_every_public_name_is_described() -> None:
 @pytest.mark.slow
 def test_the_site_needs_nothing_from_elsewhere(tmp_path: Path) -> None:
     pytest.importorskip("sphinx", reason="the extra `docs` is not installed")
-    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", "-c", "docs", ".", str(tmp_path)]
-    subprocess.run(command, cwd=ROOT, check=True, timeout=300)
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", "-c", "docs"]
+    subprocess.run([*command, ".", str(tmp_path)], cwd=ROOT, check=True, timeout=300)
     for page in tmp_path.rglob("*.html"):
         loaded = re.findall(r"<(?:script|img|link)[^>]*(?:src|href)=\"([^\"]+)\"", page.read_text())
         assert loaded
         assert [name for name in loaded if "//" in name] == []
-    found = set(
-        re.findall(r'id="(?:module-)?softehl\.([\w.]+)"', (tmp_path / "docs" / "api.html").read_text())
-    )
+    text = (tmp_path / "docs" / "api.html").read_text()
+    found = set(re.findall(r'id="(?:module-)?softehl\.([\w.]+)"', text))
     assert set(softehl.__all__) <= {name.rpartition(".")[2] for name in found}
