@@ -66,23 +66,30 @@ class _Body:
 
 def _newton(d: Definition, r: Newton) -> list[str]:
     n, first = r.outputs, r.inputs - r.outputs
-    jacobian = [a for row in r.by_local for a in row]
-    body = _Body(d, d.graph, [*r.equations, *jacobian])
+    slopes = [a for rows in (r.by_local, r.by_external) for row in rows for a in row]
+    body = _Body(d, d.graph, [*r.equations, *slopes])
     targets = [*(f"g[{i}]" for i in range(n)), *(f"A[{i}]" for i in range(n * n))]
-    control = r.control
-    close = f"{number(float(control.tolerance))} * ({number(float(control.size))} + fabs(s[k]))"
+    targets += [f"B[{i}]" for i in range(n * first)]
+    control, size = r.control, number(float(r.control.size))
     text = f"""/* {r.name}: {n} local unknowns, at most {control.iterations} Newton steps */
 {_signature(d, r)}{{
     int failed = 0;
-    for (int k = 0; k < {n}; ++k) s[k] = p[{first} + k];
+    const double tolerance = {number(float(control.tolerance))};
+    double before[{n}];
+    for (int k = 0; k < {n}; ++k) s[k] = p[{first} + k], before[k] = HUGE_VAL;
     for (int step = 0; step < {control.iterations}; ++step) {{
-        double g[{n}], A[{n * n}];
+        double g[{n}], A[{n * n}], B[{max(n * first, 1)}];
 {_joined(body.lines(2, targets))}
-        if (failed || softehl_eliminate({n}, A, 1, g)) break;
         int far = 0;
+        for (int i = 0; i < {n}; ++i)
+            far |= softehl_unsolved(
+                g[i], tolerance, {n}, A + {n} * i, s, {first}, B + {first} * i, p);
+        if (failed || softehl_eliminate({n}, A, 1, g)) break;
         for (int k = 0; k < {n}; ++k) {{
             s[k] -= g[k];
-            far |= !(fabs(g[k]) <= {close});
+            const double change = fabs(g[k]), close = tolerance * ({size} + fabs(s[k]));
+            far |= !(change <= close || change > 0.9 * before[k]);
+            before[k] = change;
         }}
         if (!far) return 0;
     }}
@@ -90,7 +97,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
     return 1;
 }}
 """
-    return [_ELIMINATE, *body.before, text]
+    return [_UNSOLVED, _ELIMINATE, *body.before, text]
 
 
 def _inverse(d: Definition, r: Inverse) -> str:
@@ -135,6 +142,21 @@ def _joined(lines: Sequence[str]) -> str:
 
 
 _CONTENT = ("energy", "first derivatives", "first and second derivatives")
+
+_UNSOLVED = """/* Whether an equation g is far from zero: compared with the sum of |slope * value|
+   over the local unknowns and all that comes from outside. */
+static int softehl_unsolved(double g, double tolerance, int n, const double *A, const double *s,
+    int m, const double *B, const double *p)
+{
+    double terms = 0.0;
+    for (int k = 0; k < n; ++k) terms += fabs(A[k] * s[k]);
+    for (int k = 0; k < m; ++k) {
+        const double term = fabs(B[k] * p[k]);
+        if (term < HUGE_VAL) terms += term;
+    }
+    return !(fabs(g) <= tolerance * terms);
+}
+"""
 
 _ELIMINATE = """/* Solve A x = b for `count` columns b in place, with partial pivoting. */
 static int softehl_eliminate(int n, double *A, int count, double *b)

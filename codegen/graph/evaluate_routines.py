@@ -39,6 +39,7 @@ def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
     p, s = args[: r.inputs - r.outputs], args[r.inputs - r.outputs :]
     size = range(len(s))
     h = mpmath.mpf(10) ** (-mpmath.mp.dps // 3)
+    before = mpmath.inf
     for _ in range(200):
         A = mpmath.matrix(len(s), len(s))
         for j in size:
@@ -53,8 +54,12 @@ def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
         except ZeroDivisionError:
             break
         s = [v - step[i] for i, v in enumerate(s)]
-        if max(map(abs, step)) <= mpmath.mpf(10) ** (8 - mpmath.mp.dps) * max(1, *map(abs, s)):
-            return s
+        digits = mpmath.mpf(10) ** (8 - mpmath.mp.dps)
+        changes = [abs(v) for v in step]
+        near = all(c <= digits * abs(v) for c, v in zip(changes, s, strict=True))
+        if near or digits * max(1, *map(abs, s)) >= max(changes) > before / 2:
+            return s  # to its own digits, or to those that rounding leaves
+        before = max(changes)
     return [mpmath.nan] * len(s)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import mpmath
 
 from softehl.codegen.graph.arithmetic import number
-from softehl.codegen.graph.differentiate import gradient
+from softehl.codegen.graph.differentiate import gradient, guarded, plus
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine
 from softehl.codegen.graph.partials import DifferentiationError
 from softehl.codegen.graph.traverse import reachable, substitute
@@ -90,7 +90,11 @@ def place(item: Node) -> int:
 
 @dataclass(frozen=True)
 class Control:
-    """A local iteration ends when no step exceeds tolerance * (size + |s_k|), or fails."""
+    """When a local iteration has found its solution; without, it fails after `iterations` steps.
+
+    Every equation must be below `tolerance` of the sum of |dg_i/dy * y| over all y that enter it,
+    and every step below `tolerance` * (`size` + |s_k|), or smaller no longer: it is rounding then.
+    """
 
     tolerance: Fraction
     size: Fraction
@@ -123,11 +127,20 @@ class Newton(Routine):
         A = [lifted(g, row, s, p) for row in self.by_local]
         B = [lifted(g, row, s, p) for row in self.by_external]
         X = inverse(g, A)
-        size = range(self.outputs)
-        return [
-            [g.neg(_sum(g, [(X[k][i], B[i][j]) for i in size])) for j in range(len(p))]
-            for k in size
-        ]
+        columns = list(zip(*B, strict=True))
+        return [[_contracted(g, [g.neg(x) for x in row], c) for c in columns] for row in X]
+
+
+def _contracted(g: Graph, a: Sequence[Node], b: Sequence[Node]) -> Node:
+    """Sum of a_i b_i, in one branch where the b_i have one: its other side stays unseen."""
+    total = g.zero
+    for x, y in zip(a, b, strict=True):
+        product = guarded(g, x, y)
+        if product.op is Op.NEG and product.args[0].op is Op.BRANCH:
+            c, then, otherwise = product.args[0].args
+            product = g.branch(c, g.neg(then), g.neg(otherwise))
+        total = plus(g, total, product)
+    return total
 
 
 def newton(g: Graph, name: str, local: Local, control: Control) -> Newton:

@@ -40,9 +40,9 @@ class Entries:
         return self.arrange(self.values)
 
 
-def fraction(value: Any) -> Fraction:
-    """An exact number of a model page (a setting, so that a float does as well)."""
+def fraction(value: Any, *, zero: bool = False) -> Fraction:
+    """An exact number > 0 of a model page (a setting, so that a float does as well), or `zero`."""
     number = sp.nsimplify(value, rational=True)
-    if not number.is_Rational or number <= 0:
-        raise ModelError(f"{value} must be a number > 0")
+    if not number.is_Rational or number < 0 or (number == 0 and not zero):
+        raise ModelError(f"{value} must be a number {'>=' if zero else '>'} 0")
     return Fraction(int(number.p), int(number.q))

@@ -113,6 +113,10 @@ class Lowering:
             return self.g.call(Op.EXP, self.g.one)
         if isinstance(e, sp.Float):
             raise ModelError(f"{e} is a rounded number; write an exact one, e.g. Rational(1, 3)")
+        if e in self.bound:  # a name that is written out
+            return self.bound[e]
+        if hasattr(e, "definition"):
+            return self(e.definition)
         for kind, rule in self._rules:
             if isinstance(e, kind):
                 return (yield rule(e))
@@ -129,7 +133,9 @@ class Lowering:
 
     def _symbol(self, e: Any) -> Node:
         if e not in self.bound:
-            raise ModelError(f"symbol {e} is not declared in the model")
+            alike = any(str(e) == str(s) for s in self.bound)
+            hint = ": use the symbol that the model returned" if alike else ""
+            raise ModelError(f"symbol {e} is not declared in the model{hint}")
         return self.bound[e]
 
     def _add(self, e: Any) -> Recursion[Node]:

@@ -28,6 +28,7 @@ from softehl.codegen.language.definition import Argument, Condition, Definition
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import Entries, fraction
 from softehl.codegen.language.lower import Lowering, ModelError, page_line
+from softehl.codegen.language.names import named
 
 __all__ = ["Argument", "Definition", "Model"]
 
@@ -52,6 +53,7 @@ class Model:
         self.doc = " ".join((doc or "").split())
         self.graph = Graph()
         self._bound: dict[sp.Symbol, Node] = {}
+        self._symbols: dict[str, Any] = {}
         self._lower = Lowering(self.graph, self._bound)
         self._coordinates: tuple[str, ...] = ()
         self._unknowns: list[str] = []
@@ -136,9 +138,13 @@ class Model:
             raise ModelError(f"{names[0]}: the element interpolates {self._interpolated} already")
         self._interpolated, self._components = ", ".join(names), 2 * len(names)
         labels = [label for name in names for label in (name, f"{name}_xi")]
-        symbols = [
-            self._input(label, "interpolated", k, varying=True) for k, label in enumerate(labels)
-        ]
+        xi = sp.Symbol("xi", real=True)
+        symbols = []
+        for k, label in enumerate(labels):
+            node = self.graph.input("interpolated", k, varying=True)
+            symbols.append(self._name(label, node, xi, known=False))
+        for p, p_xi in zip(symbols[::2], symbols[1::2], strict=True):
+            p.slope(xi, p_xi)
         self._directions.extend(self._bound[s] for s in symbols)
         return list(zip(symbols[::2], symbols[1::2], strict=True))
 
@@ -258,8 +264,8 @@ class Model:
         if interface:
             self._interface.append(node)
         if derivative is not None:
-            self._given[node] = {self._bound[s]: self._lower(e) for s, e in derivative.items()}
-        return self._bind(name, node)
+            self._given[node] = {self._lower(s): self._lower(e) for s, e in derivative.items()}
+        return self._name(name, node, expression, given=derivative)
 
     def implicit(
         self,
@@ -268,17 +274,18 @@ class Model:
         *,
         start: Any,
         tolerance: float = 1e-10,
-        size: float = 1.0,
+        size: float = 0.0,
         iterations: int = 25,
     ) -> Any:
         """Local unknowns s with equations(s) = 0, found by Newton's method inside the kernel.
 
         `start` is where the iteration begins: a scalar, a list, or a matrix, and s is alike; so is
         what `equations` returns.  Derivatives of s follow from the implicit function theorem,
-        whatever the start.  The iteration ends when a step changes every s_k by no more than
-        `tolerance` (`size` + |s_k|), `size` being the magnitude that matters; the last step is
-        taken, so that the error is of the order of its square.  Without success after `iterations`
-        steps all outputs of the element are not-a-number.
+        whatever the start.  The iteration ends when every equation is solved to `tolerance` of its
+        own terms and a step changes every s_k by no more than `tolerance` (`size` + |s_k|), or by
+        nothing but rounding; `size` is a magnitude of s_k below which it does not matter. The last
+        step is taken, so that the error is of the order of its square.  Without success after
+        `iterations` steps all outputs of the element are not-a-number.
         """
         begin, unknowns = Entries.of(start), Entries.of(start).map(lambda _: sp.Dummy(real=True))
         local = self._placeholders(name, unknowns)
@@ -288,13 +295,16 @@ class Model:
                 f"{name}: {len(found.values)} equations for {len(local)} unknowns; one for each"
             )
         system = localise(self.graph, [self._lower(e) for e in found.values], local)
-        control = Control(fraction(tolerance), fraction(size), iterations)
+        if not (isinstance(iterations, int) and iterations > 0):
+            raise ModelError(f"{name}: iterations = {iterations!r} must be an integer > 0")
+        control = Control(fraction(tolerance), fraction(size, zero=True), iterations)
         routine = newton(self.graph, name, system, control)
         for k in range(len(local)):
             if all(row[k] is self.graph.zero for row in routine.by_local):
                 raise ModelError(f"{name}: unknown {k} does not occur in the equations")
         args = [*system.external, *(self._lower(e) for e in begin.values)]
-        return self._named(name, begin, self.graph.run(routine, args))
+        below = [*found.values, *begin.values]
+        return self._named(name, begin, self.graph.run(routine, args), below)
 
     def principal(self, name: str, C: Any, energy: Callable[[Any, Any, Any], Any]) -> sp.Symbol:
         """An isotropic energy of the principal stretches: energy(lambda_1, lambda_2, lambda_3).
@@ -307,13 +317,15 @@ class Model:
             raise ModelError(f"{name}: C has shape {sp.Matrix(C).shape}, must be (3, 3)")
         squares = Entries([sp.Dummy(positive=True) for _ in range(3)], ("", "", ""), list)
         local = self._placeholders(name, squares)
-        value = self._lower(energy(*(sp.sqrt(c) for c in squares.values)))
+        written = energy(*(sp.sqrt(c) for c in squares.values))
+        value = self._lower(written)
         if not symmetric(value, local):
             raise ModelError(f"{name}: the energy changes when two stretches are exchanged")
         system = localise(self.graph, [value], local)
         routine = isotropic(name, 6 + len(system.external), system.values[0])
         args = [*(self._lower(C[i, j]) for i, j in SYMMETRIC), *system.external]
-        return self._bind(name, self.graph.name(name, self.graph.run(routine, args)[0]))
+        node = self.graph.name(name, self.graph.run(routine, args)[0])
+        return self._name(name, node, [*C, written], known=False)
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Derivatives of a scalar by one named symbol, a list or a matrix of them, e.g. P = dW/dF.
@@ -323,11 +335,12 @@ class Model:
         symbols = Entries.of(by)
         sources = [self._lower(s) for s in symbols.values]
         slopes = gradient(self.graph, self._lower(value), sources, given=self._given)
-        return self._named(name, symbols, [slopes[s] for s in sources])
+        return self._named(name, symbols, [slopes[s] for s in sources], [value, *symbols.values])
 
     def integral(self, name: str, integrand: Any) -> sp.Symbol:
         """Quadrature of `integrand` over the parent element."""
-        return self._bind(name, self.graph.sum(self._lower(integrand * self.weight)))
+        node = self.graph.sum(self._lower(integrand * self.weight))
+        return self._name(name, node, integrand, known=False)
 
     def potential(self, expression: Any, *, constant: Iterable[Any] = ()) -> None:
         """The residual is the gradient of `expression` with the `constant` symbols frozen."""
@@ -450,12 +463,20 @@ class Model:
         self._bound.update(zip(symbols.values, nodes, strict=True))
         return nodes
 
-    def _named(self, name: str, like: Entries, nodes: Sequence[Node]) -> Any:
-        """Symbols for `nodes`, arranged like other values."""
+    def _named(self, name: str, like: Entries, nodes: Sequence[Node], below: list[Any]) -> Any:
+        """Names for `nodes` that depend on `below`, arranged like other values."""
         labels = [name + suffix for suffix in like.suffixes]
-        named = [self.graph.name(s, n) for s, n in zip(labels, nodes, strict=True)]
-        symbols = [self._bind(s, n) for s, n in zip(labels, named, strict=True)]
+        symbols = [
+            self._name(label, self.graph.name(label, n), below, known=False)
+            for label, n in zip(labels, nodes, strict=True)
+        ]
         return Entries(symbols, like.suffixes, like.arrange).shaped()
+
+    def _name(self, label: str, node: Node, value: Any, **how: Any) -> Any:
+        """A name that SymPy differentiates through (`names.named`); the old one for an old node."""
+        found = self._symbols.get(label)
+        symbol = found if found is not None else named(label, value, **how)
+        return self._bind(symbol, node)
 
     def _declare(
         self, array: str, meanings: Mapping[str, str], *, varying: bool = False
@@ -468,14 +489,14 @@ class Model:
 
     def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
         node = self.graph.input(array, index, varying=varying)
-        symbol = self._bind(name, node)
+        symbol = self._bind(sp.Symbol(name, real=True), node)
         if array in ("dofs", "parameters", "data", "point data"):
             self._declared.setdefault(name, (node, page_line()))
         return symbol
 
-    def _bind(self, name: str, node: Node) -> sp.Symbol:
-        symbol = sp.Symbol(name, real=True)
-        if self._bound.get(symbol, node) is not node:
-            raise ModelError(f"the name {name} is used twice in model {self.name}")
+    def _bind(self, symbol: Any, node: Node) -> Any:
+        label = str(symbol)
+        if self._bound.get(self._symbols.setdefault(label, symbol), node) is not node:
+            raise ModelError(f"the name {label} is used twice in model {self.name}")
         self._bound[symbol] = node
         return symbol

@@ -18,11 +18,13 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from softehl.codegen.language import names
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.tools.model_text import ModelFileError, read
@@ -41,6 +43,19 @@ def definitions(path: Path) -> list[Definition]:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
     check_names(path.name, found)
     return found
+
+
+def written_out(path: Path) -> dict[str, Definition]:
+    """The models of a file that is run again, with names as `language.names.Written`.
+
+    A page that loses a dependence through a name, because SymPy took it for a constant, says
+    something else then. Empty where SymPy cannot do with such names what the page asks for.
+    """
+    try:
+        with names.written_out(), redirect_stdout(StringIO()):
+            return {d.name: d for d in definitions(path)}
+    except (ModelFileError, RecursionError):
+        return {}
 
 
 def check_names(where: str, found: Iterable[Definition]) -> None:

@@ -42,10 +42,14 @@ FLOOR = 1e-6
 Vector = list[float]
 
 
-def errors(definition: Definition, tasks: Iterable[str], library: Path) -> dict[str, float]:
+def errors(
+    definition: Definition, tasks: Iterable[str], library: Path, written: Definition | None = None
+) -> dict[str, float]:
     """Largest error of each task of one kernel; NoStateError if no admissible state is found.
 
-    Where the page gives a derivative of its own, only energy and fields can be compared.
+    The oracle walks `written`, the same page with its names written out (`user.written_out`), if
+    there is one. Where the page gives a derivative of its own, only energy and fields can be
+    compared.
     """
     tasks = [t for t in tasks if not definition.given or t in (abi.Task.ENERGY, abi.Task.FIELDS)]
     states = samples.admissible(definition, BATCH)
@@ -58,7 +62,7 @@ def errors(definition: Definition, tasks: Iterable[str], library: Path) -> dict[
             f"{definition.name} cannot be checked: its local iteration finds no solution at random "
             f"states; say where it does, e.g. m.example({samples.suggestion(definition)})"
         )
-    compared = _Compared(definition, states, along, called)
+    compared = _Compared(definition, states, along, called, written or definition)
     return {t: max(map(_finite, compared.errors(t)), default=0.0) for t in tasks}
 
 
@@ -129,10 +133,15 @@ class _Compared:
     """Errors of each task at the compared states."""
 
     def __init__(
-        self, d: Definition, states: Sequence[State], along: Sequence[Vector], called: _Batch
+        self,
+        d: Definition,
+        states: Sequence[State],
+        along: Sequence[Vector],
+        called: _Batch,
+        walked: Definition,
     ) -> None:
         self.d, self.states, self.along, self.called = d, states, along, called
-        self.oracle = Oracle(d)
+        self.oracle = Oracle(walked)
         self.left = _combs(len(along[0]), random.Random(f"{d.name} rows"))
         self.compared = COMPARED if len(along[0]) <= ROWS else COMPARED[:1]
         pairs = [(e, states[e]) for e in self.compared]

@@ -100,12 +100,15 @@ class Recipe:
             m.unknown(str(u))
         m.parameters(k="a parameter")
         m.point()
+        of_model: dict[Any, Any] = {}
         for s, e, interface in (*self.named, *self.inside):
             slope = {UNKNOWNS[0]: self.given} if (s, "given") == (A, self.exception) else None
-            m.define(str(s), e, interface=interface, derivative=slope)
-        m.integral(str(TOTAL), self.integrand)
+            e = e.xreplace(of_model)
+            of_model[s] = m.define(str(s), e, interface=interface, derivative=slope)
+        of_model[TOTAL] = m.integral(str(TOTAL), self.integrand.xreplace(of_model))
         frozen = {"constant": [A], "constant inside": [B]}.get(self.exception, [])
-        m.potential(self.potential, constant=frozen)
+        held = [of_model[s] for s in frozen]
+        m.potential(self.potential.xreplace(of_model), constant=held)
         return m.finish()
 
 

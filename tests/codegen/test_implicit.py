@@ -256,3 +256,85 @@ def test_as_many_equations_as_unknowns() -> None:
         m.implicit("s", lambda s: [s[0] - x], start=[x, x])
     with pytest.raises(ModelError, match="0 must be a number > 0"):
         m.implicit("t", lambda t: t - x, start=x, tolerance=0)
+
+
+# ----------------------------------------------------------------------------------- small unknowns
+
+
+def small(name: str, equation: Callable[..., Any], start: Any, **given: Any) -> Definition:
+    m = one(equation, start=start, name=name, **given)
+    s, x = m.s, sp.Symbol("x", real=True)  # type: ignore[attr-defined]
+    m.potential(s * x)
+    m.fields(s=s)
+    return m.finish()
+
+
+@pytest.mark.parametrize("x", [1e-3, 1e-7, 1e-10, 1e-11, 1e-14, 1e-16])
+def test_unknowns_of_any_size_are_found_to_their_last_digits(tmp_path: Path, x: float) -> None:
+    """Five decades below a tolerance of 1e-10 a first step must not pass for a solution."""
+    k = sp.Rational(10) ** 10
+    d = small("small", lambda s, x: s + k * s**2 - x / 5, start=sp.Symbol("x", real=True))
+    kernel = compiled(d, tmp_path)
+    found = kernel.fields_at(np.zeros((1, 0)), np.array([[x]]))[0, 0, 0]
+    with mpmath.workdps(150):
+        exact = (mpmath.sqrt(1 + mpmath.mpf(4e10) * mpmath.mpf(x) / 5) - 1) / mpmath.mpf(2e10)
+        oracle = Oracle(d).fields(element_state(kernel, (), [x]))[0][0]
+        assert abs(oracle - exact) <= 1e-35 * abs(exact)
+        assert abs(mpmath.mpf(float(found)) - exact) <= 1e-14 * abs(exact)
+    assert max(tangent_errors(d, kernel, (), [x])) <= 1e-13
+
+
+def test_rounding_of_large_terms_ends_the_iteration(tmp_path: Path) -> None:
+    """s is what is left of terms a billion times larger; no step is small compared with it."""
+
+    def equation(s: Any, x: Any) -> Any:
+        return s**3 + s - x - 10**9 * sp.cos(x) + 10**9 * sp.sqrt(1 - sp.sin(x) ** 2)
+
+    d = small("rest", equation, start=0)
+    kernel = compiled(d, tmp_path)
+    u = np.array([[1e-7], [3e-4], [0.1], [0.0]])
+    found = kernel.fields_at(np.zeros((4, 0)), u)[:, 0, 0]
+    assert np.abs(found**3 + found - u[:, 0]).max() <= 5e-7
+
+
+def test_one_factor_is_an_equation(tmp_path: Path) -> None:
+    d = small("factor", lambda s, x: sp.log(s / x) * (2 + s), start=sp.Symbol("x", real=True) * 2)
+    kernel = compiled(d, tmp_path)
+    found = kernel.fields_at(np.zeros((1, 0)), np.array([[3e-9]]))[0, 0, 0]
+    assert abs(found - 3e-9) <= 1e-15 * 3e-9
+
+
+@pytest.mark.parametrize("vector", [False, True])
+def test_a_side_that_is_not_taken_is_cut_out_of_the_derivatives(
+    vector: bool, tmp_path: Path
+) -> None:
+    """A flow rule with the norm of a strain, which has no derivative where the strain is zero."""
+    m = Model("flow", nodes=1, rule=quadrature.point_rule())
+    x, y = m.unknown("x"), m.unknown("y")
+    norm = m.define("norm", sp.sqrt(x**2 + y**2))
+
+    def flow(s: Any, e: Any) -> Any:
+        return sp.Piecewise((s + s**3 - e * (1 - 1 / (2 * norm)), norm > 1), (s - e / 10, True))
+
+    if vector:
+        a, b = m.implicit("s", lambda s: [flow(s[0], x), flow(s[1], y)], start=[x, y])
+    else:
+        a = b = m.implicit("s", lambda s: flow(s, x), start=x)
+    m.potential(x**2 + y**2 + a * x + b * y)
+    d = m.finish()
+    kernel = compiled(d, tmp_path)
+    for u in ([0.0, 0.0], [0.3, 0.2], [2.0, 1.0]):
+        assert max(tangent_errors(d, kernel, (), u)) <= 1e-14
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"size": -1}, "-1 must be a number >= 0"),
+        ({"iterations": 0}, "iterations = 0 must be an integer > 0"),
+        ({"iterations": 2.5}, "iterations = 2.5 must be an integer > 0"),
+    ],
+)
+def test_settings_of_the_iteration_are_checked(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        one(lambda s, x: s - x, name="set", **given)

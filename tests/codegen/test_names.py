@@ -1,0 +1,196 @@
+"""Names of a page under SymPy's own calculus: followed, or refused; a blind page is found out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sympy as sp
+
+from softehl.codegen.language import model as language
+from softehl.codegen.language import names
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.model import Model
+from softehl.codegen.tools import files, user
+
+x = sp.Symbol("x", real=True)
+PLAIN = ((1 + x) ** 2, (1 + x) ** 3)
+"""J and K of the page below without names."""
+
+
+class Page:
+    """lam = 1 + x, J = lam^2, K = J lam, and what is made of them."""
+
+    def __init__(self) -> None:
+        self.m = Model("page", nodes=1, rule=quadrature.gauss(2, 1))
+        self.x = self.m.unknown("x")
+        self.lam = self.m.define("lam", 1 + self.x)
+        self.J = self.m.define("J", self.lam**2)
+        self.K = self.m.define("K", self.J * self.lam)
+        self.W = self.K**2 / self.J + sp.Piecewise((self.J, self.J > 1), (self.K, True)) + self.lam
+
+
+def number(e: Any, at: float = 0.75) -> float:
+    """Value of an expression at x."""
+    return float(e.subs(x, sp.Rational(at)))
+
+
+@pytest.fixture(params=[False, True], ids=["names", "written out"])
+def page(request: pytest.FixtureRequest) -> Iterator[Page]:
+    """Both kinds of names."""
+    if not request.param:
+        yield Page()
+        return
+    with names.written_out():
+        yield Page()
+
+
+LAM = sp.Symbol("l", positive=True)
+W = LAM**4 + LAM**2 + LAM  # the branch that is taken
+
+
+@pytest.mark.parametrize(
+    ("calculus", "expected"),
+    [
+        (lambda p: sp.diff(p.W, p.lam), sp.diff(W, LAM)),
+        (lambda p: sp.diff(p.W, p.x), sp.diff(W, LAM)),
+        (lambda p: sp.diff(p.W, p.lam, 2), sp.diff(W, LAM, 2)),
+        (lambda p: sp.Derivative(p.W, p.lam).doit(), sp.diff(W, LAM)),
+        (lambda p: sp.Matrix([p.W]).jacobian([p.lam])[0], sp.diff(W, LAM)),
+        (lambda p: sp.hessian(p.W, [p.lam])[0], sp.diff(W, LAM, 2)),
+        (lambda p: sp.Matrix([p.W]).diff(p.lam)[0], sp.diff(W, LAM)),
+        (lambda p: p.W.subs(p.lam, 2), sp.Integer(22)),
+        (lambda p: p.W.subs(p.x, 1), sp.Integer(22)),
+        (lambda p: p.W.subs({p.lam: 2}, simultaneous=True), sp.Integer(22)),
+        (lambda p: p.W.xreplace({p.lam: sp.Integer(2)}), sp.Integer(22)),
+    ],
+)
+def test_calculus_sees_through_names(
+    calculus: Callable[[Page], Any], expected: Any, page: Page
+) -> None:
+    right = float(expected.subs(LAM, sp.Rational(7, 4)))
+    assert number(calculus(page)) == pytest.approx(right, rel=1e-14)
+
+
+def test_what_is_not_below_a_name_is_a_constant_of_it() -> None:
+    p = Page()
+    y = p.m.unknown("y")
+    assert sp.diff(p.J * y, y) == p.J
+    assert sp.diff(p.lam, p.J) == 0
+    assert sp.diff(p.J, p.J) == 1
+
+
+def test_a_given_derivative_is_the_derivative() -> None:
+    p = Page()
+    held = p.m.define("held", p.x**2, derivative={p.x: 5 * p.x})
+    assert sp.diff(held * p.x, p.x) == held + 5 * p.x**2
+    with pytest.raises(ModelError, match=r"test_names.py:\d+: x is replaced in held, a name"):
+        (held + 1).subs(p.x, 2)
+
+
+@pytest.mark.parametrize(
+    ("calculus", "message"),
+    [
+        (lambda p, s: sp.diff(s * p.x, p.x), r"use m.derivative\(name, value, x\)"),
+        (lambda p, s: sp.Matrix([s]).jacobian([p.lam]), r"use m.derivative\(name, value, lam\)"),
+        (lambda p, s: (s + p.J).subs(p.x, 1), "x is replaced in s, a name through which"),
+        (lambda p, s: s.xreplace({p.lam: p.x}), "lam is replaced in s, a name through which"),
+        (lambda p, s: p.W.replace(p.lam, 2), "lam is looked for in J.*use subs, not replace"),
+        (lambda p, s: p.x + sp.Symbol("J", real=True), "use the symbol that the model returned"),
+    ],
+)
+def test_what_cannot_be_followed_is_refused_with_its_line(
+    calculus: Callable[[Page, Any], Any], message: str
+) -> None:
+    p = Page()
+    s = p.m.implicit("s", lambda s: s**3 + s - p.lam, start=p.x)
+    with pytest.raises(ModelError, match=rf"test_names.py:\d+: .*{message}|{message}"):
+        p.m.define("made", calculus(p, s))
+
+
+def test_implicit_names_refuse_also_through_other_names() -> None:
+    p = Page()
+    s = p.m.implicit("s", lambda s: s**3 + s - p.lam, start=p.x)
+    t = p.m.define("t", s**2)
+    with pytest.raises(ModelError, match="derivative by x meets s"):
+        sp.diff(t, p.x)
+    assert sp.diff(t, s) == 2 * s
+
+
+def test_names_of_two_models_are_different() -> None:
+    """SymPy remembers derivatives of equal expressions: names of equal labels must not be equal."""
+    one, two = Page(), Page()
+    other = two.m.define("other", two.lam**5)
+    mine = one.m.define("other", one.lam**4)
+    assert sp.diff(mine, one.lam) == 4 * one.lam**3
+    assert sp.diff(other, two.lam) == 5 * two.lam**4
+    with pytest.raises(ModelError, match="symbol other is not declared in the model: use the"):
+        one.m.define("mixed", other)
+
+
+def test_a_chain_of_many_names_is_differentiated() -> None:
+    m = Model("chain", nodes=1, rule=quadrature.point_rule())
+    a = u = m.unknown("u")
+    for k in range(500):
+        a = m.define(f"a_{k}", a + u / 500)
+    assert number(sp.diff(a, u).subs(u, x)) == pytest.approx(2.0)
+
+
+def test_the_slope_of_an_interpolated_field() -> None:
+    m = Model("film", nodes=2, rule=quadrature.gauss(2, 1))
+    p, p_xi = m.interpolated("p")
+    (xi,) = m.point()
+    assert sp.diff(p**2, xi) == 2 * p * p_xi
+    with pytest.raises(ModelError, match="derivative by xi meets p_xi"):
+        sp.diff(p_xi, xi)
+
+
+# --------------------------------------------------------------------------- the check of a page
+
+BAR = """
+import sympy as sp
+from softehl import Definition, Model, quadrature
+
+def bar() -> Definition:
+    m = Model("bar", nodes=2, rule=quadrature.gauss(2, 1), unroll=True, doc="A bar.")
+    (X,) = m.coordinates("X")
+    (u,) = m.nodal_unknowns("u")
+    (mu,) = m.parameters(mu="modulus")
+    L = m.define("L", X[1] - X[0])
+    lam = m.define("lam", 1 + (u[1] - u[0]) / L)
+    I1 = m.define("I1", lam**2 + 2 / lam)
+    W = mu * (I1 + lam**3 - 4) / 2
+    m.weak_form([(sp.diff(W, lam) * L / 2, lam)])
+    return m.finish()
+"""
+
+
+def test_the_check_reads_a_page_with_its_names_written_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With symbols to which SymPy is blind the page is wrong, and its oracle must not be."""
+    path = tmp_path / "bar.py"
+    path.write_text(BAR)
+    monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "right"))
+    assert files.generate([path]) == 0
+
+    def blind(label: str, value: Any, **how: Any) -> Any:
+        seen = names._WRITTEN.get()
+        return names.named(label, value, **how) if seen else sp.Symbol(label, real=True)
+
+    monkeypatch.setattr(language, "named", blind)
+    monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "wrong"))
+    assert files.generate([path]) == 1
+    printed = capsys.readouterr().err
+    assert "bar: residual is off by" in printed
+    assert "bar: tangent is off by" in printed
+
+
+def test_a_page_that_cannot_be_written_out_is_compared_with_itself(tmp_path: Path) -> None:
+    path = tmp_path / "odd.py"
+    path.write_text(BAR.replace("W = mu", "I1.name\n    W = mu"))
+    assert user.written_out(path) == {}
+    assert [d.name for d in user.definitions(path)] == ["bar"]
