@@ -248,6 +248,8 @@ class Assembler:
         if self.memo.reach is None:
             reach = np.zeros(self.size)
             for block in self.blocks:
+                if not np.size(block.coordinates):
+                    continue  # its kernel has none
                 flat = np.abs(block.coordinates).reshape(len(block.dofs), -1)
                 largest = flat.max(axis=1, initial=0.0)
                 np.maximum.at(reach, block.dofs, largest[:, None])

@@ -70,6 +70,12 @@ def require_sound_elements(block: ElementBlock) -> None:
 
     Elements are looked at whose kernel integrates over their volume (in the plane: their area).
     """
+    n = len(block.dofs)
+    if np.size(block.coordinates) and len(block.coordinates) != n:
+        raise ProblemError(
+            f"block {block.name!r} has coordinates of {len(block.coordinates)} elements and dofs "
+            f"of {n}"
+        )
     for what, numbers in (("coordinates", block.coordinates), ("data", block.data)):
         wrong = ~np.isfinite(np.asarray(0.0 if numbers is None else numbers, dtype=np.float64))
         if wrong.any():
@@ -138,6 +144,8 @@ def _shown(place: Array) -> str:
 def not_finite(block: ElementBlock, *results: Array) -> str:
     """The first element of a block with a result, (n, ...), that is not finite; empty if none."""
     n = len(block.dofs)
+    if not n:
+        return ""
     wrong: Flags = np.zeros(n, dtype=bool)
     for result in results:
         wrong |= ~np.isfinite(result.reshape(n, -1)).all(axis=1)

@@ -178,6 +178,28 @@ def test_the_sections_of_the_seal_are_sound() -> None:
     assert {"solid", "film", "rod", "rotation"} <= kinds
 
 
+def test_a_block_without_elements_or_coordinates_is_none_the_worse() -> None:
+    p = problem()
+    mesh, (solid, pull) = ring()
+    none = replace(solid, name="none", coordinates=np.empty((0, 8)), dofs=solid.dofs[:0])
+    bare = replace(pull, coordinates=np.empty(0))
+    more = replace(
+        p,
+        assembler=Assembler.build(2 * len(mesh.points), [solid, bare, none]),
+        parameters={**p.parameters, "none": SOLID},
+    )
+    assert solved(more) == pytest.approx(solved(p), rel=1e-12)
+    assert "element" in more.where_not_finite(np.full(50, np.nan))
+
+
+def test_sizes_that_do_not_fit_are_named() -> None:
+    solid = ring()[1][0]
+    with pytest.raises(ProblemError, match="coordinates of 15 elements and dofs of 16"):
+        Assembler.build(50, [replace(solid, coordinates=solid.coordinates[1:])])
+    with pytest.raises(ProblemError, match="the layout has 48 unknowns, the assembler 50"):
+        problem(layout=DofLayout.of(displacement=48))
+
+
 # --- unknowns that nothing determines ------------------------------------------------------------
 
 
