@@ -62,7 +62,10 @@ class Trial:
             check=False,
         )
         seconds = time.perf_counter() - start
-        shown = " ".join(Path(word).name if "/" in word else word for word in command)
+        words = (
+            [title] if "-c" in command else [Path(w).name if w[0] == "/" else w for w in command]
+        )
+        shown = " ".join(words)
         self.rows.append((title, shown, seconds))
         print(f"{seconds:7.1f} s  {title}: {shown}", flush=True)
         told = done.stdout + done.stderr
