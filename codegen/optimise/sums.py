@@ -13,15 +13,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import combinations
 
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.traverse import reachable
-
-Row = dict[Node, int]
-"""A signed sum: term -> +1 or -1."""
-Pair = tuple[int, int, int]
-"""Ids of two terms, the smaller first, and the sign of the second relative to the first."""
+from softehl.codegen.optimise.pairs import Row, build, insert, share
 
 
 def common_sums(g: Graph, roots: list[Node]) -> list[Node]:
@@ -140,7 +135,7 @@ class _Plan:
                     pieces.append((size, self._row(one)))
                 else:
                     for value, sign in one.items():
-                        _insert(self.g, rest, value, sign)
+                        insert(self.g, rest, value, sign)
             else:
                 pieces.append((size, self._row(row)))
         if rest:
@@ -153,8 +148,8 @@ class _Plan:
 
     def solve(self) -> dict[Node, Node]:
         """Values of the sums that were added."""
-        self._share()
-        values = [self._build(row) for row in self.rows]
+        share(self.g, self.rows)
+        values = [build(self.g, row) for row in self.rows]
         out: dict[Node, Node] = {}
         for n, pieces in self.pieces.items():
             total = self.g.zero
@@ -163,59 +158,3 @@ class _Plan:
             out[n] = total
         self.rows, self.pieces = [], {}
         return out
-
-    def _share(self) -> None:
-        """Replace the most frequent pair of terms by one value until no pair is shared."""
-        count: Counter[Pair] = Counter()
-        where: dict[Pair, set[int]] = {}
-        nodes: dict[int, Node] = {}
-
-        def note(k: int, pairs: list[Pair], by: int) -> None:
-            for p in pairs:
-                count[p] += by
-                (where.setdefault(p, set()).add if by > 0 else where[p].discard)(k)
-
-        for k, row in enumerate(self.rows):
-            nodes.update({n.id: n for n in row})
-            note(k, _pairs(row), 1)
-        while count:
-            best = max(count, key=lambda p: (count[p], -max(p[0], p[1]), -p[0], p[2]))
-            if count[best] < 2:
-                return
-            a, b, sign = nodes[best[0]], nodes[best[1]], best[2]
-            value = self.g.add(a, b) if sign > 0 else self.g.sub(a, b)
-            lead = 1
-            if value.op is Op.NEG:
-                value, lead = value.args[0], -1
-            nodes[value.id] = value
-            for k in sorted(where[best]):
-                row = self.rows[k]
-                note(k, _pairs(row), -1)
-                s = row.pop(a)
-                row.pop(b)
-                _insert(self.g, row, value, s * lead)
-                note(k, _pairs(row), 1)
-            count += Counter()
-            count.pop(best, None)
-
-    def _build(self, row: Row) -> Node:
-        total = self.g.zero
-        for n, s in sorted(row.items(), key=lambda t: (t[0].varying, -t[1], t[0].id)):
-            total = self.g.add(total, n) if s > 0 else self.g.sub(total, n)
-        return total
-
-
-def _insert(g: Graph, row: Row, value: Node, sign: int) -> None:
-    """Add a term to a signed sum; equal terms combine."""
-    if value not in row:
-        row[value] = sign
-    elif row[value] == sign:
-        row.pop(value)
-        _insert(g, row, g.mul(g.const(2), value), sign)
-    else:
-        row.pop(value)
-
-
-def _pairs(row: Row) -> list[Pair]:
-    items = sorted(((n.id, s) for n, s in row.items()))
-    return [(i, j, s * t) for (i, s), (j, t) in combinations(items, 2)]
