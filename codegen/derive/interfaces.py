@@ -34,6 +34,7 @@ LIMIT = 64
 def degrees(roots: Iterable[Node], sources: Collection[Node]) -> dict[Node, int]:
     """0: independent of `sources`, 1: affine in them, 2: anything else."""
     degree: dict[Node, int] = {}
+    sources = frozenset(sources)
     for n in reachable(roots):
         inner = [degree[a] for a in n.args]
         if n in sources:

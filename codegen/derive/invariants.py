@@ -39,6 +39,7 @@ def degrees(
 ) -> dict[Node, float]:
     """Degree of every value below `roots` as a polynomial in the forms `linear`; inf: is none."""
     degree: dict[Node, float] = {}
+    linear, constant = frozenset(linear), frozenset(constant)
     for n in reachable(roots):
         inner = [degree[a] for a in n.args]
         if n in linear:

@@ -42,18 +42,19 @@ class Linearisation:
         self._depends = Dependence(tuple(self.directions), self.constant, self.given)
         self._adjoint_of = {z: a for a, z in self.symmetric.items()}
         self._points = [j for j, d in enumerate(self.directions) if d.varying]
+        self._interface, self._ends_in = frozenset(self.interface), frozenset(self.directions)
         self._level = {n: k for k, w in enumerate((self.interface, *self.upper)) for n in w}
 
     def derivative(self, n: Node, j: int) -> Node:
         """dn/d(direction j).  Varies when `n` or the direction does (then: of the summand)."""
-        if n.varying and n not in self.interface:
+        if n.varying and n not in self._interface:
             return recursion(self._over(self.local(n), j))
         return recursion(self._total(n, j))
 
     def _total(self, n: Node, j: int) -> Recursion[Node]:
         if n is self.directions[j]:
             return self.g.one
-        if not self._depends(n) or n in self.directions:
+        if not self._depends(n) or n in self._ends_in:
             return self.g.zero
         key = (n, j)
         if key not in self._totals:
@@ -109,7 +110,7 @@ class Linearisation:
 
     def _is_key(self, n: Node, level: int) -> bool:
         own = self._level.get(n)
-        return not n.varying or n in self.directions or (own is not None and own <= level)
+        return not n.varying or n in self._ends_in or (own is not None and own <= level)
 
     def _compute_local(self, n: Node, level: int) -> dict[Node, Node]:
         g = self.g

@@ -28,7 +28,7 @@ LATENCY = {Op.RECIP: 26, Op.RCBRT: 60, Op.CBRT: 60, Op.SQRT: 40, Op.LOG: 100, Op
 """Half cycles (two pieces start in a cycle) until a result is there."""
 USUAL_LATENCY = 8
 LONGEST_WAIT = 12
-CANDIDATES = 1_500_000
+CANDIDATES = 1_000_000
 """Pieces that are compared in all: in very long code only those written first are candidates."""
 
 # What a piece costs, in operands fetched: measured on the solids of `models`.

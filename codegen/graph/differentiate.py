@@ -29,6 +29,9 @@ class Dependence:
     given: Given = field(default_factory=dict)
     _known: dict[Node, bool] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self.sources, self.constant = frozenset(self.sources), frozenset(self.constant)
+
     def __call__(self, n: Node) -> bool:
         known = self._known
         stack = [] if n in known else [n]
@@ -64,7 +67,7 @@ def gradient(
     For a node that varies with the quadrature point the adjoint is that of the summand: it is
     to be contracted with the node's own dependence and summed by the caller.
     """
-    sweep = _Reverse(g, Dependence(tuple(wrt), constant, given or {}), named=named)
+    sweep = _Reverse(g, Dependence(tuple(wrt), constant, given or {}), named=frozenset(named))
     adjoint = sweep.run(root)
     return {**dict.fromkeys(wrt, g.zero), **adjoint}
 
@@ -124,7 +127,7 @@ class _Reverse:
         frontier = [m for m in reachable([then, otherwise], stop=leaf) if leaf(m)]
         frontier = [m for m in frontier if self.depends(m)]
         sides = [
-            _Reverse(self.g, self.depends, flat=True, stop=frontier).run(side)
+            _Reverse(self.g, self.depends, flat=True, stop=frozenset(frontier)).run(side)
             for side in (then, otherwise)
         ]
         zero = self.g.zero
