@@ -3,6 +3,7 @@
 from typing import Any
 
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.state import FilmRow
 
 
 def oring(**changes: Any) -> ORing:
@@ -16,3 +17,8 @@ def oring(**changes: Any) -> ORing:
         **changes,
     }
     return ORing(**values)
+
+
+def film_values(**given: Any) -> dict[str, Any]:
+    """The columns of a made-up row: what is given, and zeros."""
+    return {**{column.name: column.kind() for column in FilmRow.columns()}, **given}

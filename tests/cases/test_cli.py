@@ -8,6 +8,7 @@ import multiprocessing
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ from softehl.cases.seal.telling import Teller
 from softehl.runtime.kernels import MissingKernelsError
 from softehl.runtime.library import library_of
 from softehl.runtime.solve.solution import Status
+from tests.cases.oring_cases import film_values
 
 HEADER = (
     "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_star_error_percent,h_min_um,p_max_MPa,"
@@ -87,25 +89,24 @@ def section() -> Section:
 def film_state(parameters: ORing, speed: float, verdict: str = OK) -> FilmState:
     x = np.linspace(-1.0, 1.0, 5)
     h_star = abs(speed) ** 0.5 / 10
-    return FilmState(
+    values = film_values(
         sealed_pressure_MPa=parameters.sealed_pressure,
         rod_speed_mm_s=speed,
         h_star_um=h_star,
+        h_star_error_percent=nan,
         h_min_um=0.8 * h_star,
         p_max_MPa=4.0,
-        pressure_jump_max_MPa=0.0,
         rod_friction_N=3.0,
         leak_rate_mm3_s=speed * h_star,
         contact_start_mm=-0.9,
         contact_end_mm=0.8,
         newton_iterations=5,
-        flux_variation=1e-12,
-        moment_N_mm=7.0,
         contact_p_max_MPa=4.1,
-        oscillation_index=0.01,
-        inlet_segments=4.2,
         density=parameters.density,
         verdict=verdict,
+    )
+    return FilmState(
+        **values,
         advice="" if verdict == OK else "Use a finer mesh.",
         profile=Profile(x, h_star + 50 * x**2, 4 - 4 * x**2, 0.01 * x, h_star * speed + 0 * x),
         section=section(),

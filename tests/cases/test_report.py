@@ -21,33 +21,30 @@ from softehl.cases.seal.report.curve import curve_figure, fitted_exponent, plain
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import View, boundary_edges, section_figure, von_mises
 from softehl.cases.seal.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
+from tests.cases.oring_cases import film_values
 
 SEAL = ORing()
 SPEEDS = (100.0, 400.0, 1600.0)
 
 
 def row(speed: float, h_star: float, error: float = 0.5, verdict: str = OK) -> FilmRow:
-    return FilmRow(
+    values = film_values(
         sealed_pressure_MPa=1.0,
         rod_speed_mm_s=speed,
         h_star_um=h_star,
         h_star_error_percent=error,
         h_min_um=0.8 * h_star,
         p_max_MPa=3.7,
-        pressure_jump_max_MPa=0.0,
         rod_friction_N=9.0,
         leak_rate_mm3_s=400.0,
         contact_start_mm=-0.6,
         contact_end_mm=1.1,
         newton_iterations=9,
-        flux_variation=1e-12,
-        moment_N_mm=7.0,
         contact_p_max_MPa=3.7,
-        oscillation_index=0.01,
-        inlet_segments=9.0,
         density=2,
         verdict=verdict,
     )
+    return FilmRow(**values)
 
 
 def power_law(exponent: float) -> list[FilmRow]:
