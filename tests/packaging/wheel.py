@@ -2,8 +2,8 @@
 
     python -m tests.packaging.wheel          (what `make wheel` calls; about five minutes)
 
-Everything happens in a temporary folder outside the tree.  The commands run with a compiler (twice:
-the first use tunes the kernels) and without one on the PATH; the table shows their seconds.  Exit
+Everything happens in a temporary folder outside the tree.  The commands run with a compiler (some
+twice: the first use tunes the kernels) and without one on the PATH; their seconds are shown.  Exit
 code 1 and one line for each expectation that is not met.
 """
 
@@ -30,11 +30,10 @@ KERNELS = ("kernels",)
 
 
 class Trial:
-    """Commands that are run, their seconds, and what was not as it must be."""
+    """Commands that are run in a folder, and what was not as it must be."""
 
     def __init__(self, place: Path) -> None:
         self.place = place
-        self.rows: list[tuple[str, str, float]] = []
         self.wrong: list[str] = []
 
     def expect(self, holds: bool, message: str) -> None:
@@ -62,11 +61,9 @@ class Trial:
             check=False,
         )
         seconds = time.perf_counter() - start
-        words = (
-            [title] if "-c" in command else [Path(w).name if w[0] == "/" else w for w in command]
-        )
-        shown = " ".join(words)
-        self.rows.append((title, shown, seconds))
+        shown = " ".join(Path(w).name if w[0] == "/" else w for w in command)
+        if "-c" in command:
+            shown = title
         print(f"{seconds:7.1f} s  {title}: {shown}", flush=True)
         told = done.stdout + done.stderr
         self.expect(done.returncode == code, f"{shown} ends with {done.returncode}: {told[-2000:]}")
