@@ -71,9 +71,11 @@ and `d_NAME` of a family become functions `softehl_NAME_TASK_ufcx` of UFCx's typ
 | `custom_data`            |                    | not read, may be NULL                          |
 
 Vertices, and with them the nodal unknowns in `w` and the rows and columns of `A`, stand in the
-order of DOLFINx (basix): `VERTEX_ORDER` says which of its vertices each node of the model is.
-A quadrilateral runs around in a model and in tensor-product order in DOLFINx.  The components of
-one node stay neighbours, as in a blocked element; unknowns that belong to no node follow.
+order of DOLFINx (basix): `VERTEX_ORDER` says which node of its Lagrange element each node of the
+model is; a model with other nodes is refused.  A quadrilateral runs around in a model and in
+tensor-product order in DOLFINx.  Quadratic elements need a mesh whose geometry is quadratic, too.
+The components of one node stay neighbours, as in a blocked element; unknowns that belong to no
+node follow.
 """
 
 from __future__ import annotations
@@ -99,8 +101,27 @@ class Target(StrEnum):
     UFCX = "ufcx"
 
 
-VERTEX_ORDER = {(4, 2): (0, 1, 3, 2), (8, 3): (0, 1, 3, 2, 4, 5, 7, 6)}
-"""DOLFINx vertex of each node, by (nodes, parent dimension); the same number where not listed."""
+_HEX8 = (0, 1, 3, 2, 4, 5, 7, 6)
+VERTEX_ORDER = {
+    (1, 0): (0,),
+    (2, 0): (0, 1),
+    (2, 1): (0, 1),
+    (3, 1): (0, 1, 2),
+    (3, 2): (0, 1, 2),
+    (6, 2): (0, 1, 2, 5, 3, 4),
+    (4, 2): (0, 1, 3, 2),
+    (9, 2): (0, 1, 3, 2, 4, 6, 7, 5, 8),
+    (4, 3): (0, 1, 2, 3),
+    (10, 3): (0, 1, 2, 3, 9, 6, 8, 7, 5, 4),
+    (6, 3): (0, 1, 2, 3, 4, 5),
+    (8, 3): _HEX8,
+    (27, 3): (*_HEX8, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 15, 14, 22, 23, 21, 24, 20, 25, 26),
+}
+"""Node of basix's Lagrange element for each node, by (nodes, parent dimension): all there are.
+
+The nodes are in the order of `language.elements.cells`. The elements quad8 and hex20 have no
+counterpart: basix knows their functions, but not by values at nodes.
+"""
 
 
 def derivative_task(name: str) -> str:

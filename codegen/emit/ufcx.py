@@ -34,6 +34,12 @@ def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
             f"{d.name} has local unknowns, stretches or data per point, which target ufcx cannot "
             "hold: use simd or scalar"
         )
+    if (d.nodes, d.rule.dimension) not in abi.VERTEX_ORDER:
+        known = ", ".join(f"{n} in {k}-D" for n, k in abi.VERTEX_ORDER)
+        raise TargetError(
+            f"{d.name} has {d.nodes} nodes and a rule in {d.rule.dimension}-D; DOLFINx has "
+            f"Lagrange elements of as many nodes as {known}: choose one of them, or use simd or scalar"
+        )
     return [t for t in offered if t not in (abi.Task.FIELDS, abi.Task.PRODUCT)]
 
 
@@ -44,7 +50,7 @@ def chosen(entries: Sequence[Entry], task: str) -> list[Entry]:
 
 def vertices(d: Definition) -> tuple[int, ...]:
     """DOLFINx vertex of each node of the model."""
-    return abi.VERTEX_ORDER.get((d.nodes, d.rule.dimension), tuple(range(d.nodes)))
+    return abi.VERTEX_ORDER[d.nodes, d.rule.dimension]
 
 
 def places(d: Definition) -> list[int]:
