@@ -366,6 +366,27 @@ void softehl_mean_rotation_tangent(
     const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent);
+void softehl_mean_axial_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_mean_axial_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_mean_axial_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
 void softehl_axial_spring_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,

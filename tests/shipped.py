@@ -25,6 +25,7 @@ SHIPPED = {
     "film_upwind": Shipped(2, 4),
     "film_facet": Shipped(3, 6, fields=True),
     "mean_rotation": Shipped(4, 9, energy=True),
+    "mean_axial": Shipped(4, 9, energy=True),
     "axial_spring": Shipped(4, 8, energy=True),
 }
 ENERGIES = tuple(name for name, s in SHIPPED.items() if s.energy)
@@ -48,6 +49,8 @@ VALUES = {
     "polar_moment": 7.6,
     "angle": 0.05,
     "stiffness": 0.4,
+    "area": 9.8,
+    "place": 0.04,
     "shear_modulus": 3.66,
     "upwinding": 1.0,
 }

@@ -1,43 +1,80 @@
-"""Contact stages of the path: the section is squeezed, then loaded by the sealed pressure.
+"""Contact stages of the path: squeezed, pushed against a wall, loaded by the sealed pressure.
 
-The rod is held 10 micrometres off, where the film will be.
+The rod is held 10 micrometres off, where the film will be. Rod and housing start where they just
+touch the free section, also where the rod then stretches it. What holds the section axially is a
+multiplier on its mean displacement: in the middle of the groove until there is a pressure; then it
+pushes the section against the wall of the air side a little, and fades as the pressure rises.
+Without a pressure it stays, as friction on the housing would, and its force is reported.
 """
 
 from __future__ import annotations
 
+from math import pi
+
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import ContactLoads
+from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
-from softehl.cases.seal.system import BORE, ROD
+from softehl.cases.seal.system import AIR_WALL, BORE, ROD, SEALED_WALL
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.newton import Corrector, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
 
+WEDGED = 2
+"""Nodes that touch each wall where the groove holds the section without help."""
 
-def squeeze_problem(system: SealSystem, settings: PathSettings, closed: float) -> Problem:
+
+def held_place(p: ORing) -> float | None:
+    """Mean axial displacement (mm) at which contact and film hold a section, None if it is free.
+
+    With the arc of the paper's scheme it is free: the walls of a narrow groove hold it.
+    """
+    return 0.0 if p.sealed_pressure == 0.0 and p.given_arc is None else None
+
+
+def squeeze_problem(
+    system: SealSystem, settings: PathSettings, closed: float, place: float | None = 0.0
+) -> Problem:
     """Rod and housing on their way from touching the free section (0) to their radii (1), p_s = 0.
 
-    A weak axial spring holds the section until the walls do; it is gone at 1.
+    place: mean axial displacement at which the section is held, mm.
+    """
+    rod_gap, housing_gap = _ways(system.parameters)
+    offsets = {
+        ROD: closed * settings.offset + (1.0 - closed) * rod_gap,
+        BORE: (1.0 - closed) * housing_gap,
+    }
+    return system.contact_problem(ContactLoads(offsets=offsets, place=place))
+
+
+def _ways(p: ORing) -> tuple[float, float]:
+    """How far rod and housing move from where they touch the free section, mm, + = outwards."""
+    rod = 0.5 * (p.inner_diameter - p.rod_diameter)
+    return rod, 0.5 * (p.housing_diameter - p.inner_diameter) - p.section_diameter
+
+
+def contact_problem(
+    system: SealSystem, settings: PathSettings, sealed_pressure: float, force: float = 0.0
+) -> Problem:
+    """Frictionless contact under a sealed pressure, the rod where the contact stage holds it.
+
+    force: that pushes the section to the air side, N, where it is not held.
+    """
+    place = held_place(system.parameters)
+    loads = ContactLoads(sealed_pressure, {ROD: settings.offset}, place, force)
+    return system.contact_problem(loads)
+
+
+def squeeze_stage(system: SealSystem, settings: PathSettings, cut: float = 1.0) -> Stage:
+    """First stage, without pressure: from the undeformed section into the groove.
+
+    cut: factor on the first step.
     """
     p = system.parameters
-    rod_gap = 0.5 * (p.inner_diameter - p.rod_diameter)
-    housing_gap = 0.5 * (p.housing_diameter - p.inner_diameter) - p.section_diameter
-    offsets = {
-        ROD: closed * settings.offset + (1.0 - closed) * max(rod_gap, 0.0),
-        BORE: (1.0 - closed) * min(housing_gap, 0.0),
-    }
-    spring = settings.spring if closed < 1.0 else 0.0
-    return system.contact_problem(ContactLoads(offsets=offsets, spring=spring))
-
-
-def contact_problem(system: SealSystem, settings: PathSettings, sealed_pressure: float) -> Problem:
-    """Frictionless contact under a sealed pressure, the rod where the contact stage holds it."""
-    return system.contact_problem(ContactLoads(sealed_pressure, {ROD: settings.offset}))
-
-
-def squeeze_stage(system: SealSystem, settings: PathSettings) -> Stage:
-    """First stage, without pressure: from the undeformed section into the groove."""
-    first = min(settings.first_contact / system.parameters.density**2, 0.05)
+    way = max(map(abs, _ways(p)))
+    first = cut * min(settings.first_contact / p.density**2, 0.05)
+    first = min(first, cut * settings.first_way * p.section_diameter / way)
     return Stage(
         name="squeeze",
         problem_at=lambda closed: squeeze_problem(system, settings, closed),
@@ -49,14 +86,59 @@ def squeeze_stage(system: SealSystem, settings: PathSettings) -> Stage:
     )
 
 
-def load_stage(system: SealSystem, settings: PathSettings, sealed_pressure: float) -> Stage:
-    """First stage, continued: the sealed pressure rises from 0."""
+def wedged(system: SealSystem, x: Array) -> bool:
+    """Whether both walls of the groove hold the section."""
+    touching = [int((system.pressing(w, x) > 0.0).sum()) for w in (SEALED_WALL, AIR_WALL)]
+    return min(touching) >= (1 if system.parameters.given_arc else WEDGED)
+
+
+def against_wall(system: SealSystem, x: Array) -> tuple[Array, float]:
+    """The squeezed section x moved rigidly until it touches the wall of the air side, and how far.
+
+    It fulfils the equations of the squeeze at its new place: rod and housing are cylinders.
+    """
+    p, y = system.parameters, x.copy()
+    wall = p.groove_centre + 0.5 * p.groove_width
+    shift = wall - float(system.deformed(x)[:, 0].max())
+    system.displacements(y)[:, 0] += shift
+    return y, shift
+
+
+def lean_stage(system: SealSystem, settings: PathSettings, place: float) -> Stage:
+    """First stage, continued: the hold pushes the section from `place` into the wall it touches."""
+    far = settings.lean * system.parameters.section_diameter
+    return Stage(
+        name="lean",
+        problem_at=lambda part: squeeze_problem(system, settings, 1.0, place + part * far),
+        start=0.0,
+        stop=1.0,
+        steps=StepRule(0.25, 0.005),
+        sealed_pressure=0.0,
+        stroke="both",
+    )
+
+
+def load_stage(
+    system: SealSystem, settings: PathSettings, sealed_pressure: float, force: float = 0.0
+) -> Stage:
+    """First stage, continued: the sealed pressure rises from 0.
+
+    force: of the hold before, N; it fades as the pressure on the gland replaces it.
+    """
+    p, steps = system.parameters, settings.load_steps
+    area = 0.25 * pi * (p.housing_diameter**2 - p.rod_diameter**2)
+    gone = min(abs(force) / area, sealed_pressure)
+
+    def at(p_s: float) -> Problem:
+        rest = force * max(0.0, 1.0 - p_s / gone) if gone else 0.0
+        return contact_problem(system, settings, p_s, rest)
+
     return Stage(
         name="sealed pressure",
-        problem_at=lambda p_s: contact_problem(system, settings, p_s),
+        problem_at=at,
         start=0.0,
         stop=sealed_pressure,
-        steps=settings.load_steps,
+        steps=steps.scaled(p.shear_modulus),
         sealed_pressure=sealed_pressure,
         stroke="both",
     )

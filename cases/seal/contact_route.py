@@ -11,10 +11,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from softehl.cases.seal.contact import load_stage, squeeze_stage
+from softehl.cases.seal.contact import (
+    against_wall,
+    held_place,
+    lean_stage,
+    load_stage,
+    squeeze_stage,
+    wedged,
+)
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.grading import PASSES, graded_disc
+from softehl.cases.seal.grading import PASSES, graded_disc, placed_disc
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import carried_contact, finer
@@ -22,6 +29,8 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
 
 State: TypeAlias = tuple[SealSystem, Array]
+
+_CUTS = (1.0, 0.25, 0.0625)  # of the first step of the squeeze, one after the other
 
 GUIDE = 2
 """Least density of the uniform mesh whose contact shows where a graded one is to be fine."""
@@ -42,7 +51,8 @@ class ContactRoute:
 
     def contact(self, p: ORing) -> State | StageFailed:
         """The system of a case, uniform or graded, and its unknowns in contact under p_s."""
-        return self._graded(p) if p.mesh == "graded" else self._uniform(p)
+        graded = p.mesh == "graded" or p.given_arc is None
+        return self._graded(p) if graded else self._uniform(p)
 
     def _uniform(self, p: ORing) -> State | StageFailed:
         """From coarser meshes; on the mesh itself if that is asked for or the others fail."""
@@ -65,16 +75,36 @@ class ContactRoute:
 
     def _loaded(self, system: SealSystem) -> Followed:
         """Unknowns of a section in contact, from rest: squeezed, then loaded by p_s."""
-        p_s = system.parameters.sealed_pressure
-        x = self.follow(squeeze_stage(system, self.settings), system.at_rest())
-        if p_s > 0.0 and not isinstance(x, StageFailed):
-            x = self.follow(load_stage(system, self.settings, p_s), x)
+        x = self._squeezed(system)
+        if held_place(system.parameters) is None and not isinstance(x, StageFailed):
+            x = self._pressed(system, x)
         if not isinstance(x, StageFailed):
             self.contacts.keep(system, x)
         return x
 
+    def _squeezed(self, system: SealSystem) -> Followed:
+        """Unknowns of a squeezed section without pressure; a failed start is tried closer."""
+        for cut in _CUTS:
+            x = self.follow(squeeze_stage(system, self.settings, cut), system.at_rest())
+            if not isinstance(x, StageFailed) or x.branch.points:
+                break
+        return x
+
+    def _pressed(self, system: SealSystem, x: Array) -> Followed:
+        """From the squeezed to the loaded section, by way of the wall unless both walls hold it."""
+        p_s, force = system.parameters.sealed_pressure, 0.0
+        if p_s > 0.0 and not wedged(system, x):
+            y, place = against_wall(system, x)
+            leaning = self.follow(lean_stage(system, self.settings, place), y)
+            if isinstance(leaning, StageFailed):
+                return leaning
+            x, force = leaning, system.axial_force(leaning)
+        return self.follow(load_stage(system, self.settings, p_s, force), x)
+
     def _graded(self, p: ORing) -> State | StageFailed:
         """Graded at a low density, from the uniform mesh of that density, then refined."""
+        if p.given_arc is None:
+            return self._placed(p)
         for guide in _doublings(min(GUIDE, p.density), p.density // 2):
             graded = self._regraded(_at(p, guide))
             if not isinstance(graded, StageFailed):
@@ -82,6 +112,38 @@ class ContactRoute:
             if not isinstance(graded, StageFailed):
                 return graded
         return self._regraded(p)
+
+    def _placed(self, p: ORing) -> State | StageFailed:
+        """On an arc that the contact places: seen on a wide guide, then on meshes graded in turn.
+
+        Where a state cannot be carried to the first of these, the whole path is followed on it;
+        where it cannot be carried to the next one, the first one has to do.
+        """
+        guide = build_system(_at(p.model_copy(update={"mesh": "uniform"}), GUIDE))
+        low, x = _at(p, min(GUIDE, p.density)), self._guided(guide)
+        if isinstance(x, StageFailed):
+            return x
+        state: State | StageFailed = guide, x
+        for number in range(1, PASSES + 1):
+            before = state
+            assert not isinstance(before, StageFailed)
+            new = build_system(low, placed_disc(*before, p))
+            state = self._carried(*before, new, f"contact on graded mesh {number}")
+            if isinstance(state, StageFailed) and number == 1:
+                x = self._loaded(new)
+                state = x if isinstance(x, StageFailed) else (new, x)
+            if isinstance(state, StageFailed):
+                state = before if number > 1 else state
+                break
+        return state if isinstance(state, StageFailed) else self._refined(*state, p.density)
+
+    def _guided(self, guide: SealSystem) -> Followed:
+        """Unknowns of the guide in contact, from a stored state if there is a good one."""
+        if self.contacts.densities(guide.parameters, (GUIDE,)):
+            x = self._stored(guide)
+            if not isinstance(x, StageFailed):
+                return x
+        return self._loaded(guide)
 
     def _regraded(self, p: ORing) -> State | StageFailed:
         """On meshes graded in turn, each by the contact on the one before."""

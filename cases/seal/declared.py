@@ -25,7 +25,7 @@ from softehl.runtime.fem.dofs import (
 )
 from softehl.runtime.kernels import Rule, load_kernel
 
-Place = Literal["nodes", "film", "arc_nodes", "outer_nodes", "section"]
+Place = Literal["nodes", "film", "arc_nodes", "outer_nodes", "wall_nodes", "section"]
 Group = Literal["solid", "load", "contact", "film", "support"]
 
 
@@ -34,7 +34,8 @@ class Field:
     """A field of unknowns.
 
     on: what has one of them: each node (two displacements), each segment of the film (the
-    coefficients of a polynomial), each node of the arc or of the other boundary, or the section.
+    coefficients of a polynomial), each node of the arc, of the other boundary or of what may touch
+    a wall, or the section.
     scale: reference size of its residuals. order: of a film field, None for the case's m_p.
     """
 

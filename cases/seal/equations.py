@@ -14,6 +14,7 @@ from softehl.cases.seal.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection, disc_section
 from softehl.cases.seal.system import (
+    AXIAL,
     BLOCKS,
     DISPLACEMENT,
     FIELDS,
@@ -155,10 +156,21 @@ class SealSystem:
         return {"total": self.layout.total, PRESSURE: self.pressure_count}
 
     def wall_forces(self, x: Array) -> Array:
-        """Normal forces (outer nodes,) of the housing and its walls on the nodes, N."""
-        nodes, segments = self.section.chains["outer_nodes"]
-        pressing = [np.maximum(-x[self.layout.part(name)], 0.0) for name in WALLS]
-        return np.asarray(sum(pressing) * tributary_areas(self.mesh.points, segments, nodes))
+        """Normal forces (nodes,) of the housing and its walls on the nodes, N."""
+        total = np.zeros(len(self.mesh.points))
+        for name, on in WALLS.items():
+            nodes, segments = self.section.chains[on]
+            areas = tributary_areas(self.mesh.points, segments, nodes)
+            total[nodes] += self.pressing(name, x) * areas
+        return total
+
+    def pressing(self, name: str, x: Array) -> Array:
+        """Nominal pressures (n,) of an obstacle on the nodes that may touch it, MPa, >= 0."""
+        return np.maximum(-x[self.layout.part(name)], 0.0)
+
+    def axial_force(self, x: Array) -> float:
+        """Force that the hold exerts on the section, to the air side, N."""
+        return -float(x[self.layout.part(AXIAL)][0])
 
     @property
     def film_ends(self) -> Integers:
@@ -177,7 +189,10 @@ class SealSystem:
 
     def contact_problem(self, loads: ContactLoads) -> Problem:
         """Frictionless contact (9)-(10) under a sealed pressure (8)."""
-        return self.problem.with_parameters(**contact_values(loads))
+        problem = self.problem.with_parameters(**contact_values(loads))
+        if loads.place is not None:
+            return problem
+        return problem.also_fixed(self.layout.dofs(AXIAL), -loads.axial_force)
 
     def film_problem(self, film: FilmLoads, shares: Mapping[str, float] | None = None) -> Problem:
         """Film forces (18) weighted by w, contact forces by 1 - w; Reynolds equation (25) in full.
@@ -187,13 +202,16 @@ class SealSystem:
         shares: of the film forces by pressure field, where there are several.
         """
         p_s, fields = film.sealed_pressure, shares or {PRESSURE: 1.0}
-        contact = self.contact_problem(ContactLoads(p_s, {ROD: film.rod_offset}))
+        contact = self.contact_problem(ContactLoads(p_s, {ROD: film.rod_offset}, film.place))
         problem = contact.with_parameters(
             **faded_values(film), **self._film_parameters(film, fields)
         )
         fixed = [*map(self._ends, fields), self.layout.dofs(ROD)]
         values: list[Array | float] = [np.array([p_s, 0.0]) for _ in fields]
         values.append(film.multipliers)
+        if film.place is None:
+            fixed.append(self.layout.dofs(AXIAL))
+            values.append(0.0)
         if film.moment is not None:
             fixed.append(self.layout.dofs(ROTATION))
             values.append(film.moment)

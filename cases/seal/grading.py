@@ -10,12 +10,15 @@ edges and are as K^(-6/5) at them resolve every speed, and one mesh serves both 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection, uniform_disc
+from softehl.cases.seal.system import ROD
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG, Disc
 from softehl.runtime.mesh.spacing import Spot, graded
@@ -30,6 +33,7 @@ COARSEST = 18
 """The arc is at least as many of its longest segments long, at density 2."""
 
 _DENSITY = 2  # for which the sizes are chosen; other densities divide or join its segments
+_SIDES = 25.0  # degrees that the side blocks need at least
 _CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
 
 
@@ -56,6 +60,74 @@ def graded_disc(system: SealSystem, x: Array) -> Disc:
         layer_growth=_LAYER_GROWTH,
         row_growth=_ROW_GROWTH,
     )
+
+
+REACH, FILMS = 0.15, 60.0
+"""The arc that the contact places ends where the gap is this wide, mm, or so many films."""
+
+STEEPEST = 55.0
+"""Or where the surface is this steep, degrees: beyond it is no film."""
+
+_PLACED_COARSEST = 12  # as COARSEST, of an arc that the contact places
+
+
+def placed_disc(system: SealSystem, x: Array, p: ORing) -> Disc:
+    """The disc of a case whose arc reaches as far as a film may matter in the contact state x.
+
+    With k = K / K_max of each edge, segments are as k^-0.3 at it and grow by 0.3 k^0.5 outside and
+    0.3 min(1 / k, 1.5) inside: at the flatter edge the dip is as wide as the inlet of the other
+    one, and lies outside. The exponents were fitted to states at p_s / mu = 0, 1 and 2.7.
+    """
+    old, s = system.section.disc, arc_positions(system.section)
+    edges = contact_edges(system, x)
+    ends = [_way_out(system, x, s, side, p) for side in (0, 1)]
+    start, end = (old.arc_start + float(np.degrees(e / old.radius)) for e in ends)
+    disc = replace(uniform_disc(p), arc_start=start, arc_end=end)
+    if p.mesh == "uniform" or not edges:
+        return disc
+    length, steepest = ends[1] - ends[0], max(edge.rise for edge in edges)
+    spots = []
+    for edge, side in zip(edges, (0, 1), strict=True):
+        k = (edge.rise / steepest) ** 0.5
+        rates = RATE * k**0.5, RATE * min(1.0 / k, 1.5)
+        place = min(max(edge.place - ends[0], 0.0), length)
+        spots.append(Spot(place, k**-0.3, rates if side == 0 else rates[::-1]))
+    count = disc.long * _DENSITY
+    spacing = graded(length, spots, count, coarsest=length / _PLACED_COARSEST, rate=RATE)
+    return replace(
+        disc,
+        spacing=spacing,
+        top=max(_TOP, end + _SIDES, _SIDES - start),
+        corner_radius=_CORNERS,
+        layer_growth=_LAYER_GROWTH,
+        row_growth=_ROW_GROWTH,
+    )
+
+
+def film_thickness(p: ORing, edges: Sequence[Edge]) -> float:
+    """About h* (mm) at the highest speed, K l^(3/2) / E with the l of the head of this page."""
+    flow, E = p.viscosity * max(p.speeds), 3.0 * p.shear_modulus
+    return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
+
+
+def _way_out(system: SealSystem, x: Array, s: Array, side: int, p: ORing) -> float:
+    """Where on the arc (mm) an end of the film is to be: side 0 the sealed, 1 the air end."""
+    z, h = system.arc_film(x)
+    touching = np.flatnonzero(system.pressing(ROD, x) > 0.0)
+    if not len(touching):
+        return float(s[-side])
+    if side == 0:
+        z, h, s, first = -z[::-1], h[::-1], s[::-1], len(s) - 1 - touching[0]
+    else:
+        first = touching[-1]
+    reach = max(REACH, FILMS * film_thickness(p, contact_edges(system, x)))
+    steep = np.degrees(np.arctan2(np.diff(h), np.diff(z))) >= STEEPEST
+    for i in range(first, len(s) - 1):
+        if steep[i]:
+            return float(s[i])
+        if h[i + 1] >= reach:
+            return float(np.interp(reach, h[i : i + 2], s[i : i + 2]))
+    return float(s[-1])
 
 
 def arc_positions(section: SealSection) -> Array:

@@ -16,12 +16,14 @@ class ContactLoads:
     """Loads of frictionless contact.
 
     sealed_pressure: p_s, MPa. offsets: obstacle -> distance (mm) that it keeps from the section,
-    0 where none is given. spring: axial stiffness that holds the section, N/mm^3.
+    0 where none is given. place: mean axial displacement at which the section is held, mm, None
+    where it is free; then axial_force pushes it to the air side, N.
     """
 
     sealed_pressure: float = 0.0
     offsets: Mapping[str, float] = field(default_factory=dict)
-    spring: float = 0.0
+    place: float | None = None
+    axial_force: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class FilmLoads:
     contact forces. shear: weight of the shear stress. multipliers, gap: (arc nodes,) rod
     multipliers, MPa, and distance of the rod, mm, of the contact state; rod_offset: the offset of
     the rod in it, mm. moment: moment on the section (N mm) if it is free to roll, None if its
-    rotation is held.
+    rotation is held. place: as of the contact state.
     """
 
     sealed_pressure: float
@@ -44,6 +46,7 @@ class FilmLoads:
     shear: float = 1.0
     moment: float | None = None
     rod_offset: float = 0.0
+    place: float | None = None
 
     @property
     def rod_speed(self) -> float:

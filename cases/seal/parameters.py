@@ -99,22 +99,28 @@ class ORing(Parameters):
         unit="mm",
         bounds="such that the section is between the walls",
     )
-    arc_start: float = key(
-        -34.0,
+    arc_start: float | None = key(
+        None,
         "sealed end of the lubricated arc, from the bottom",
         unit="degrees",
-        bounds="-120 to < 0",
+        bounds="-120 to < 0, left out = found from the contact",
         ge=-120.0,
         lt=0.0,
     )
-    arc_end: float = key(
-        43.0,
+    arc_end: float | None = key(
+        None,
         "air end of the lubricated arc, from the bottom",
         unit="degrees",
-        bounds="> 0 to 120",
+        bounds="> 0 to 120, left out = found from the contact",
         gt=0.0,
         le=120.0,
     )
+
+    @property
+    def given_arc(self) -> tuple[float, float] | None:
+        """Ends of the lubricated arc where they are given; else the contact decides."""
+        start, end = self.arc_start, self.arc_end
+        return None if start is None or end is None else (start, end)
 
     @property
     def shear_modulus(self) -> float:
@@ -146,6 +152,12 @@ class ORing(Parameters):
         return self
 
     @model_validator(mode="after")
+    def _arc_has_two_ends(self) -> Self:
+        if (self.arc_start is None) != (self.arc_end is None):
+            raise ValueError("arc_start and arc_end: give both, or none to have them found")
+        return self
+
+    @model_validator(mode="after")
     def _seal_is_squeezed(self) -> Self:
         gap = 0.5 * (self.housing_diameter - self.rod_diameter)
         if not 0.5 * self.section_diameter < gap < self.section_diameter:
@@ -154,12 +166,11 @@ class ORing(Parameters):
                 f"to squeeze the seal it must be between a half and one section_diameter, "
                 f"{0.5 * self.section_diameter:g} to {self.section_diameter:g} mm"
             )
-        centre = 0.5 * (self.inner_diameter + self.section_diameter)
-        if not 0.5 * self.rod_diameter < centre < 0.5 * self.housing_diameter:
+        stretch = self.rod_diameter / self.inner_diameter - 1.0
+        if not -0.1 <= stretch <= 0.2:
             raise ValueError(
-                f"the section centre lies at radius {centre:g} mm (inner_diameter, "
-                f"section_diameter); it must be between rod and housing, "
-                f"{0.5 * self.rod_diameter:g} to {0.5 * self.housing_diameter:g} mm"
+                f"rod_diameter = {self.rod_diameter:g} mm stretches inner_diameter = "
+                f"{self.inner_diameter:g} mm by {100 * stretch:.3g} %; allowed are -10 to 20 %"
             )
         if self.groove_width < self.section_diameter:
             raise ValueError(

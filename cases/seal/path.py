@@ -43,18 +43,21 @@ ROLLING = (
 class PathSettings:
     """Numbers that steer the path; none of them changes a result.
 
-    offset: distance of the rod in the contact stage, mm. spring: axial stiffness during the
-    squeeze, N/mm^3. first_contact: where the squeeze begins at density 1, 0 = just touching and
-    1 = all the way; it falls with density^2, so that the first contact is as many nodes wide.
-    start_speed: least |U| at which the film is built up, mm/s. The rest: step rules.
+    offset: distance of the rod in the contact stage, mm. first_contact: where the squeeze begins
+    at density 1, 0 = just touching and 1 = all the way; it falls with density^2, so that the first
+    contact is as many nodes wide. first_way: the same in section diameters of way. lean: how far
+    the section is pushed against its wall before the pressure does it, in section diameters.
+    start_speed: least |U| at which the film is built up, mm/s. load_steps: in shear moduli. The
+    rest: step rules.
     """
 
     offset: float = 0.01
-    spring: float = 0.1
     first_contact: float = 0.2
+    first_way: float = 0.004
+    lean: float = 0.01
     start_speed: float = 6400.0
     longest_squeeze: float = 0.3
-    load_steps: StepRule = field(default_factory=lambda: StepRule(0.2, 1e-3, 0.6))
+    load_steps: StepRule = field(default_factory=lambda: StepRule(0.055, 3e-4, 0.3))
     weight_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-5))
     shear_steps: StepRule = field(default_factory=lambda: StepRule(1.0, 1e-3))
     order_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-4))

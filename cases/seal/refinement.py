@@ -22,13 +22,18 @@ from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.prolongation import (
     prolong_chain,
     prolong_elements,
+    prolong_loop,
     prolong_nodes,
     restrict_chain,
     restrict_elements,
     restrict_nodes,
 )
-from softehl.runtime.mesh.sections import LONG
-from softehl.runtime.mesh.transfer import transfer_chain, transfer_elements, transfer_nodes
+from softehl.runtime.mesh.transfer import (
+    transfer_chain,
+    transfer_elements,
+    transfer_loop,
+    transfer_nodes,
+)
 
 
 def finer(parameters: ORing) -> ORing:
@@ -48,24 +53,27 @@ class _Carrier:
 
 def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
     """The most accurate transfer: exact between meshes that share nodes, else by local splines."""
-    density = old.mesh.arc // LONG
+    long = old.section.disc.long
+    density = old.mesh.arc // long
     if old.section.disc == new.section.disc and new.mesh.arc == 2 * old.mesh.arc:
         return _Carrier(
             f"prolonged from density {density}",
-            lambda values: prolong_nodes(values, density),
-            lambda values: prolong_elements(values, density),
-            lambda _, values: prolong_chain(values),
+            lambda values: prolong_nodes(values, density, long),
+            lambda values: prolong_elements(values, density, long),
+            lambda name, v: prolong_loop(v) if _closed(old, name) else prolong_chain(v),
         )
     if old.section.disc == new.section.disc and old.mesh.arc == 2 * new.mesh.arc:
         return _Carrier(
             f"restricted from density {density}",
-            lambda values: restrict_nodes(values, density),
-            lambda values: restrict_elements(values, density),
+            lambda values: restrict_nodes(values, density, long),
+            lambda values: restrict_elements(values, density, long),
             lambda _, values: restrict_chain(values),
         )
     meshes = old.mesh, new.mesh
 
     def chain(name: str, values: Array) -> Array:
+        if _closed(old, name):
+            return transfer_loop(*meshes, values)
         before, after = (system.section.chains[name][0] for system in (old, new))
         return transfer_chain(*meshes, before, after, values)
 
@@ -75,6 +83,11 @@ def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
         lambda values: transfer_elements(*meshes, values),
         chain,
     )
+
+
+def _closed(system: SealSystem, chain: str) -> bool:
+    """Whether a chain is the whole boundary."""
+    return len(system.section.chains[chain][0]) == len(system.mesh.boundary)
 
 
 def carried_contact(

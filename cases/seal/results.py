@@ -135,11 +135,12 @@ def housing_pressure(system: SealSystem, x: Array) -> Array:
     The multipliers per current area, and p_s where it acts.
     """
     pressure, force = np.zeros(len(system.mesh.points)), system.wall_forces(x)
-    (nodes, segments), deformed = system.section.chains["outer_nodes"], system.deformed(x)
+    nodes, segments = system.mesh.boundary, system.mesh.segments
+    deformed = system.deformed(x)
     current = tributary_areas(deformed, segments, nodes)
     wet = tributary_areas(deformed, system.section.elements["sealed_side"], nodes)
     fluid = wet * system.parameters.sealed_pressure
-    pressure[nodes] = np.where(force > 0.0, (force + fluid) / current, 0.0)
+    pressure[nodes] = np.where(force[nodes] > 0.0, (force[nodes] + fluid) / current, 0.0)
     return pressure
 
 

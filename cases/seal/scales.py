@@ -29,6 +29,11 @@ def rotation(_: ORing) -> float:
     return _ROTATION
 
 
+def place(_: ORing) -> float:
+    """A mean axial displacement, mm."""
+    return _GAP
+
+
 def film_flux(speed: float) -> float:
     """Flux (mm^2/s) of a film at |U| (mm/s): mean velocity times 10 micrometres."""
     return 0.5 * speed * _GAP

@@ -23,11 +23,13 @@ from softehl.runtime.mesh.sections import Disc, SectionMesh, disc_mesh
 class SealSection:
     """A meshed section in its reference configuration; lengths in mm.
 
-    disc: how the mesh is laid out.
+    disc: how the mesh is laid out. placed: whether its arc was placed by the contact; then every
+    boundary node may touch the walls of the groove, else (the paper's scheme) those off the arc.
     """
 
     disc: Disc
     mesh: SectionMesh
+    placed: bool = False
 
     @cached_property
     def elements(self) -> Mapping[str, Integers]:
@@ -45,21 +47,29 @@ class SealSection:
             "sealed_arc": mesh.arc_segments[: self.lowest],
             "arc_nodes": arc[:, None],
             "outer_nodes": mesh.outer_nodes[:, None],
+            "wall_nodes": self.chains["wall_nodes"][0][:, None],
         }
 
     @property
     def chains(self) -> Mapping[str, tuple[Integers, Integers]]:
-        """Nodes (n,) and segments (m, 2) of the two parts of the boundary."""
+        """Nodes (n,) and segments (m, 2) of what may meet the rod, the housing, a wall."""
         mesh = self.mesh
+        outer = mesh.outer_nodes, mesh.outer_segments
         return {
             "arc_nodes": (mesh.arc_nodes, mesh.arc_segments),
-            "outer_nodes": (mesh.outer_nodes, mesh.outer_segments),
+            "outer_nodes": outer,
+            "wall_nodes": (mesh.boundary, mesh.segments) if self.placed else outer,
         }
 
     @property
     def lowest(self) -> int:
         """Index of the arc node nearest to the rod."""
         return int(np.argmin(self.mesh.points[self.mesh.arc_nodes, 1]))
+
+    @property
+    def area(self) -> float:
+        """Area of the section, mm^2."""
+        return pi * self.disc.radius**2
 
     @property
     def polar_moment(self) -> float:
@@ -78,10 +88,20 @@ class SealSection:
         return outer[int(np.flatnonzero(middle[:, 0] < 0.0)[0]) :]
 
 
+GUIDE_ARC, GUIDE_TOP = 75.0, 118.0
+"""Half the angle of the arc on which contact is first looked for, and where the top begins."""
+
+LONG_PLACED = 33
+"""Segments at density 1 of an arc that the contact has placed."""
+
+
 def uniform_disc(p: ORing) -> Disc:
-    """The circular section with equal segments on its arc."""
+    """The circular section with equal segments on its arc, the given one or a wide guide."""
     radius = 0.5 * p.section_diameter
-    return Disc(0.0, 0.5 * p.inner_diameter + radius, radius, p.arc_start, p.arc_end)
+    centre = 0.0, 0.5 * p.inner_diameter + radius
+    if p.given_arc:
+        return Disc(*centre, radius, *p.given_arc)
+    return Disc(*centre, radius, -GUIDE_ARC, GUIDE_ARC, top=GUIDE_TOP, long=LONG_PLACED)
 
 
 def disc_section(
@@ -92,4 +112,4 @@ def disc_section(
     disc: how the mesh is laid out, with equal segments if left out. density: instead of the case's.
     """
     disc = disc or uniform_disc(p)
-    return SealSection(disc, disc_mesh(disc, density or p.density))
+    return SealSection(disc, disc_mesh(disc, density or p.density), placed=p.given_arc is None)

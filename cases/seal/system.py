@@ -12,7 +12,7 @@ from math import copysign
 from typing import TypeAlias
 
 from softehl.cases.seal import scales
-from softehl.cases.seal.declared import Block, Field
+from softehl.cases.seal.declared import Block, Field, Place
 from softehl.cases.seal.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection
@@ -28,22 +28,26 @@ def _segment_rule(p: ORing, order: int) -> Rule:
     return film_rule(order, p.quadrature, p.quadrature_points)
 
 
-DISPLACEMENT, PRESSURE, ROD, ROTATION = "displacement", "pressure", "rod", "rotation"
-"""Displacements; film pressures; contact multipliers of the rod; moment that holds the section."""
+DISPLACEMENT, PRESSURE, ROD = "displacement", "pressure", "rod"
+"""Displacements; film pressures; contact multipliers of the rod."""
+
+ROTATION, AXIAL = "rotation", "axial"
+"""Moment that holds the mean rotation of the section; force that holds its mean axial place."""
 
 SOLID, FILM, FACET = "solid", "film", "facet"
 """Blocks whose fields are results: the section, segments of the film, what lies between them."""
 
-BORE = "housing"
-WALLS = (BORE, "sealed_wall", "air_wall")
-"""The obstacles of the rest of the boundary; each has a field of multipliers of its own."""
+BORE, SEALED_WALL, AIR_WALL = "housing", "sealed_wall", "air_wall"
+WALLS: dict[str, Place] = {BORE: "outer_nodes", SEALED_WALL: "wall_nodes", AIR_WALL: "wall_nodes"}
+"""The other obstacles, and what may touch them; each has a field of multipliers of its own."""
 
 FIELDS = (
     Field(DISPLACEMENT, "nodes", scales.force),
     Field(PRESSURE, "film", scales.largest_flux),
     Field(ROD, "arc_nodes", scales.gap),
-    *(Field(name, "outer_nodes", scales.gap) for name in WALLS),
+    *(Field(name, nodes, scales.gap) for name, nodes in WALLS.items()),
     Field(ROTATION, "section", scales.rotation),
+    Field(AXIAL, "section", scales.place),
 )
 
 BLOCKS = (
@@ -51,7 +55,7 @@ BLOCKS = (
     Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
     Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
     Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
-    *(Block(name, "contact", "outer_nodes", (DISPLACEMENT, name), "contact") for name in WALLS),
+    *(Block(name, "contact", on, (DISPLACEMENT, name), "contact") for name, on in WALLS.items()),
     Block(FILM, "film", "arc", (DISPLACEMENT, PRESSURE), "film", layer=True, rule=_segment_rule),
     Block(
         *("upwind", "film_upwind", "arc", (DISPLACEMENT, PRESSURE), "film"),
@@ -66,7 +70,7 @@ BLOCKS = (
         rule=lambda _, order: facet_rule(order),
     ),
     Block("rotation", "mean_rotation", "cells", (DISPLACEMENT, ROTATION), "support", constant=True),
-    Block("spring", "axial_spring", "cells", (DISPLACEMENT,), "support", constant=True),
+    Block("hold", "mean_axial", "cells", (DISPLACEMENT, AXIAL), "support", constant=True),
 )
 
 
@@ -76,8 +80,8 @@ def obstacles_of(p: ORing) -> dict[str, Obstacle]:
     obstacles = (
         inner_cylinder(ROD, 0.5 * p.rod_diameter),
         outer_cylinder(BORE, 0.5 * p.housing_diameter),
-        plane("sealed_wall", p.groove_centre - half, faces=1),
-        plane("air_wall", p.groove_centre + half, faces=-1),
+        plane(SEALED_WALL, p.groove_centre - half, faces=1),
+        plane(AIR_WALL, p.groove_centre + half, faces=-1),
     )
     return {obstacle.name: obstacle for obstacle in obstacles}
 
@@ -93,6 +97,8 @@ def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | Non
     if block.name == "rotation":
         centre = {"centre_z": 0.0, "centre_r": section.disc.centre_r}
         return {**centre, "polar_moment": section.polar_moment, "angle": 0.0}
+    if block.name == "hold":
+        return {"area": section.area, "place": 0.0}
     return None
 
 
@@ -107,7 +113,7 @@ def contact_values(loads: ContactLoads) -> dict[str, Values | None]:
         "sealed_side": pressure,
         "sealed_arc": pressure,
         **{name: {"offset": offset} for name, offset in loads.offsets.items()},
-        "spring": {"stiffness": loads.spring} if loads.spring else None,
+        "hold": {"place": loads.place or 0.0},
     }
 
 

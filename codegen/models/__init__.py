@@ -17,5 +17,6 @@ ALL: dict[str, Callable[[], Definition]] = {
     "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,
     "mean_rotation": support.mean_rotation,
+    "mean_axial": support.mean_axial,
     "axial_spring": support.axial_spring,
 }

@@ -105,7 +105,9 @@ def bubble_load() -> Definition:
     integral of 2 pi r p_b n_r ds, (18) gives each node about a half; this term takes
     (c delta / 2) B from node 1 to node 2. delta = Pe^2 / (9 + Pe^2) and
     Pe = 3 eta_0 |ubar| dx^2 / (pi G h_m^3), h_m the mean of the nodal film thicknesses, compare the
-    oil with the elasticity of the seal (docs/film-without-oscillations.md).
+    oil with the elasticity of the seal (docs/film-without-oscillations.md). Where the film widens
+    downstream, behind its narrowest place, delta fades with the widening over h_m: full upwinding
+    would turn the film back there.
     """
     m = Model("film_upwind", nodes=2, rule=quadrature.gauss(2, 1), doc=bubble_load.__doc__ or "")
     X = m.coordinates("Z", "R")
@@ -124,7 +126,9 @@ def bubble_load() -> Definition:
     h = _nodal_thickness(m, X, u, R_rod)
     h_m = m.define("h_m", (h[0] + h[1]) / 2)
     peclet = m.define("peclet", U * z_xi**2 / (2 * sp.pi * G * _conductance(h_m, eta_0)))
-    delta = m.define("delta", peclet**2 / (9 + peclet**2))
+    widening = m.define("widening", (h[1] - h[0]) / (sp.Rational(1, 5) * h_m))
+    weight = sp.Piecewise((1, U * widening <= 0), (1 / (1 + widening**2), True))
+    delta = m.define("delta", weight * peclet**2 / (9 + peclet**2))
     # p_b vanishes at both ends: the integral of r p_b is that of -W p_b', with W' = r, and also
     # of -W p', where the integral of W is zero.
     W = m.define("W", (R_rod + h_m) * xi + (h[1] - h[0]) / 2 * (xi**2 / 2 - sp.Rational(1, 6)))

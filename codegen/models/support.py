@@ -1,4 +1,4 @@
-"""What holds a ring that nothing else holds: its mean rotation, a weak axial spring."""
+"""What holds a ring that nothing else holds: mean rotation, mean axial place, a weak spring."""
 
 from __future__ import annotations
 
@@ -36,6 +36,33 @@ def mean_rotation() -> Definition:
     r = m.define("r", shapes.interpolate(e.N, X[1]) - centre_r)
     spin = z * shapes.interpolate(e.N, u[1]) - r * shapes.interpolate(e.N, u[0])
     density = moment / inertia * e.detJ * (spin - angle * (z**2 + r**2))
+    m.potential(m.integral("constraint", density))
+    return m.finish()
+
+
+def mean_axial() -> Definition:
+    """Constraint on the mean axial displacement of the section, with the force as its multiplier.
+
+    Potential N / A * integral of (u_z - place) dA, A the area of the section: the force N [N] is
+    work-conjugate to `place`, and acts on the section with the opposite sign.
+    """
+    m = Model(
+        "mean_axial",
+        nodes=4,
+        rule=quadrature.gauss(2, 2),
+        unroll=True,
+        doc=mean_axial.__doc__ or "",
+    )
+    X = m.coordinates("Z", "R")
+    u = m.nodal_unknowns("u_z", "u_r", idle=["u_r"])
+    force = m.unknown("force")
+    area, place = m.parameters(
+        area="area of the section [mm^2]",
+        place="prescribed mean axial displacement [mm]",
+    )
+    xi, eta = m.point()
+    e = kin.quad4(m, "", X, xi, eta)
+    density = force / area * e.detJ * (shapes.interpolate(e.N, u[0]) - place)
     m.potential(m.integral("constraint", density))
     return m.finish()
 

@@ -228,6 +228,10 @@ class Problem:
             values=np.concatenate([np.empty(0), *full]),
         )
 
+    def also_fixed(self, fixed: Integers, value: Array | float) -> Problem:
+        """The problem with these unknowns prescribed too."""
+        return self.with_fixed([self.fixed, fixed], [self.values, value])
+
     def fields(self, name: str, x: Array) -> dict[str, Array]:
         """Fields of a block that is switched on, at its points: name -> (n, points)."""
         return self.assembler.block(name).fields(x, self.parameters[name])

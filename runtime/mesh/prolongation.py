@@ -1,7 +1,7 @@
 """From a mesh to the one of twice its density, and back: nodal, element and chain values.
 
 The nodes of both meshes are images of index space under one mapping (`mesh.sections`), so that
-values are interpolated in the indices of each of its five blocks.
+values are interpolated in the indices of each of its five blocks. `long` is that of the disc.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.sections import LAYERS, LONG, SHORT
 
 
-def node_blocks(density: int) -> list[Integers]:
+def node_blocks(density: int, long: int = LONG) -> list[Integers]:
     """Node numbers of the blocks as grids: bottom, right, top and left layers, then the centre.
 
     Blocks share the nodes at which they meet.
     """
-    long, short, layers = LONG * density, SHORT * density, LAYERS * density
+    long, short, layers = long * density, SHORT * density, LAYERS * density
     around = 2 * (long + short)
     rings = np.arange(layers * around).reshape(layers, around)
     centre = layers * around + np.arange((short + 1) * (long + 1)).reshape(short + 1, long + 1)
@@ -31,27 +31,27 @@ def node_blocks(density: int) -> list[Integers]:
     return [rings[:, a : b + 1] for a, b in pairwise(ends)] + [centre]
 
 
-def prolong_nodes(values: Array, density: int) -> Array:
+def prolong_nodes(values: Array, density: int, long: int = LONG) -> Array:
     """Nodal values (V', k) at twice the density from those, (V, k), at `density`: cubic splines."""
-    coarse, fine = node_blocks(density), node_blocks(2 * density)
+    coarse, fine = node_blocks(density, long), node_blocks(2 * density, long)
     result = np.empty((max(int(block.max()) for block in fine) + 1, values.shape[1]))
     for old, new in zip(coarse, fine, strict=True):
         result[new] = _halve(_halve(values[old], axis=0), axis=1)
     return result
 
 
-def restrict_nodes(values: Array, density: int) -> Array:
+def restrict_nodes(values: Array, density: int, long: int = LONG) -> Array:
     """Nodal values (V', k) at half the density from those, (V, k), at an even `density`."""
-    coarse, fine = node_blocks(density // 2), node_blocks(density)
+    coarse, fine = node_blocks(density // 2, long), node_blocks(density, long)
     result = np.empty((max(int(block.max()) for block in coarse) + 1, values.shape[1]))
     for new, old in zip(coarse, fine, strict=True):
         result[new] = values[old[::2, ::2]]
     return result
 
 
-def restrict_elements(values: Array, density: int) -> Array:
+def restrict_elements(values: Array, density: int, long: int = LONG) -> Array:
     """Element values (Q',) at half the density, means of four of those, (Q,), at `density`."""
-    long, short, layers = LONG * density, SHORT * density, LAYERS * density
+    long, short, layers = long * density, SHORT * density, LAYERS * density
     around = 2 * (long + short)
     grids = (
         values[: layers * around].reshape(layers, -1),
@@ -74,9 +74,9 @@ def _halve(values: Array, axis: int) -> Array:
     return np.asarray(spline(np.arange(2 * count - 1) / 2.0))
 
 
-def prolong_elements(values: Array, density: int) -> Array:
+def prolong_elements(values: Array, density: int, long: int = LONG) -> Array:
     """Element values (Q',) at twice the density from those, (Q,), at `density`: bilinear."""
-    long, short, layers = LONG * density, SHORT * density, LAYERS * density
+    long, short, layers = long * density, SHORT * density, LAYERS * density
     around = 2 * (long + short)
     ring = values[: layers * around].reshape(layers, around)
     ring = np.concatenate([ring[:, -1:], ring, ring[:, :1]], axis=1)  # it closes upon itself
@@ -108,3 +108,8 @@ def prolong_chain(values: Array) -> Array:
 def restrict_chain(values: Array) -> Array:
     """Values (n,) at every other node of a chain, from those, (2 n - 1,), at all of them."""
     return values[::2].copy()
+
+
+def prolong_loop(values: Array) -> Array:
+    """Values (2 n,) at the nodes and middles of a closed chain from those, (n,), at its nodes."""
+    return prolong_chain(np.append(values, values[:1]))[:-1]

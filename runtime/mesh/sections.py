@@ -30,6 +30,7 @@ class Disc:
     1 = concentric arc. layer_growth, row_growth: ratio of the last to the first thickness
     of the layers (outside to inside) and of the rows of the central block (bottom to top).
     spacing: of the nodes along the arc and, fading, in the columns above it; None = equal.
+    long: segments of the arc, and of the side opposite to it, at density 1.
     """
 
     centre_z: float
@@ -43,6 +44,7 @@ class Disc:
     layer_growth: float = 1.8
     row_growth: float = 2.4
     spacing: Spacing | None = None
+    long: int = LONG
 
     @property
     def corners(self) -> tuple[float, float, float, float]:
@@ -102,7 +104,7 @@ class SectionMesh:
 
 
 def disc_mesh(disc: Disc, density: int | Fraction) -> SectionMesh:
-    """O-grid of 360 d^2 quadrilaterals with 27 d segments on the arc and 66 d around.
+    """O-grid with `long` d segments on the arc: 27 d, 66 d around and 360 d^2 quadrilaterals.
 
     density: a multiple of 1/3, at least 2/3. Raises ValueError for others.
     """
@@ -110,7 +112,7 @@ def disc_mesh(disc: Disc, density: int | Fraction) -> SectionMesh:
         raise ValueError(
             f"disc_mesh: density {density} is not allowed, it is a multiple of 1/3 and at least 2/3"
         )
-    long, short, layers = (int(n * density) for n in (LONG, SHORT, LAYERS))
+    long, short, layers = (int(n * density) for n in (disc.long, SHORT, LAYERS))
     loop = _loop(disc, long, short)
     ring = disc.centre + disc.radius * disc.direction(loop[0])
     inner = loop[1]

@@ -4,8 +4,9 @@ A line of length L is to have `count` segments whose size at s is
 
     dx(s) = min(coarsest, min_k [a_k finest + rate |s - s_k|])
 
-with `finest` chosen such that they fill it. The map is that of the limit of many segments, so that
-the nodes of a mesh are among those of the mesh of twice its density.
+(the rate may differ from place to place and between the two sides of one) with `finest` chosen such
+that they fill it. The map is that of the limit of many segments, so that the nodes of a mesh are
+among those of the mesh of twice its density.
 """
 
 from __future__ import annotations
@@ -26,10 +27,14 @@ _STEPS = 27 * 64  # of the table of a map: nodes of every density up to 64 are e
 
 @dataclass(frozen=True)
 class Spot:
-    """A place to be resolved: s_k in mm, a_k the size there relative to that of other spots."""
+    """A place to be resolved: s_k in mm, a_k the size there relative to that of other spots.
+
+    rates: growth of the size before and behind it, None for that of the line.
+    """
 
     place: float
     size: float = 1.0
+    rates: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +72,7 @@ def graded(
             f"the coarsest size must be larger than {length / count:g} mm"
         )
     s = np.linspace(0.0, length, _STATIONS)
-    away = [rate * np.abs(s - spot.place) for spot in spots]
+    away = [_growth(s - spot.place, *(spot.rates or (rate, rate))) for spot in spots]
 
     def segments(log_finest: float) -> Array:
         """Number of segments (stations,) from the beginning of the line to s."""
@@ -81,3 +86,8 @@ def graded(
     places = np.interp(np.linspace(0.0, index[-1], _STEPS + 1), index, s) / length
     places[-1] = 1.0
     return Spacing(places)
+
+
+def _growth(beyond: Array, before: float, behind: float) -> Array:
+    """What a size grows by at signed distances (n,) from a place, at these rates."""
+    return np.where(beyond < 0.0, -before * beyond, behind * beyond)

@@ -45,6 +45,13 @@ def transfer_chain(
     return np.asarray(PchipInterpolator(_angles(old, nodes), values)(_angles(new, new_nodes)))
 
 
+def transfer_loop(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
+    """Values (n',) at the whole boundary of the new mesh from those, (n,), of the old, by angle."""
+    turn, angles = 2.0 * np.pi, _angles(old, old.boundary)
+    at = np.concatenate([angles - turn, angles, angles + turn])
+    return np.asarray(PchipInterpolator(at, np.tile(values, 3))(_angles(new, new.boundary)))
+
+
 def _angles(mesh: SectionMesh, nodes: Integers) -> Array:
     """Angles of boundary nodes about the middle of the boundary, rising, rad."""
     whole = mesh.points[mesh.boundary]

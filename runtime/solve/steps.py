@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from softehl.runtime.solve.solution import Status
 
@@ -34,6 +34,11 @@ class StepRule:
             raise ValueError(f"need 0 < smallest <= first <= largest, got {self}")
         if not (0.0 < self.cut < 1.0 <= self.growth and self.target_iterations >= 1):
             raise ValueError(f"need 0 < cut < 1 <= growth and target_iterations >= 1, got {self}")
+
+    def scaled(self, unit: float) -> StepRule:
+        """The rule with its lengths in other units, of which one is `unit` of the new ones."""
+        first, smallest, largest = (unit * a for a in (self.first, self.smallest, self.largest))
+        return replace(self, first=first, smallest=smallest, largest=largest)
 
     def after_success(self, step: float, taken: float, iterations: int) -> float:
         """Next step when `taken`, possibly shortened from `step` by a waypoint, has converged."""

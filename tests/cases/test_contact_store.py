@@ -67,7 +67,8 @@ CHANGED = {
 
 def case(**changes: Any) -> ORing:
     given = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (1600.0,)}
-    return ORing(**{"mesh": "uniform", "upwinding": 0.0, **given, **changes})
+    scheme = {"mesh": "uniform", "upwinding": 0.0, "arc_start": -34.0, "arc_end": 43.0}
+    return ORing(**{**scheme, **given, **changes})
 
 
 def names(outcome: Outcome) -> list[str]:

@@ -87,7 +87,7 @@ def test_a_wrong_value_is_named(key: str, value: Any) -> None:
         ({"rod_diameter": 60.0}, "the gap between rod and housing is -1.85 mm"),
         ({"section_diameter": 3.0}, "to squeeze the seal"),
         ({"section_diameter": 7.0}, "to squeeze the seal"),
-        ({"inner_diameter": 60.0}, "the section centre lies at radius 31.765 mm"),
+        ({"inner_diameter": 60.0}, "stretches inner_diameter = 60 mm by -16.7 %"),
         ({"groove_width": 3.0}, "at least section_diameter, 3.53 mm"),
         ({"groove_centre": 3.0}, "the round section must lie between the walls"),
     ],

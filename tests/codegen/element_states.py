@@ -112,6 +112,7 @@ def supports(rng: np.random.Generator) -> Iterator[Case]:
     X = quad(rng, 26.9, 0.4)
     u = [*rng.uniform(-0.3, 0.3, 8), -3.0]
     yield _case("mean_rotation", "turned", X, u, [0.01, 26.96, 7.6, 0.05])
+    yield _case("mean_axial", "moved", X, u, [9.8, 0.04])
     X = quad(rng, 26.9, 0.4)
     yield _case("axial_spring", "bedded", X, rng.uniform(-0.3, 0.3, 8), [0.37])
 

@@ -129,10 +129,16 @@ def test_fields(name: str) -> None:
 
 def test_cases_meet_every_family_and_every_branch() -> None:
     assert {c.family for c in CASES.values()} == set(ALL)
-    for family in set(ALL) - {"contact", "film"}:
+    for family in set(ALL) - {"contact", "film", "film_upwind"}:
         assert not branches(definition(family)), "a branch that no case is chosen for"
     closed = {bool(called(c)[0][:2].any()) for c in CASES.values() if c.family == "contact"}
     assert closed == {True, False}
+    widens = set()
+    for case in CASES.values():
+        if case.family == "film_upwind":  # h rises with the radius, downstream is along U
+            rise = (case.coordinates + case.dofs[:4])[[3, 1]] @ (1.0, -1.0)
+            widens.add(bool(case.parameters[1] * rise > 0.0))
+    assert widens == {True, False}
     signs = set()
     for case in CASES.values():
         if case.family == "film":

@@ -122,6 +122,18 @@ def test_moment_does_its_work_and_has_no_resultant() -> None:
     assert tangent[-1, -1] == 0.0
 
 
+def test_mean_axial_displacement_and_its_force() -> None:
+    """A rigid shift less the prescribed place; N pulls the section back by -N, and nothing else."""
+    nodes, _ = rectangle()
+    part = section("mean_axial", (WIDTH * HEIGHT, 0.02), extra=True)
+    shifted = np.ones_like(nodes) * (0.5, -0.2)
+    total, tangent = assemble([part], np.array([*shifted.ravel(), 7.0]))
+    assert total[-1] == pytest.approx(0.48, rel=1e-12)
+    assert total[:-1].reshape(-1, 2).sum(axis=0) == pytest.approx([7.0, 0.0], abs=1e-12)
+    np.testing.assert_allclose(tangent, tangent.T, atol=1e-15)
+    assert not tangent[:-1, :-1].any()
+
+
 def test_axial_spring_stores_the_closed_form_energy() -> None:
     """stiffness / 2 times the area for a shift; times the second moment for u_z = a (R - Rc)."""
     nodes, cells = rectangle()

@@ -102,13 +102,27 @@ def test_the_load_goes_downstream(speed: float, strength: float, downstream: int
     assert forces[0, downstream] == pytest.approx(-load / 2 * delta, rel=1e-12)
 
 
+@pytest.mark.parametrize(("speed", "strength"), [(U, 1.0), (-U, -1.0)], ids=["out", "in"])
+def test_it_fades_where_the_film_widens_downstream(speed: float, strength: float) -> None:
+    """By 1 / (1 + (rise / (0.2 h_m))^2): to a half where h rises by a fifth of its mean."""
+    forces = []
+    for rise in (-0.2, 0.0, 0.2):
+        h = 3e-4 * (1 + np.array([-0.5, 0.5]) * rise * np.sign(speed))
+        part, _ = chain(np.array([0.0, 0.1]), h, 2, strength=strength, speed=speed)
+        forces.append(abs(part.elements(np.array([0.0, 0, 0, 0, 1.0, 1.5, 1.0]))[0][0, 3]))
+    narrowing, level, widening = forces
+    assert narrowing == pytest.approx(level, rel=1e-5)
+    assert widening == pytest.approx(level / 2, rel=1e-5)
+
+
 def smooth(count: int, thickness: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Added traction (MPa) at the inner nodes of a smooth film, their places, the pressure there.
 
-    h is linear between the nodes, and p of order 4: the third derivative of exp is exp.
+    h is linear between the nodes and falls downstream, where nothing weakens the term; p is of
+    order 4: the third derivative of exp is exp.
     """
     x = np.linspace(0.0, 1.0, count + 1)
-    part, places = chain(x, thickness * (1 + 0.3 * np.sin(2 * x)), 4)
+    part, places = chain(x, thickness * (1.2 + 0.3 * np.cos(2 * x)), 4)
     state = np.concatenate([np.zeros(2 * len(x)), np.exp(places)])
     forces = np.bincount(part.maps.ravel(), part.elements(state)[0].ravel())[1 : 2 * len(x) : 2]
     return -forces[1:-1] * count / (2 * np.pi * ROD), x[1:-1], np.exp(x[1:-1])
@@ -127,7 +141,7 @@ def test_on_smooth_films_the_added_traction_is_of_third_order_where_the_oil_is_s
 
 def test_on_resolved_films_it_is_of_seventh_order() -> None:
     """delta falls with dx^4 where the elasticity of the seal is the stiffer one."""
-    counts = (20, 40, 80)
-    assert peclet(1 / 20, 6e-3) < 0.05
+    counts = (40, 80, 160)
+    assert peclet(1 / 40, 6e-3) < 0.05
     sizes = [np.abs(smooth(count, 6e-3)[0]).max() for count in counts]
     assert fitted_order(counts, sizes) == pytest.approx(-7.0, abs=0.1)

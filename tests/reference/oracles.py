@@ -55,6 +55,7 @@ RESIDUALS: dict[str, Oracle] = {
     "film_upwind": _plain(upwind.residual_upwind),
     "film_facet": _plain(facet.residual_facet),
     "mean_rotation": _plain(section.residual_rotation),
+    "mean_axial": _plain(section.residual_axial),
     "axial_spring": _single(section.residual_spring),
 }
 TANGENTS: dict[str, Oracle] = {
@@ -67,12 +68,14 @@ TANGENTS: dict[str, Oracle] = {
     "film_upwind": _plain(upwind.tangent_upwind),
     "film_facet": _plain(facet.tangent_facet),
     "mean_rotation": _plain(section.tangent_rotation),
+    "mean_axial": _plain(section.tangent_axial),
     "axial_spring": _single(section.tangent_spring),
 }
 ENERGIES: dict[str, Oracle] = {
     "solid_q4": _plain(solids.energy_q4),
     "solid_taylor": _plain(solids.energy_taylor),
     "mean_rotation": _plain(section.energy_rotation),
+    "mean_axial": _plain(section.energy_axial),
     "axial_spring": _single(section.energy_spring),
 }
 FIELDS: dict[str, Oracle] = {
@@ -113,7 +116,8 @@ def fields(state: State) -> Matrix:
 
 def blocks(family: str, count: int) -> tuple[Block, ...]:
     """Groups of unknowns of one kind: displacements, and pressures or multipliers."""
-    known = {"contact": 2, "film": 4, "film_upwind": 4, "film_facet": 6, "mean_rotation": 8}
+    known = {"contact": 2, "film": 4, "film_upwind": 4, "film_facet": 6}
+    known |= {"mean_rotation": 8, "mean_axial": 8}
     split = known.get(family, count)
     rest = () if split == count else (("p", slice(split, count)),)
     return (("u", slice(0, split)), *rest)

@@ -1,4 +1,4 @@
-"""Mean rotation of the section held by a moment, and the weak axial spring."""
+"""Mean rotation held by a moment, mean axial place by a force, and the weak axial spring."""
 
 from __future__ import annotations
 
@@ -31,6 +31,28 @@ def residual_rotation(X: Sequence[Number], dofs: Vector, parameters: Sequence[Nu
 def tangent_rotation(X: Sequence[Number], dofs: Vector, parameters: Sequence[Number]) -> Matrix:
     """Second differences of the potential."""
     return hessian(lambda v: energy_rotation(X, v, parameters), dofs)
+
+
+def energy_axial(
+    X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number]
+) -> Number:
+    """(N / A) times the integral of u_z - place over the area of the element, N mm."""
+    area, place = parameters
+    total = mpf(0)
+    for at in gauss_points(X):
+        u_z = mp.fsum(s * dofs[2 * a] for a, s in enumerate(at.shapes))
+        total += (u_z - place) * at.area
+    return dofs[8] / area * total
+
+
+def residual_axial(X: Sequence[Number], dofs: Vector, parameters: Sequence[Number]) -> Vector:
+    """Gradient of the potential."""
+    return gradient(lambda v: energy_axial(X, v, parameters), dofs)
+
+
+def tangent_axial(X: Sequence[Number], dofs: Vector, parameters: Sequence[Number]) -> Matrix:
+    """Second differences of the potential."""
+    return hessian(lambda v: energy_axial(X, v, parameters), dofs)
 
 
 def energy_spring(X: Sequence[Number], u: Sequence[Number], stiffness: Number) -> Number:

@@ -126,6 +126,7 @@ def section_states() -> Iterator[State]:
         yield State(
             "mean_rotation", label, _tuple(X), (*_tuple(u), moment), (0.013, 26.96, 7.62, 0.05)
         )
+        yield State("mean_axial", label, _tuple(X), (*_tuple(u), moment), (9.8, 0.04))
         yield State("axial_spring", label, _tuple(X), _tuple(u), (0.37,))
 
 

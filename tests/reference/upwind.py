@@ -26,12 +26,17 @@ def bubble_load(X: Sequence[Number], dofs: Sequence[Number], pressures: Sequence
 
 
 def share(X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number]) -> Number:
-    """delta = Pe^2 / (9 + Pe^2), Pe = 3 eta_0 |U / 2| dx^2 / (pi G h_m^3)."""
+    """delta = w Pe^2 / (9 + Pe^2), Pe = 3 eta_0 |U / 2| dx^2 / (pi G h_m^3).
+
+    w = 1 / (1 + (5 (h2 - h1) / h_m)^2) where the film widens downstream, 1 elsewhere.
+    """
     rod_radius, speed, viscosity, shear_modulus = parameters[:4]
     z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
     h_m = (r1 + r2) / 2 - rod_radius
     peclet = 3 * viscosity * abs(speed) / 2 * (z2 - z1) ** 2 / (PI * shear_modulus * h_m**3)
-    return peclet**2 / (9 + peclet**2)
+    widening = 5 * (r2 - r1) / h_m
+    weight = 1 / (1 + widening**2) if speed * widening > 0 else mpf(1)
+    return weight * peclet**2 / (9 + peclet**2)
 
 
 def residual_upwind(
