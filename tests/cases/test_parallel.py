@@ -112,7 +112,7 @@ def tell_and_wait(target: Path) -> None:
     time.sleep(60.0)
 
 
-def eventually(look: Any, seconds: float = 20.0) -> Any:
+def eventually(look: Any, seconds: float = 120.0) -> Any:
     """What `look` sees as soon as that is something."""
     end = time.monotonic() + seconds
     while not (seen := look()) and time.monotonic() < end:
