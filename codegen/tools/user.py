@@ -156,6 +156,8 @@ def _errors_of(path: Path) -> Iterator[None]:
         raise ModelFileError(f"{where}: {error.msg}") from error
     except Exception as error:
         what = str(error) or "no further words"
+        if isinstance(error, RecursionError):
+            what = "nested too deeply for SymPy: name parts of it with m.define"
         if isinstance(error, ModelError) and what.startswith(str(path.parent)):
             raise ModelFileError(what) from error  # it has found its line itself
         kind = "" if isinstance(error, ModelError) else f"{type(error).__name__}: "

@@ -1,0 +1,107 @@
+"""Long pages: thousands of names, long sums and deep expressions need no deep stack."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from softehl.codegen import pipeline
+from softehl.codegen.abi import Target
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.graph.graph import Graph, Op
+from softehl.codegen.graph.traverse import Recursion, recursion
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.lower import Lowering, ModelError
+from softehl.codegen.language.model import Model
+from softehl.codegen.tools.oracle import Oracle
+from tests.codegen.workshop import compiled
+
+STATE = State((), (0.7, -0.4))
+
+
+def chain(names: int, *tasks: str) -> Definition:
+    """Each name is made of the one before: a_k+1 = a_k + (y - a_k^2 / (k + 3)) / names."""
+    m = Model("chain", nodes=1, rule=quadrature.point_rule())
+    x, y = m.unknown("x"), m.unknown("y")
+    a = x
+    for k in range(names):
+        a = m.define(f"a{k}", a + (y - a**2 / (k + 3)) / names)
+    m.potential(a * x)
+    m.offer(tasks=tasks)
+    return m.finish()
+
+
+def addition(terms: int, *tasks: str) -> Definition:
+    m = Model("addition", nodes=1, rule=quadrature.point_rule())
+    x, y = m.unknown("x"), m.unknown("y")
+    m.potential(sp.Add(*[sp.exp(x / (k + 1)) * y / (k + 1) for k in range(terms)]))
+    m.offer(tasks=tasks)
+    return m.finish()
+
+
+def test_recursion_is_that_of_python_but_deeper() -> None:
+    def total(n: int) -> Recursion[int]:
+        return n + (yield total(n - 1)) if n else 0
+
+    assert recursion(total(10)) == 55
+    assert recursion(total(100_000)) == 100_000 * 100_001 // 2
+
+
+@pytest.mark.parametrize("d", [chain(300, "residual", "tangent"), addition(100, "tangent")])
+def test_values_of_a_long_page_are_those_of_the_oracle(d: Definition, tmp_path: Path) -> None:
+    kernel = compiled(d, tmp_path)
+    R, K = kernel.tangent(np.zeros((1, 2)), np.array([STATE.dofs]))
+    oracle = Oracle(d)
+    np.testing.assert_allclose(R[0], np.array(oracle.residual(STATE), dtype=float), rtol=1e-12)
+    tangent = np.array(oracle.tangent(STATE), dtype=float)
+    np.testing.assert_allclose(K[0], tangent, rtol=1e-12, atol=1e-20)
+
+
+def test_two_thousand_names() -> None:
+    d = chain(2_000, "residual")
+    function = pipeline.compile_model(d).functions["residual"]
+    assert function.chosen.operations > 4 * 2_000
+    assert float(Oracle(d).potential(STATE)) == pytest.approx(0.21, abs=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", [Target.SIMD, Target.SCALAR])
+def test_ten_thousand_names(target: Target) -> None:
+    d = chain(10_000, "residual", "tangent")
+    functions = pipeline.compile_model(d, target).functions
+    assert functions["tangent"].chosen.operations > 10 * 10_000
+
+
+@pytest.mark.slow
+def test_five_thousand_terms() -> None:
+    functions = pipeline.compile_model(addition(5_000, "residual", "tangent")).functions
+    assert functions["residual"].chosen.operations > 3 * 5_000
+
+
+def test_a_deep_expression_is_lowered() -> None:
+    g = Graph()
+    x = sp.Symbol("x", real=True)
+    deep = x
+    for _ in range(3_000):
+        deep = sp.sin(deep, evaluate=False)
+    node = Lowering(g, {x: g.input("dofs", 0)})(deep)
+    depth = 0
+    while node.op is Op.SIN:
+        node, depth = node.args[0], depth + 1
+    assert depth == 3_000
+
+
+def test_where_sympy_gives_up_the_page_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    g = Graph()
+    x = sp.Symbol("x", real=True)
+
+    def deep(expression: object) -> object:
+        raise RecursionError
+
+    monkeypatch.setattr(sp, "sympify", deep)
+    with pytest.raises(ModelError, match=r"test_long_models.py:\d+: .* too deeply .*m\.define"):
+        Lowering(g, {})(x)
