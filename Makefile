@@ -15,7 +15,7 @@ BUILDER := $(wildcard codegen/tools/build.py codegen/abi.py)
 OTHERS ?= python3.13 python3.12 $(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python \
 	$(HOME)/.pyenv/versions/3.12.*/bin/python)
 
-.PHONY: help oring test test-other slow wheel lint check format docs pictures clean
+.PHONY: help oring test test-other slow torture wheel lint check format docs pictures clean
 
 help:
 	@echo "make oring    solve the O-ring and write its film-thickness curve to $(OUT)"
@@ -49,6 +49,10 @@ test-other:
 	  fi; \
 	done; \
 	echo "no second Python is installed (looked for: $(OTHERS)): its tests are left out"
+
+# faults from outside, at most 15 minutes; writes its table into docs/reliability.md
+torture: $(VENV)/.dev $(VENV)/.kernels
+	$(BIN)/python -m tests.torture 15 docs/reliability.md
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from softehl.__main__ import main
+    from softehl.cases.harness.processes import processes
     from softehl.cases.harness.sweep import Curve
     from softehl.cases.seal.method import run as run_oring
     from softehl.cases.seal.parameters import ORing
@@ -60,6 +61,7 @@ _PUBLIC = {
     "StepRule": "softehl.runtime.solve.steps",
     "Study": "softehl.runtime.study",
     "main": "softehl.__main__",
+    "processes": "softehl.cases.harness.processes",
     "run_oring": "softehl.cases.seal.method:run",
     "solve_cases": "softehl.cases.shipped",
 }
@@ -101,6 +103,7 @@ __all__ = [
     "kinematics",
     "load_kernel",
     "main",
+    "processes",
     "quadrature",
     "run_oring",
     "shapes",

@@ -1,0 +1,223 @@
+"""`python -m tests.torture [MINUTES] [FILE.md]`: try every fault, print and write the table.
+
+Bounded to 15 minutes. The exit code is 1 if anything was lost or ended in a traceback.
+"""
+
+from __future__ import annotations
+
+import random
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from tests.torture.trials import (
+    CASE,
+    DAMAGES,
+    PAGE,
+    RUN,
+    Clock,
+    Tally,
+    begun,
+    curve,
+    damage,
+    done,
+    ended,
+    killed,
+    same,
+    wounds,
+)
+
+SCRIPT = """
+import softehl
+speeds = (1600.0, 800.0, 400.0)
+cases = {
+    str(p): softehl.ORing(density=1, sealed_pressure=p, speeds=speeds) for p in (1.0, 2.0)
+}
+if __name__ == "__main__":
+    with softehl.processes(2) as executor:
+        curves = softehl.solve_cases(cases, "swept", executor, resume=True)
+    assert all(c.converged for c in curves), [c.complaints for c in curves]
+"""
+
+
+def kills(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
+    """Runs of every mode, killed at random moments and resumed until they are done."""
+    reference = work / "reference"
+    assert done(*RUN, str(reference), cwd=work).code == 0
+    expected = curve(reference)
+    modes: list[tuple[str, ...]] = [(), ("--jobs", "2")]
+    for number in range(30):
+        if clock.left() < 0.45 * 60 * MINUTES:
+            break
+        folder, more = work / f"killed{number}", modes[number % len(modes)]
+        for _ in range(3):
+            mode = (*RUN, str(folder), "--resume", *more)
+            if not killed(begun(*mode, cwd=work), rng.uniform(0.3, 6.0)):
+                break
+            tally.count(wounds(folder))
+        last = done(*RUN, str(folder), "--resume", cwd=work)
+        tally.count(last.fault or same(curve(folder), expected))
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def disks(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
+    """Files that cannot grow, folders that cannot be written, folders that are files."""
+    for largest in (0, 300, 3000, 30_000, 200_000):
+        folder = work / f"full{largest}"
+        first = done(*RUN, str(folder), cwd=work, largest=largest)
+        tally.count(first.fault or ("" if first.code in (0, 2) else f"exit code {first.code}"))
+        tally.count(wounds(folder))
+        again = done(*RUN, str(folder), "--resume", cwd=work)
+        tally.count(again.fault or ("" if len(curve(folder)) == 8 else "rows are missing"))
+    (work / "page.py").write_text(PAGE)
+    for largest in (0, 300, 3000):
+        cache = work / f"cache{largest}"
+        tried = done("generate", "page.py", cwd=work, cache=cache, largest=largest)
+        tally.count(tried.fault)
+        tally.count(done("generate", "page.py", cwd=work, cache=cache).fault)
+    (work / "file").write_text("mine")
+    for out in ("file", "file/below", "/proc/nothing", "\udcff"):
+        tried = done(*RUN, out, cwd=work)
+        tally.count(tried.fault or ("" if tried.code == 2 else f"--out {out!r}: {tried.code}"))
+    tally.count("" if (work / "file").read_text() == "mine" else "a user's file was changed")
+
+
+def damages(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
+    """Every kind of file of a run, damaged in every way, then resumed."""
+    good = work / "good"
+    assert done(*RUN, str(good), cwd=work).code == 0
+    expected = curve(good)
+    names = ["run.json", "curve.csv", "leakage.csv", "profile_1_400.csv", "section_1_400.vtu"]
+    for name in [*names, "contact_1.csv", "curve.png"]:
+        for kind in DAMAGES:
+            if clock.left() < 0.25 * 60 * MINUTES:
+                return
+            folder = work / "damaged"
+            shutil.rmtree(folder, ignore_errors=True)
+            shutil.copytree(good, folder)
+            damage(folder / name, kind, rng)
+            tried = done(*RUN, str(folder), "--resume", cwd=work)
+            right = tried.code == 2 or not same(curve(folder), expected)
+            tally.count(tried.fault or ("" if right else f"{name} {kind}: wrong rows"))
+
+
+def caches(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
+    """Every file of the user's cache, damaged in every way, then used."""
+    (work / "page.py").write_text(PAGE)
+    good = work / "cache"
+    assert done("generate", "page.py", cwd=work, cache=good).code == 0
+    assert done("run", "oring", *CASE, "--out", "warm", cwd=work, cache=good).code == 0
+    files = sorted(p.relative_to(good) for p in good.rglob("*") if p.is_file())
+    trials = [(name, kind) for name in files for kind in DAMAGES]
+    rng.shuffle(trials)
+    for name, kind in trials[:40]:
+        if clock.left() < 0.1 * 60 * MINUTES:
+            return
+        cache = work / "broken"
+        shutil.rmtree(cache, ignore_errors=True)
+        shutil.copytree(good, cache)
+        damage(cache / name, kind, rng)
+        tried = done("generate", "page.py", cwd=work, cache=cache)
+        tally.count(tried.fault or ("" if tried.code == 0 else f"{name} {kind}: {tried.err}"))
+        if "built" in name.parts or name.suffix not in (".json",):
+            one = ("run", "oring", "--set", "density=1", "--set", "speeds=[1600]", "--quiet")
+            tried = done(*one, "--overwrite", "--out", "used", cwd=work, cache=cache)
+            tally.count(tried.fault or ("" if tried.code == 0 else f"{name} {kind}: {tried.err}"))
+
+
+def pairs(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
+    """Two processes at once on one folder, one cache, one sweep."""
+    for more in ((), ("--resume",), ("--overwrite",)):
+        both = [begun(*RUN, str(work / "shared"), *more, cwd=work) for _ in range(2)]
+        ends = [ended(process) for process in both]
+        codes = sorted(end.code for end in ends)
+        for end in ends:
+            tally.count(end.fault)
+        tally.count("" if codes in ([0, 2], [0, 0]) else f"exit codes {codes}")
+        tally.count("" if len(curve(work / "shared")) == 8 else "rows are missing")
+    (work / "page.py").write_text(PAGE)
+    for _ in range(2):
+        cache = Path(tempfile.mkdtemp(dir=work))
+        both = [begun("generate", "page.py", cwd=work, cache=cache) for _ in range(2)]
+        for process in both:
+            end = ended(process)
+            tally.count(end.fault or ("" if end.code == 0 else end.err))
+    cache = Path(tempfile.mkdtemp(dir=work))
+    first = [begun(*RUN, str(work / f"first{k}"), cwd=work, cache=cache) for k in range(2)]
+    for k, process in enumerate(first):
+        end = ended(process)
+        tally.count(end.fault or ("" if len(curve(work / f"first{k}")) == 8 else end.err))
+
+
+def sweeps(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
+    """A sweep on two processes, killed and begun again until it is done."""
+    import subprocess
+
+    (work / "sweep.py").write_text(SCRIPT)
+    for _ in range(6):
+        if clock.left() < 60:
+            break
+        process = subprocess.Popen(
+            [sys.executable, "sweep.py"],
+            cwd=work,
+            start_new_session=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        was = killed(process, rng.uniform(1.0, 8.0))
+        for name in ("1.0", "2.0"):
+            tally.count(wounds(work / "swept" / name) if name == "1.0" else "")
+        if not was:
+            break
+    last = subprocess.run(
+        [sys.executable, "sweep.py"], cwd=work, capture_output=True, text=True, check=False
+    )
+    tally.count("" if last.returncode == 0 else last.stderr.strip()[-200:])
+
+
+GROUPS = (
+    (kills, "kill -9 of a run", "no half file, nothing lost; resumed to the same curve"),
+    (sweeps, "kill -9 of a sweep", "no half file; begun again it ends"),
+    (pairs, "two processes at once", "one of them, or both, right; the other says why not"),
+    (damages, "a damaged file of a run", "computed again or refused in one line; never believed"),
+    (caches, "a damaged file of the cache", "healed without a word"),
+    (disks, "full disks, folders that are none", "one line; what was there is still there"),
+)
+
+
+def lines(tallies: list[Tally]) -> Iterator[str]:
+    """The table as Markdown."""
+    yield "| fault | tried | survived | what that means |"
+    yield "|---|---|---|---|"
+    for tally in tallies:
+        yield f"| {tally.name} | {tally.tried} | {tally.survived} | {tally.means} |"
+
+
+MINUTES = float(sys.argv[1]) if len(sys.argv) > 1 else 15.0
+
+
+def main() -> int:
+    """Try everything."""
+    clock, rng, tallies = Clock(MINUTES), random.Random(20261121), []
+    for group, name, means in GROUPS:
+        tally = Tally(name, means)
+        with tempfile.TemporaryDirectory(prefix="torture-") as folder:
+            group(Path(folder), clock, rng, tally)
+        tallies.append(tally)
+        print(f"{name}: {tally.survived} of {tally.tried}", flush=True)
+        for failure in tally.failures:
+            print(f"  {failure}", flush=True)
+    if len(sys.argv) > 2:
+        page = Path(sys.argv[2])
+        before, _, rest = page.read_text().partition("<!-- table -->\n")
+        _, _, after = rest.partition("<!-- end -->")
+        table = "\n".join(lines(tallies))
+        page.write_text(f"{before}<!-- table -->\n{table}\n\n<!-- end -->{after}")
+    return int(any(tally.failures for tally in tallies))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
