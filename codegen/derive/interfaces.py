@@ -19,10 +19,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.polynomial import Monomial, Polynomial, added, product, value
 from softehl.codegen.graph.traverse import reachable
 
-Monomial = tuple[int, ...]
-Polynomial = dict[Monomial, Fraction]
 Vector = tuple[tuple[int, Fraction], ...]
 """A sparse constant vector over sources: (id of the source, coefficient), ids ascending."""
 
@@ -132,24 +131,6 @@ class _Expansion:
                     m.op is Op.CONST or _parent(m) or (linear and all(self.pure[a] for a in m.args))
                 )
         return self.pure[n]
-
-
-def product(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Product of two polynomials."""
-    out: Polynomial = {}
-    for a, x in p.items():
-        for b, y in q.items():
-            key = tuple(sorted((*a, *b)))
-            out[key] = out.get(key, Fraction(0)) + x * y
-    return {k: v for k, v in out.items() if v}
-
-
-def added(p: Polynomial, q: Polynomial, sign: int) -> Polynomial:
-    """p + sign q."""
-    out = dict(p)
-    for k, v in q.items():
-        out[k] = out.get(k, Fraction(0)) + sign * v
-    return {k: v for k, v in out.items() if v}
 
 
 def _combined(
@@ -289,10 +270,4 @@ class _Forms:
 
     def _value(self, p: Polynomial) -> Node:
         """A polynomial in atoms as a node."""
-        g, result = self.g, self.g.zero
-        for monomial, c in p.items():
-            term = g.one
-            for i in sorted(monomial, key=lambda i: (self.nodes[i].varying, i)):
-                term = g.mul(term, self.nodes[i])
-            result = g.add(result, g.mul(g.const(c), term))
-        return result
+        return value(self.g, p, self.nodes, order=lambda i: (self.nodes[i].varying, i))

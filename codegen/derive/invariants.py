@@ -20,8 +20,8 @@ from itertools import combinations, combinations_with_replacement
 from sympy import QQ
 from sympy.polys.matrices import DomainMatrix
 
-from softehl.codegen.derive.interfaces import Monomial, Polynomial, added, product
 from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.polynomial import Monomial, Polynomial, added, product, value
 from softehl.codegen.graph.traverse import Recursion, reachable, recursion
 
 _Shape = tuple[tuple[Monomial, Fraction], ...]
@@ -131,22 +131,9 @@ class _Recipe:
 
     def cook(self, g: Graph, terms: Sequence[Node], known: Mapping[int, Node]) -> Node:
         """The value over the new `terms`, with the constants as `known` by their old ids."""
-        total = _polynomial_value(g, self.row, terms)
-        factor = _polynomial_value(g, {self.part.constants: self.part.scale}, known)
+        total = value(g, self.row, terms)
+        factor = value(g, {self.part.constants: self.part.scale}, known)
         return g.mul(factor, total)
-
-
-def _polynomial_value(
-    g: Graph, p: Mapping[tuple[int, ...], Fraction], atoms: Mapping[int, Node] | Sequence[Node]
-) -> Node:
-    """A polynomial in numbered atoms as a node."""
-    result = g.zero
-    for monomial, c in p.items():
-        term = g.const(abs(c))
-        for i in monomial:
-            term = g.mul(term, atoms[i])
-        result = g.add(result, term) if c > 0 else g.sub(result, term)
-    return result
 
 
 @dataclass
@@ -202,7 +189,7 @@ class _Search:
         inside = {self._nodes[i] for shape in basis for m, _ in shape for i in m}
         if not recipes.keys().isdisjoint(reachable(inside - self.forms)):
             return None
-        terms = [_polynomial_value(self.g, dict(s), self._nodes) for s in [*basis, *squared]]
+        terms = [value(self.g, dict(s), self._nodes) for s in [*basis, *squared]]
         terms = [self.g.name(f"q{k}", t) if k < len(basis) else t for k, t in enumerate(terms)]
         return recipes, terms, tuple(terms[: len(basis)])
 
