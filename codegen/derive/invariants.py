@@ -37,7 +37,7 @@ ABOVE = float("inf")
 def degrees(
     roots: Sequence[Node], linear: Collection[Node], constant: Collection[Node]
 ) -> dict[Node, float]:
-    """Degree of every value below `roots` as a polynomial in the forms `linear`; inf: is none."""
+    """Degree of every value below `roots` as a polynomial in the forms `linear`; inf: it is not one."""
     degree: dict[Node, float] = {}
     linear, constant = frozenset(linear), frozenset(constant)
     for n in reachable(roots):
@@ -148,7 +148,7 @@ class _Search:
         self._nodes = {f.id: f for f in self.forms}
 
     def targets(self, roots: Sequence[Node]) -> list[Node]:
-        """Polynomials that something which is none uses (or that are roots themselves)."""
+        """Polynomials that a value of another kind uses, or that are roots themselves."""
         out = {r: None for r in roots if 1 < self.degree[r] < ABOVE}
         for n in reachable(roots):
             if self.degree[n] == ABOVE:

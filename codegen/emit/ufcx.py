@@ -38,7 +38,8 @@ def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
         known = ", ".join(f"{n} in {k}-D" for n, k in abi.VERTEX_ORDER)
         raise TargetError(
             f"{d.name} has {d.nodes} nodes and a rule in {d.rule.dimension}-D; DOLFINx has "
-            f"Lagrange elements of as many nodes as {known}: choose one of them, or use simd or scalar"
+            f"Lagrange elements of as many nodes as {known}: choose one of them, or use simd or "
+            "scalar"
         )
     return [t for t in offered if t not in (abi.Task.FIELDS, abi.Task.PRODUCT)]
 
