@@ -37,7 +37,7 @@ ABOVE = float("inf")
 def degrees(
     roots: Sequence[Node], linear: Collection[Node], constant: Collection[Node]
 ) -> dict[Node, float]:
-    """Degree of every value below `roots` as a polynomial in the forms `linear`; inf: it is not one."""
+    """Degree of every value below `roots` as a polynomial in `linear`; inf: it is not one."""
     degree: dict[Node, float] = {}
     linear, constant = frozenset(linear), frozenset(constant)
     for n in reachable(roots):
