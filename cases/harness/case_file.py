@@ -19,11 +19,13 @@ from pydantic import ValidationError
 from softehl.cases.harness.case import AnyCase, Run, load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters
+from softehl.cases.harness.units import is_quantity
 
 Shipped = Mapping[str, str]
 """Name of a case that ships -> its module, which is imported when the case is needed."""
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+_PHRASE = re.compile(r"[A-Za-z][A-Za-z0-9]*( [A-Za-z0-9][A-Za-z0-9.,]*)+")
 _SHOWN = 60
 _LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end
 
@@ -65,7 +67,7 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
         table = {}
     if list(table) == ["value"]:
         return key, table["value"]
-    if _BARE_WORD.fullmatch(value):
+    if _BARE_WORD.fullmatch(value) or is_quantity(value) or _PHRASE.fullmatch(value):
         return key, value
     raise BadInput(
         f"{origin} {key}: {_shorten(value)!r} is not a TOML value; "

@@ -5,7 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from softehl.cases.harness.units import is_quantity, read_quantity
 
 _BOUNDS = {"gt": "> {}", "ge": ">= {}", "lt": "< {}", "le": "<= {}"}
 
@@ -29,12 +31,28 @@ Nonzeros = Annotated[
 class Parameters(BaseModel):
     """Base of a parameter set: frozen, checked on construction, of strict types.
 
-    An integer is accepted where a real number is meant, nothing else is converted.  Every key has
-    a default, and is declared by :func:`key`.  Raises pydantic.ValidationError where a value is of
-    the wrong type, out of its range or not finite, and for an unknown key.
+    An integer is accepted where a real number is meant, and a text with a unit where a key has one
+    ("50 bar"); nothing else is converted.  Every key has a default, and is declared by :func:`key`.
+    Raises pydantic.ValidationError where a value is of the wrong type, out of its range or not
+    finite, and for an unknown key.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_units(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        return cls.completed({name: _plain(cls, name, value) for name, value in given.items()})
+
+    @classmethod
+    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """The values with those that follow from them; for cases whose keys name one another.
+
+        Raises ValueError.
+        """
+        return given
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -45,6 +63,21 @@ class Parameters(BaseModel):
             extra["bounds"] = bounds = extra["bounds"] or _values(field.annotation)
             unit = f" [{extra['unit']}]" if extra["unit"] else ""
             field.description = f"{extra['meaning']}{unit}" + (f"; {bounds}" if bounds else "")
+
+
+def _plain(kind: type[Parameters], name: str, value: object) -> object:
+    """A value without a unit, in that of its key; lists item by item."""
+    if isinstance(value, list | tuple):
+        return [_plain(kind, name, item) for item in value]
+    field = kind.model_fields.get(name)
+    extra = field.json_schema_extra if field else None
+    unit = str(extra["unit"]) if isinstance(extra, dict) else ""
+    if not unit or not isinstance(value, str) or not is_quantity(value):
+        return value
+    try:
+        return read_quantity(value, unit)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 @dataclass(frozen=True)

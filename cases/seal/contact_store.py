@@ -30,6 +30,7 @@ from softehl.runtime.solve.newton import Newton
 WITHOUT_INFLUENCE = (
     *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
     *("viscosity", "pressure_viscosity", "shear_traction", "cavitation_penalty"),
+    *("ring", "rod", "squeeze", "gland", "backup", "extrusion_gap"),  # diameters follow from them
     *("rotation", "solver", "linear", "upwinding", "error_estimate", "tolerance"),
 )
 """Parameters that the contact stage does not know."""

@@ -3,11 +3,12 @@
 Units are mm, MPa, N, s.
 """
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.fitting import fitted
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
@@ -80,6 +81,38 @@ class ORing(Parameters):
         "auto", "linear solver", bounds='"superlu", "pardiso" or "auto" (pardiso where installed)'
     )
 
+    ring: str | None = key(
+        None,
+        "a ring by its name, for inner_diameter and section_diameter",
+        bounds='"AS568-226", "ISO 3601 50.4x3.55", left out = by its diameters',
+    )
+    rod: float | None = key(None, "the same as rod_diameter", unit="mm", gt=0)
+    squeeze: float | None = key(
+        None,
+        "part of section_diameter that the gland takes away, for housing_diameter",
+        unit="%",
+        bounds="> 0 to 50, left out = by housing_diameter",
+        gt=0,
+        le=50,
+    )
+    gland: Literal["dynamic"] | None = key(
+        None,
+        "a standard gland, for housing_diameter and groove_width where they are not given",
+        bounds='"dynamic" (reciprocating rod), left out = none, or "dynamic" with a ring',
+    )
+    backup: bool = key(
+        True,
+        "whether a back-up ring closes the gap between rod and housing on the air side",
+        bounds="true (an open gap cannot be computed yet)",
+    )
+    extrusion_gap: float = key(
+        0.0,
+        "radial gap between rod and housing on the air side",
+        unit="mm",
+        bounds="0 (an open gap cannot be computed yet: backup = true)",
+        ge=0,
+    )
+
     inner_diameter: float = key(50.39, "inner diameter of the seal D_inner", unit="mm", gt=0)
     section_diameter: float = key(3.53, "diameter of the section D_seal", unit="mm", gt=0)
     rod_diameter: float = key(50.0, "rod diameter D_rod", unit="mm", gt=0)
@@ -87,7 +120,14 @@ class ORing(Parameters):
     mu_1: float = key(3.04, "Mooney-Rivlin parameter mu_1 of (3)", unit="MPa", gt=0)
     mu_2: float = key(0.62, "Mooney-Rivlin parameter mu_2 of (3)", unit="MPa", ge=0)
     bulk_modulus: float = key(500.0, "bulk modulus kappa of (6)", unit="MPa", gt=0)
-    viscosity: float = key(6.59e-8, "viscosity eta_0 at zero pressure of (13)", unit="MPa s", gt=0)
+    viscosity: float = key(
+        6.59e-8,
+        "viscosity eta_0 at zero pressure of (13)",
+        unit="MPa s",
+        bounds='1e-12 to 1e-3; 1e-9 MPa s is 1 mPa s, and "46 mPa s" may be written too',
+        ge=1e-12,
+        le=1e-3,
+    )
     cavitation_penalty: float = key(
         1.0e4, "cavitation penalty epsilon of (25)", unit="mm/(MPa s)", gt=0
     )
@@ -115,6 +155,11 @@ class ORing(Parameters):
         gt=0.0,
         le=120.0,
     )
+
+    @classmethod
+    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """Diameters and width from ring, rod, squeeze and gland.  ValueError."""
+        return fitted(given)
 
     @property
     def given_arc(self) -> tuple[float, float] | None:
@@ -148,6 +193,16 @@ class ORing(Parameters):
             raise ValueError(
                 f"tolerance = {self.tolerance:g} needs an estimate of the error; "
                 'set error_estimate = true and mesh = "graded"'
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _air_side_is_closed(self) -> Self:
+        if not self.backup or self.extrusion_gap:
+            raise ValueError(
+                "an open gap on the air side (backup = false, extrusion_gap) cannot be computed "
+                "yet: the wall of the air side reaches down to the rod, as with a back-up ring; "
+                "leave both keys out"
             )
         return self
 

@@ -1,0 +1,53 @@
+"""Numbers with units, as a user types them: "50 bar", "0.2 m/s", "12 %".
+
+Everything is computed in mm, MPa, N, s; a key says which of these it is in, and a text with a unit
+of the same kind is converted to it. There is no arithmetic of units here.
+"""
+
+import re
+
+_QUANTITY = re.compile(
+    r"""[ ]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
+    [ ]*(1/\S+|(?![eE][+-]?\d)[A-Za-z%\xb5\xb0][^\n]*?)[ ]*""",
+    re.VERBOSE,
+)
+
+_KINDS = {
+    "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, "inch": 25.4},
+    "MPa": {
+        **{"MPa": 1.0, "GPa": 1e3, "kPa": 1e-3, "Pa": 1e-6, "bar": 0.1, "mbar": 1e-4},
+        **{"psi": 6.894757293168361e-3, "N/mm2": 1.0, "N/mm^2": 1.0},
+    },
+    "mm/s": {
+        **{"mm/s": 1.0, "m/s": 1e3, "cm/s": 10.0, "um/s": 1e-3, "µm/s": 1e-3},
+        **{"mm/min": 1.0 / 60.0, "m/min": 1e3 / 60.0, "in/s": 25.4},
+    },
+    "MPa s": {"MPa s": 1.0, "Pa s": 1e-6, "mPa s": 1e-9, "cP": 1e-9, "P": 1e-7},
+    "1/MPa": {"1/MPa": 1.0, "1/GPa": 1e-3, "1/Pa": 1e6, "1/bar": 10.0},
+    "degrees": {"degrees": 1.0, "degree": 1.0, "deg": 1.0, "°": 1.0},
+    "%": {"%": 1.0, "percent": 1.0},
+}
+
+_KINEMATIC = ("cSt", "St", "mm2/s", "mm^2/s", "mm²/s", "m2/s")
+
+
+def is_quantity(text: str) -> bool:
+    """Whether a text is a number and something behind it."""
+    return _QUANTITY.fullmatch(text) is not None
+
+
+def read_quantity(text: str, unit: str) -> float:
+    """The number of a text in `unit`.
+
+    Raises ValueError, in words, for a text without a unit of that kind.
+    """
+    known, found = _KINDS.get(unit, {unit: 1.0}), _QUANTITY.fullmatch(text)
+    given = found[2].replace("·", " ").replace("*", " ") if found else ""
+    if found and given in known:
+        return float(found[1]) * known[given]
+    if unit == "MPa s" and given in _KINEMATIC:
+        raise ValueError(
+            f'"{text}" is a kinematic viscosity; the dynamic one is meant, which is it times the '
+            'density: of an oil of 870 kg/m3, 46 cSt are "40 mPa s"'
+        )
+    raise ValueError(f'"{text}" is no number in {unit}; units: {", ".join(known)}')

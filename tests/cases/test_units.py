@@ -1,0 +1,55 @@
+"""Numbers with units, as they are typed."""
+
+import pytest
+
+from softehl.cases.harness.units import is_quantity, read_quantity
+from softehl.cases.seal.parameters import ORing
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("30 bar", "MPa", 3.0),
+        ("435.113 psi", "MPa", 3.0),
+        ("0.2 m/s", "mm/s", 200.0),
+        ("12 m/min", "mm/s", 200.0),
+        ("12 %", "%", 12.0),
+        ("12%", "%", 12.0),
+        ("40 mPa s", "MPa s", 4e-8),
+        ("40 cP", "MPa s", 4e-8),
+        ("2 in", "mm", 50.8),
+        ("-30 deg", "degrees", -30.0),
+        ("1e3 kPa", "MPa", 1.0),
+        ("20 1/GPa", "1/MPa", 0.02),
+    ],
+)
+def test_quantities(text: str, unit: str, value: float) -> None:
+    assert is_quantity(text)
+    assert read_quantity(text, unit) == pytest.approx(value, rel=1e-5)
+
+
+@pytest.mark.parametrize("text", ["AS568-226", "out", "12", "1e-3", "", "-226", "bar"])
+def test_other_texts_are_no_quantities(text: str) -> None:
+    assert not is_quantity(text)
+
+
+def test_a_wrong_unit_names_those_that_fit() -> None:
+    with pytest.raises(ValueError, match='"3 mm" is no number in MPa; units: MPa, GPa'):
+        read_quantity("3 mm", "MPa")
+    with pytest.raises(ValueError, match="is a kinematic viscosity"):
+        read_quantity("46 cSt", "MPa s")
+
+
+def test_a_case_takes_them_in_every_key_with_a_unit() -> None:
+    case = ORing(sealed_pressure="30 bar", speeds=["0.2 m/s", 100], viscosity="40 mPa s")  # type: ignore[arg-type]
+    assert case.sealed_pressure == pytest.approx(3.0)
+    assert case.speeds == (200.0, 100.0)
+    assert case.viscosity == pytest.approx(4e-8)
+    with pytest.raises(ValueError, match=r"sealed_pressure: .* is no number in MPa"):
+        ORing(sealed_pressure="30 mm")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("viscosity", [46.0, 0.046, 1e-15])
+def test_a_viscosity_in_other_units_is_refused(viscosity: float) -> None:
+    with pytest.raises(ValueError, match="viscosity"):
+        ORing(viscosity=viscosity)
