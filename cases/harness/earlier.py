@@ -75,6 +75,8 @@ def read_earlier(folder: Path, run: Run, version: str | None) -> Earlier:
         content = read_json(folder / "run.json")
         states = _states(content)
     except FileNotFoundError:
+        if not _has_rows(folder / "curve.csv"):
+            return Earlier()  # a run that was ended before it had anything
         raise BadInput(f"--resume: {folder} has a curve.csv and no run.json; {ANEW}") from None
     except (OSError, ValueError, TypeError, KeyError) as error:
         raise BadInput(
@@ -88,6 +90,13 @@ def read_earlier(folder: Path, run: Run, version: str | None) -> Earlier:
         )
     rows, doubts = _believed(folder, run, states)
     return Earlier(content, tuple(rows), tuple(doubts))
+
+
+def _has_rows(path: Path) -> bool:
+    try:
+        return path.read_bytes().count(b"\n") != 1
+    except OSError:
+        return True
 
 
 def _states(content: Mapping[str, Any]) -> list[Mapping[str, Any]]:
