@@ -212,7 +212,7 @@ def test_profiles_have_a_panel_a_stroke_and_a_line_a_speed() -> None:
     assert pressure_out.get_ylabel() == "pressure $p$ [MPa]"
     assert film_out.get_ylabel() == "film thickness $h$ [µm]"
     assert film_in.get_xlabel().startswith("$x$ [mm]")
-    assert legend(pressure_out) == ["100", "400", "1600", "25 (oscillating)"]
+    assert legend(film_out) == ["100", "400", "1600", "25 (oscillating)"]
     assert [line.get_linestyle() for line in film_out.lines] == ["-", "-", "-", ":"]
 
 

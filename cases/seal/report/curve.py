@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from softehl.cases.seal.parameters import ORing
 
 _ABOVE, _BESIDE, _ROOM = 1.2, 1.2, 1.7
+_BESIDE_MARK = {"out": (-5, 4), "in": (5, -9)}
 _PLAIN = ((1.0,), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0))
 _ENOUGH, _MANY = 3, 7
 
@@ -97,8 +98,9 @@ def _draw_stroke(axes: Axes, stroke: str, rows: Sequence[FilmRow]) -> None:
             axes.annotate(
                 row.verdict,
                 (abs(row.rod_speed_mm_s), row.h_star_um),
-                xytext=(6, -8),
+                xytext=_BESIDE_MARK[stroke],
                 textcoords="offset points",
+                ha="right" if stroke == "out" else "left",
                 fontsize="x-small",
                 color=colour,
             )

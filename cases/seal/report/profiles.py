@@ -38,10 +38,10 @@ def profiles_figure(p: ORing, results: Results) -> Figure:
             plain = row.verdict == OK
             label = f"{abs(row.rod_speed_mm_s):g}" + ("" if plain else f" ({row.verdict})")
             line = {"color": colour, "linestyle": "-" if plain else ":"}
-            pressure.plot(profile.x_mm, profile.p_MPa, label=label, **line)
-            film.plot(profile.x_mm, profile.h_um, **line)
+            pressure.plot(profile.x_mm, profile.p_MPa, **line)
+            film.plot(profile.x_mm, profile.h_um, label=label, **line)
         pressure.set_title(style.STROKES[stroke])
-        pressure.legend(title="$|U|$ [mm/s]", loc="upper right")
+        film.legend(title="$|U|$ [mm/s]", loc="upper center", ncols=2)
         film.set_xlabel(style.POSITION)
     axes[0, 0].set_ylabel(style.PRESSURE)
     axes[1, 0].set_ylabel(style.FILM)
@@ -64,12 +64,13 @@ def _coloured(results: Results, stroke: str) -> Iterator[tuple[FilmRow, Profile,
 
 def _show_contact(film: Axes, rows: Sequence[FilmRow]) -> None:
     """Show the contact and the thin film only: beside it h is a hundred times larger."""
-    from matplotlib.ticker import NullLocator
+    from matplotlib.ticker import MaxNLocator, NullLocator
 
     start = min(row.contact_start_mm for row in rows)
     end = max(row.contact_end_mm for row in rows)
     if np.isfinite(start) and np.isfinite(end):
         film.set_xlim(start - _MARGIN_MM, end + _MARGIN_MM)
+    film.xaxis.set_major_locator(MaxNLocator(5))
     film.set_yscale("log")
     low = min(row.h_min_um for row in rows)
     high = max(row.h_star_um for row in rows)
