@@ -61,6 +61,10 @@ SUPPORTED = (
 )
 
 
+PIECES = 60
+"""Pieces of one Piecewise: each is a branch inside the one before."""
+
+
 class Lowering:
     """Converts SymPy expressions whose symbols are bound to nodes in `bound`."""
 
@@ -73,7 +77,7 @@ class Lowering:
             (sp.Mul, self._mul),
             (sp.exp, lambda e: self._call(Op.EXP, e)),
             (sp.Pow, self._pow),
-            (sp.Piecewise, lambda e: self._piecewise(list(e.args), e)),
+            (sp.Piecewise, self._pieces),
             ((sp.Max, sp.Min), self._extremum),
             (sp.Abs, self._absolute),
             (sp.sign, lambda e: self._step(e.args[0], (-1, 0, 1))),
@@ -174,6 +178,13 @@ class Lowering:
             return self.g.power(base, Fraction(int(exponent.p), int(exponent.q)))
         power = yield self._lower(exponent)
         return self.g.call(Op.EXP, self.g.mul(power, self.g.call(Op.LOG, base)))
+
+    def _pieces(self, e: Any) -> Recursion[Node]:
+        if len(e.args) > PIECES:
+            raise ModelError(
+                f"a Piecewise of {len(e.args)} pieces; at most {PIECES} are allowed: nest a few of them"
+            )
+        return (yield self._piecewise(list(e.args), e))
 
     def _piecewise(self, pairs: list[Any], whole: Any) -> Recursion[Node]:
         value, condition = pairs[0].args
