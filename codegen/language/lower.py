@@ -182,7 +182,7 @@ class Lowering:
     def _pieces(self, e: Any) -> Recursion[Node]:
         if len(e.args) > PIECES:
             raise ModelError(
-                f"a Piecewise of {len(e.args)} pieces; at most {PIECES} are allowed: nest a few of them"
+                f"a Piecewise of {len(e.args)} pieces; at most {PIECES} are allowed: use fewer"
             )
         return (yield self._piecewise(list(e.args), e))
 
