@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from softehl.runtime.solve.steps import StepRule
     from softehl.runtime.study import Study
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PUBLIC = {
     "Arclength": "softehl.runtime.solve.arclength",
