@@ -120,7 +120,7 @@ class Lowering:
         if e in self.bound:  # a name that is written out
             return self.bound[e]
         if hasattr(e, "definition"):
-            return self(e.definition)
+            return (yield self._lower(e.definition))
         for kind, rule in self._rules:
             if isinstance(e, kind):
                 return (yield rule(e))
@@ -129,6 +129,10 @@ class Lowering:
             return (yield self._call(operation, e))
         if isinstance(e, sp.MatrixBase):
             raise ModelError(f"a matrix of shape {e.shape} where a scalar is needed")
+        if e in (sp.zoo, sp.nan, sp.oo, -sp.oo):
+            raise ModelError(f"{e} is no number: something is divided by zero, or is infinite")
+        if isinstance(e, (sp.Derivative, sp.Integral)):
+            raise ModelError(f"{e} is not carried out: use m.derivative or m.integral")
         if e is sp.I or isinstance(e, (sp.re, sp.im, sp.conjugate)):
             raise ModelError(f"{e} has no kernel operation: kernels compute with real numbers")
         raise ModelError(

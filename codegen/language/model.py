@@ -6,6 +6,7 @@ A model page declares its arguments, writes its mathematics in SymPy, and ends w
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,9 @@ from softehl.codegen.language.entries import Entries, fraction
 from softehl.codegen.language.lower import Lowering, ModelError, page_line
 from softehl.codegen.language.names import named
 
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+"""What a model may be called: it is part of the names of C functions."""
+
 __all__ = ["Argument", "Definition", "Model"]
 
 
@@ -49,6 +53,10 @@ class Model:
         unroll: bool = False,
         doc: str | None = "",
     ) -> None:
+        if not NAME.fullmatch(name):
+            raise ModelError(
+                f"a model is called {name!r}; use letters, digits and underscores, a letter first"
+            )
         self.name, self.nodes, self.rule, self.unroll = name, nodes, rule, unroll
         self.doc = " ".join((doc or "").split())
         self.graph = Graph()

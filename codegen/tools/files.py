@@ -7,6 +7,7 @@ all named files go together to DIR.  Such a folder holds nothing else and can be
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -69,6 +70,10 @@ def _generate(paths: Sequence[Path], folder: Path) -> int:
     Console().print(_table(made, errors))
     for d in (d for d in definitions if d.given):
         print(f"{d.name} gives derivatives of its own: residual and tangent were not compared")
+    for d in definitions:
+        for task in (t for t, e in errors.get(d.name, {}).items() if e == math.inf):
+            what = verify.culprit(d, task) or "a value"
+            print(f"softehl: {d.name}: {task} is not a number: {what} has none", file=sys.stderr)
     for message in unchecked:
         print(f"softehl: {message}", file=sys.stderr)
     return max([2 * bool(unchecked), *(_judge(name, found) for name, found in errors.items())])

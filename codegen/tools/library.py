@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from softehl.codegen import abi
 from softehl.codegen.tools import build, model_text
 from softehl.codegen.tools import cache as store
+from softehl.codegen.tools.model_text import ModelFileError
 
 if TYPE_CHECKING:
     from softehl.codegen.graph.graph import Node
@@ -84,7 +85,13 @@ def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str,
     kernels, seconds = [], {}
     for d in definitions:
         start = perf_counter()
-        kernels.append(pipeline.compile_model(d))
+        try:
+            kernels.append(pipeline.compile_model(d))
+        except ZeroDivisionError:
+            raise ModelFileError(
+                f"{d.name}: something is divided by a value that is always zero, or a root of it "
+                "is differentiated"
+            ) from None
         seconds[d.name] = perf_counter() - start
     files = product.files(kernels)
     store.remember(key, files)

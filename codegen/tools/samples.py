@@ -10,6 +10,7 @@ real numbers there: no logarithm or root of something negative, no division by z
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +18,7 @@ import mpmath
 from mpmath.libmp import NoConvergence
 
 from softehl.codegen.graph.evaluate import State, Walk
-from softehl.codegen.graph.graph import Node, Op, Routine
+from softehl.codegen.graph.graph import BOOLEAN, Node, Op, Routine
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements.cells import ELEMENTS
@@ -134,11 +135,15 @@ def _linear(xi: float) -> list[tuple[float, float]]:
 
 def fault(definition: Definition, state: State) -> str | None:
     """The first operation without a real value at a state; None if everything has one."""
-    roots = [definition.potential, *(n for _, n in definition.fields)]
+    return first_fault([definition.potential, *(n for _, n in definition.fields)], state)
+
+
+def first_fault(roots: Sequence[Node], state: State) -> str | None:
+    """The first operation below `roots` without a real value at a state."""
     with mpmath.workdps(DIGITS):
         walk = Walk(state, {})
         bad = [n for n in roots if not _real(walk, n, state)]
-        nodes = (n for n in reachable(bad) if n.op is not Op.CALL)
+        nodes = (n for n in reachable(bad) if n.op not in (*BOOLEAN, Op.CALL))
         first = next((n for n in nodes if not _real(walk, n, state)), None)
     return None if first is None else _described(first)
 

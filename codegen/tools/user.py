@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import inspect
 import linecache
-import re
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -27,10 +26,14 @@ from typing import Any
 from softehl.codegen.language import names
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.model import Model
 from softehl.codegen.tools.model_text import ModelFileError, read
 
 _RECIPE = "write `def my_model() -> Definition:` that ends in `return m.finish()`"
-_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_TRUTH = (
+    "a condition on symbols is neither true nor false while the page is read: write a branch as "
+    "sp.Piecewise((value, condition), (other, True))"
+)
 
 
 def definitions(path: Path) -> list[Definition]:
@@ -59,13 +62,9 @@ def written_out(path: Path) -> dict[str, Definition]:
 
 
 def check_names(where: str, found: Iterable[Definition]) -> None:
-    """Raise `ModelFileError` unless the names are different and can be names in C."""
+    """Raise `ModelFileError` unless the names are different."""
     seen: set[str] = set()
     for d in found:
-        if not _IDENTIFIER.fullmatch(d.name):
-            raise ModelFileError(
-                f"{where}: a model is called {d.name!r}; use letters, digits and underscores"
-            )
         if d.name in seen:
             raise ModelFileError(f"{where}: two models are called {d.name}; rename one")
         seen.add(d.name)
@@ -123,7 +122,10 @@ def _made(entry: Any) -> Definition:
     made = entry() if callable(entry) else entry
     if not isinstance(made, Definition):
         label = getattr(entry, "__name__", repr(entry))
-        raise ModelFileError(f"{label} gives {type(made).__name__}, not a Definition: {_RECIPE}")
+        code = getattr(entry, "__code__", None)
+        where = f"{Path(code.co_filename).name}:{code.co_firstlineno}: " if code else ""
+        what = "a Model that is not finished" if isinstance(made, Model) else type(made).__name__
+        raise ModelFileError(f"{where}{label} gives {what}, not a Definition: {_RECIPE}")
     return made
 
 
@@ -161,6 +163,8 @@ def _errors_of(path: Path) -> Iterator[None]:
         if isinstance(error, ModelError) and what.startswith(str(path.parent)):
             raise ModelFileError(what) from error  # it has found its line itself
         kind = "" if isinstance(error, ModelError) else f"{type(error).__name__}: "
+        if isinstance(error, TypeError) and "truth value of Relational" in what:
+            kind, what = "", _TRUTH
         raise ModelFileError(f"{_line(path, error)}: {kind}{what}") from error
 
 

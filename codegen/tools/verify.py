@@ -23,6 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from softehl.codegen import abi
+from softehl.codegen.derive.variants import outputs
+from softehl.codegen.graph.differentiate import gradient
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.graph.graph import Input, Op
 from softehl.codegen.graph.traverse import reachable
@@ -64,6 +66,18 @@ def errors(
         )
     compared = _Compared(definition, states, along, called, written or definition)
     return {t: max(map(_finite, compared.errors(t)), default=0.0) for t in tasks}
+
+
+def culprit(d: Definition, task: str) -> str | None:
+    """What has no value in a task whose result is not a number, for the author of the page."""
+    slopes = gradient(d.graph, d.potential, d.directions, constant=d.constant, given=d.given)
+    states = samples.admissible(d, BATCH)
+    for nodes in ([slopes[u] for u in d.directions], [x.node for x in outputs(d, task)]):
+        for state in states:
+            found = samples.first_fault(nodes, state)
+            if found is not None:
+                return found
+    return None
 
 
 def _finite(error: float) -> float:

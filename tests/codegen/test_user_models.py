@@ -84,13 +84,38 @@ def test_imported_models_are_not_those_of_the_file() -> None:
         ("x = 1\n", r"mine.py has no model: write `def my_model\(\) -> Definition:`"),
         ("def it(): return 1\n", r"has no model: annotate `def it\(\) -> Definition:`"),
         (spring() + "x = spring()\n", "two models are called spring; rename one"),
-        (spring().replace('"spring"', '"a-b"'), "a model is called 'a-b'; use letters, digits"),
+        (spring().replace('"spring"', '"a-b"'), "mine.py:5: a model is called 'a-b'; use letters"),
+        (spring().replace('"spring"', '"a b"'), "mine.py:5: a model is called 'a b'; use letters"),
         ("x = 1\ndef f(:\n", "mine.py:2: invalid syntax"),
         ("x = 1\ny = x / 0\n", "mine.py:2: ZeroDivisionError: division by zero"),
         ("import no_such_thing\n", "mine.py:1: ModuleNotFoundError: No module named 'no_such"),
         (spring(energy="k * q"), "mine.py:9: NameError: name 'q' is not defined"),
         (spring(energy="0.1 * k"), r"mine.py:9: 0\.1.* is a rounded number; write an exact one"),
-        ("from softehl import Definition\ndef f() -> Definition: return 3\n", "f gives int, not a"),
+        (
+            "from softehl import Definition\ndef f() -> Definition: return 3\n",
+            "mine.py:2: f gives int, not a",
+        ),
+        (
+            spring().replace("m.finish()", "m"),
+            "mine.py:4: spring gives a Model that is not finished, not a Definition: write",
+        ),
+        (
+            spring().replace("    return m.finish()\n", ""),
+            "mine.py:4: spring gives NoneType, not a Definition: write",
+        ),
+        ("import sympy as sp" + spring(energy="k / sp.Integer(0)"), "mine.py:9: zoo is no number"),
+        ("import sympy as sp" + spring(energy="k * sp.oo"), "mine.py:9: oo.* is no number"),
+        (spring(energy="k / 0"), "mine.py:9: zoo is no number: something is divided by zero"),
+        (spring(energy="1 / 0"), "mine.py:9: ZeroDivisionError: division by zero"),
+        (
+            spring(energy="k if u > 0 else 0"),
+            "mine.py:9: a condition on symbols is neither .* write a branch as sp.Piecewise",
+        ),
+        (spring().replace("point_rule()", "gauss(4, 7)"), "mine.py:5: .*the dimension is 1, 2"),
+        (
+            "import sympy as sp" + spring(energy="sp.Derivative(k * u**2, u)"),
+            r"mine.py:9: Derivative\(k\*u1\*\*2, u1\) is not carried out: use m.derivative",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line_with_the_line(
@@ -311,6 +336,44 @@ def test_a_model_far_from_its_domain_says_what_to_give(capsys: pytest.CaptureFix
     model_file(text.replace("    return", "    m.example(q=50)\n    return"))
     assert run("mine.py") == 2
     assert "example: q is no argument of spring" in capsys.readouterr().err
+
+
+def test_a_kernel_that_cannot_be_checked_does_not_hide_the_others(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    model_file("import sympy as sp" + spring("far", "sp.log(k - 40) * u**2") + spring("near"))
+    assert run("mine.py") == 2
+    printed = capsys.readouterr()
+    rows = [line.split() for line in printed.out.splitlines()]
+    (near,) = [r for r in rows if r[:2] == ["near", "energy"]]
+    assert all(0.0 <= float(v) < 1e-14 for v in near[6:8])
+    (far,) = [r for r in rows if r[:2] == ["far", "energy"]]
+    assert far[6:8] == ["-", "-"]
+    assert printed.err.startswith("softehl: far cannot be checked: log")
+    assert len(printed.err.splitlines()) == 1
+
+
+def test_a_value_that_is_not_a_number_names_its_quantity(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """An energy with a value, but without a derivative where the check looks: sqrt at zero."""
+    root = "m.define('root', sp.sqrt(m.define('nothing', sp.Min(u, 10) - sp.Max(u, -10))))"
+    model_file("import sympy as sp" + spring(energy=f"{root} * k + u**2"))
+    assert run("mine.py") == 1
+    printed = capsys.readouterr().err
+    for task in ("residual", "tangent"):
+        assert f"spring: {task} is not a number: pow(.. nothing ..) has none" in printed
+
+
+def test_a_root_of_nothing_is_said_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    root = "m.define('root', sp.sqrt(m.define('nothing', sp.Min(u, 10) - u)))"
+    model_file("import sympy as sp" + spring(energy=f"{root} * k + u**2"))
+    assert run("mine.py") == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith(
+        "softehl: spring: something is divided by a value that is always zero"
+    )
+    assert len(printed.splitlines()) == 1
 
 
 def test_a_local_iteration_without_a_solution_asks_for_an_example(
