@@ -14,6 +14,8 @@ PHYSICS = (
     *("leak", "leakage", "friction", "viscosity", "lubricant", "oil", "inlet", "wedge", "slider"),
 )
 CASES = ("cases.seal", "cases.paper", "cases.oring", "cases.slider", "cases.shipped", "cases.cli")
+QUANTITIES = {"units.py": {"viscosity", "density", "oil"}}
+"""What a table of units has to say of cSt: that a density is missing."""
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
@@ -30,7 +32,7 @@ def _singular(ending: re.Match[str]) -> str:
 @pytest.mark.parametrize("path", sorted(HARNESS.glob("*.py")), ids=lambda path: path.name)
 def test_the_harness_mentions_no_physics(path: Path) -> None:
     source = path.read_text(encoding="utf-8")
-    assert physics(source) == set()
+    assert physics(source) <= QUANTITIES.get(path.name, set())
     names = {name.removeprefix("softehl.") for name in imports_of(source)}
     assert {name for name in names if name.startswith(CASES)} == set()
 
