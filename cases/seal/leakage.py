@@ -4,9 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from softehl.cases.harness.row import OK, Record, column
-from softehl.cases.seal.state import COLLAPSED, OSCILLATING, UNDER_RESOLVED, FilmRow
+from softehl.cases.seal.state import (
+    CLIPPED,
+    COLLAPSED,
+    OSCILLATING,
+    UNCERTAIN,
+    UNDER_RESOLVED,
+    FilmRow,
+)
 
-_WORST_LAST = (OK, OSCILLATING, UNDER_RESOLVED, COLLAPSED)
+_WORST_LAST = (OK, OSCILLATING, UNCERTAIN, CLIPPED, UNDER_RESOLVED, COLLAPSED)
 
 
 @dataclass(frozen=True)

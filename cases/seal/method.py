@@ -30,14 +30,13 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.refinement import carried_contact
 from softehl.cases.seal.results import (
-    MICROMETRE,
     contact_pressure,
     contact_state,
     film_numbers,
     film_state,
 )
 from softehl.cases.seal.state import FilmState, Observer, Outcome
-from softehl.cases.seal.verdict import Verdict, fewest_inlet_segments
+from softehl.cases.seal.verdict import ANY_RATIO, INLET_RATIO, Verdict, fewest_inlet_segments
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.linear import Condenser
@@ -139,8 +138,9 @@ class SealRun:
         p, path = self.system.parameters, self.path
         reference = float(contact_pressure(self.system, p.sealed_pressure, self.x).max())
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
+        ratios = INLET_RATIO if p.mesh == "graded" else ANY_RATIO
         coarser = _thicknesses(*self.coarser, stroke) if self.coarser else {}
-        progress = StrokeState(Verdict(reference, fewest=fewest), set(p.speeds))
+        progress = StrokeState(Verdict(reference, fewest=fewest, ratios=ratios), set(p.speeds))
 
         def on_speed(film: FilmLoads, point: Point) -> None:
             self._judge(progress, coarser, film, point)
@@ -171,9 +171,12 @@ class SealRun:
             return
         progress.missing.discard(film.speed)
         iterations = point.solution.iterations
-        state = film_state(system, problem, film, x, progress.verdict, iterations)
-        thickness = coarser.get(film.speed, nan) / MICROMETRE
-        error = h_star_error(state.density, state.h_star_um, thickness)
+        p, last = system.parameters, progress.verdict.last
+        assert last is not None
+        error = h_star_error(p.density, last.h_star, coarser.get(film.speed, nan))
+        wanted = error if p.error_estimate and p.mesh == "graded" else None
+        verdict = replace(progress.verdict, error=wanted)
+        state = film_state(system, problem, film, x, verdict, iterations)
         state = replace(state, h_star_error_percent=error)
         self.state.states.append(state)
         self.observer.film_state(state)

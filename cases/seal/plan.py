@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 
 from softehl.cases.seal.parameters import DENSITIES, ORing
-from softehl.cases.seal.state import OSCILLATING, UNDER_RESOLVED, FilmRow
+from softehl.cases.seal.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
 
 SIGNS = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
 
 DOUBTS = {
     UNDER_RESOLVED: "the inlet is too short for this mesh, h* may be far off",
+    CLIPPED: "the arc ends within the film, h* may be far off",
+    UNCERTAIN: "the estimated error of h* is large or not known",
     OSCILLATING: "the film zigzags from node to node; h* holds, the profile does not",
 }
 """Verdict of a state that is kept but is no plain result -> what is to be known of it."""

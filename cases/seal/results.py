@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import pi
 
@@ -70,7 +71,26 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         jump=jump,
         oscillation=oscillation(z, h),
         inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
+        inlet_ratio=inlet_ratio(at, film, h_star),
+        end_gap=float(min(h[0], h[-1])),
     )
+
+
+def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> float:
+    """h* over sqrt(8 eta |U| / (9 p')), p' the steepest rise of the pressure in the inlet.
+
+    at: fields of the film, (segments, points) each. By (14) p' = 6 eta U (h - h*) / h^3, which is
+    largest at h = 3/2 h*: the ratio is 1 for a film that fulfils (14), on a mesh that shows it.
+    """
+    x, h, p, eta = (at[name].ravel() for name in ("x", "h", "p", "eta"))
+    slope = (at["tau_rod"] - at["tau"]).ravel() / h
+    top = x[np.argmax(p)]
+    inlet = x < top if film.rod_speed > 0.0 else x > top
+    rise = np.where(inlet, np.copysign(1.0, film.rod_speed) * slope, -np.inf)
+    steepest = int(np.argmax(rise))
+    if not rise[steepest] > 0.0:
+        return np.nan
+    return float(h_star / np.sqrt(8.0 * eta[steepest] * film.speed / (9.0 * rise[steepest])))
 
 
 def oscillation(x: Array, h: Array) -> float:
@@ -173,6 +193,7 @@ def film_state(
         contact_p_max_MPa=verdict.reference,
         oscillation_index=numbers.oscillation,
         inlet_segments=numbers.inlet_segments,
+        inlet_ratio=numbers.inlet_ratio,
         verdict=verdict.word,
         advice=verdict.advice,
         profile=_profile(system, problem, x),

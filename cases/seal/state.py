@@ -21,6 +21,11 @@ UNDER_RESOLVED = "under-resolved"
 OSCILLATING = "oscillating"
 """Verdict of a state whose film zigzags from node to node: h* is sound, the profile is not."""
 
+CLIPPED = "clipped"
+"""Verdict of a state whose arc ends within its film: the inlet may be cut off."""
+UNCERTAIN = "uncertain"
+"""Verdict of a state whose estimated error is too large, or is not known though it was wanted."""
+
 Section = Cells
 """A deformed section: points are (z, r)."""
 
@@ -90,8 +95,17 @@ class FilmRow(Row):
     inlet_segments: float = column(
         "", "segments over which the film narrows from 10 to 1.5 times h* at its inlet"
     )
+    inlet_ratio: float = column(
+        "",
+        "h* over sqrt(8 eta |U| / (9 p')), p' the steepest rise of the pressure in the inlet; 1 "
+        "where the inlet is resolved",
+        default=nan,
+    )
     density: int = column("", "density of the mesh that the state was solved on")
-    verdict: str = column("", "`ok`, `oscillating` or `under-resolved`; `collapsed` is no result")
+    verdict: str = column(
+        "",
+        "`ok`, `oscillating`, `uncertain`, `clipped` or `under-resolved`; `collapsed` is no result",
+    )
 
     @property
     def name(self) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, isfinite
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.state import COLLAPSED, OSCILLATING, UNDER_RESOLVED
+from softehl.cases.seal.state import CLIPPED, COLLAPSED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED
 from softehl.runtime.fem.postprocess import local_exponent
 
 EXCESS_PRESSURE = 0.1
@@ -22,6 +22,19 @@ FEWEST_INLET_SEGMENTS = 1.5
 INLET_SEGMENTS_OF_LOW_ORDERS = {("fe", 1): 3.0, ("dg", 1): 5.0, ("dg", 2): 2.0}
 """The same for low orders m_p, by treatment of the Reynolds equation: they need more."""
 
+INLET_RATIO = (0.95, 1.02)
+"""Credible h* over that of the film's own steepest inlet slope: 0.995 to 0.998 where an inlet is
+resolved, 0.83 to 0.94 where it is not. Judged on graded meshes."""
+
+ANY_RATIO = (-inf, inf)
+"""That of meshes where it is not judged."""
+
+END_FILMS, END_GAP = 50.0, 0.1
+"""At its ends the arc is outside the film where the gap is so many h*, or so many mm."""
+
+LARGEST_ERROR = 2.0
+"""Largest estimated error of h*, %, of a state that is `ok`."""
+
 STRONG_OSCILLATION = 0.2
 """Oscillation index from which on a profile is not to be taken at face value: about 5 % of h."""
 
@@ -34,7 +47,9 @@ class FilmNumbers:
 
     flux_variation: relative, outside cavitation. jump: largest of the pressure at a facet, MPa.
     oscillation: index of `cases.seal.results.oscillation`. inlet_segments: number of segments
-    over which the film narrows from ten times to one and a half times h* at its inlet.
+    over which the film narrows from ten times to one and a half times h* at its inlet. inlet_ratio:
+    h* over that of the steepest slope of the pressure in the inlet, by (14) at h = 3/2 h*. end_gap:
+    the smaller film thickness of both ends of the arc.
     """
 
     speed: float
@@ -47,6 +62,13 @@ class FilmNumbers:
     jump: float
     oscillation: float
     inlet_segments: float
+    inlet_ratio: float = 1.0
+    end_gap: float = inf
+
+    @property
+    def clipped(self) -> bool:
+        """Whether the arc ends within the film."""
+        return self.end_gap < min(END_FILMS * self.h_star, END_GAP)
 
 
 def fewest_inlet_segments(reynolds: str, m_p: int) -> float:
@@ -62,13 +84,16 @@ class Verdict:
     gave a spurious collapsed film away, if anything did: a pressure well above the contact's, a
     friction that rises while the speed falls, or a thickness that falls too fast. A path that
     has once collapsed does not recover; too few segments in the inlet or an oscillating film
-    are judged for each film alone. fewest: segments that the inlet needs.
+    are judged for each film alone. fewest: segments that the inlet needs. ratios: credible
+    inlet_ratio. error: estimated error of the last film's h*, %, None where none is wanted.
     """
 
     reference: float
     last: FilmNumbers | None = None
     collapsed: str = ""
     fewest: float = FEWEST_INLET_SEGMENTS
+    ratios: tuple[float, float] = ANY_RATIO
+    error: float | None = None
 
     def after(self, film: FilmNumbers) -> Verdict:
         """The verdict that includes one more film; `collapsed` says what gave it away."""
@@ -77,13 +102,19 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """OK, COLLAPSED, UNDER_RESOLVED or OSCILLATING, whichever is worst."""
+        """OK or what is worst: COLLAPSED, UNDER_RESOLVED, CLIPPED, UNCERTAIN, OSCILLATING."""
         if self.collapsed:
             return COLLAPSED
         if self.last is None:
             return OK
         if self.last.inlet_segments < self.fewest:
             return UNDER_RESOLVED
+        if self.last.clipped:
+            return CLIPPED
+        if not self.ratios[0] <= self.last.inlet_ratio <= self.ratios[1]:
+            return UNDER_RESOLVED
+        if self.error is not None and not abs(self.error) <= LARGEST_ERROR:
+            return UNCERTAIN
         return OSCILLATING if self.last.oscillation > STRONG_OSCILLATION else OK
 
     @property
@@ -94,6 +125,20 @@ class Verdict:
             return f"{FINER_MESH}: {self.collapsed}"
         if last is None or word == OK:
             return ""
+        if word == CLIPPED:
+            return (
+                f"the arc ends where the film is only {1e3 * last.end_gap:.3g} um thick: its inlet "
+                "may be cut off; leave arc_start and arc_end out, or move them outwards"
+            )
+        if word == UNCERTAIN:
+            known = self.error is not None and isfinite(self.error)
+            size = f"is {self.error:+.2g} %" if known else "is not known"
+            return f"the error of h* {size}; use a finer mesh (larger density)"
+        if word == UNDER_RESOLVED and last.inlet_segments >= self.fewest:
+            return (
+                f"h* is {last.inlet_ratio:.3g} of what the steepest slope of its inlet gives, it "
+                "must be near 1: the mesh does not show it; use a finer mesh (larger density)"
+            )
         if word == UNDER_RESOLVED:
             return (
                 f"the inlet is only {last.inlet_segments:.2g} segments long, it needs "
@@ -106,6 +151,8 @@ class Verdict:
         )
 
     def _suspicion(self, film: FilmNumbers) -> str:
+        if film.h_min <= 0.0:
+            return f"its least thickness is {1e3 * film.h_min:.2g} um"
         excess = film.p_max - self.reference
         if excess > EXCESS_PRESSURE * self.reference:
             return f"the maximum pressure is {excess:.2f} MPa above that of frictionless contact"

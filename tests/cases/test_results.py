@@ -8,17 +8,18 @@ import pytest
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.path import PathSettings
 from softehl.cases.seal.results import (
     contact_pressure,
     film_numbers,
     film_state,
+    inlet_ratio,
     inlet_segments,
     oscillation,
 )
-from softehl.cases.seal.state import COLLAPSED, OSCILLATING, UNDER_RESOLVED
-from softehl.cases.seal.verdict import FilmNumbers, Verdict, fewest_inlet_segments
+from softehl.cases.seal.state import CLIPPED, COLLAPSED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED
+from softehl.cases.seal.verdict import INLET_RATIO, FilmNumbers, Verdict, fewest_inlet_segments
 from tests.cases.oring_cases import oring
 
 HEALTHY = FilmNumbers(
@@ -171,3 +172,45 @@ def test_sealed_pressure_changes_the_load_of_the_contact_problem_only() -> None:
     assert problem.parameters["sealed_side"].tolist() == [2.5]
     assert "film" not in problem.parameters
     assert "spring" not in problem.parameters
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "word", "says"),
+    [
+        ({}, 0.3, OK, ""),
+        ({}, None, OK, ""),
+        ({}, -2.1, UNCERTAIN, "the error of h* is -2.1 %"),
+        ({}, float("nan"), UNCERTAIN, "the error of h* is not known"),
+        ({"inlet_ratio": 0.94}, 0.3, UNDER_RESOLVED, "steepest slope"),
+        ({"inlet_ratio": 1.03}, 0.3, UNDER_RESOLVED, "steepest slope"),
+        ({"inlet_ratio": float("nan")}, 0.3, UNDER_RESOLVED, "steepest slope"),
+        ({"end_gap": 0.9 * 50 * HEALTHY.h_star}, 0.3, CLIPPED, "leave arc_start and arc_end out"),
+        ({"h_min": 0.0}, 0.3, COLLAPSED, "least thickness"),
+        ({"h_min": -1e-4}, 0.3, COLLAPSED, "least thickness"),
+    ],
+)
+def test_ok_is_a_promise(
+    changes: dict[str, float], error: float | None, word: str, says: str
+) -> None:
+    """Nothing is ok whose inlet, arc, thickness or estimated error speaks against it."""
+    start = Verdict(reference=4.0, ratios=INLET_RATIO, error=error)
+    verdict = start.after(replace(HEALTHY, **changes))
+    assert verdict.word == word
+    assert says in verdict.advice
+
+
+@pytest.mark.parametrize("speed", [400.0, -400.0])
+def test_the_inlet_of_an_exact_film_has_the_ratio_one(speed: float) -> None:
+    """p' = 6 eta U (h - h*) / h^3 over h falling to the contact and rising behind it."""
+    h_star, eta = 1e-3, 6e-8
+    x = np.linspace(-1.0, 1.0, 4001) * np.sign(speed)
+    h = h_star * (0.9 + 20 * np.maximum(-np.sign(speed) * x - 0.1, 0.0))
+    slope = 6 * eta * speed * (h - h_star) / h**3
+    order = np.argsort(x)
+    p = np.concatenate([[0.0], np.cumsum(np.diff(x[order]) * slope[order][1:])])
+    at = {"x": x[order], "h": h[order], "p": p, "eta": np.full(len(x), eta)}
+    shear = slope[order] * h[order]
+    at |= {"tau_rod": 0.5 * shear, "tau": -0.5 * shear}
+    stroke: Stroke = "out" if speed > 0 else "in"
+    film = FilmLoads(1.0, stroke, abs(speed), np.empty(0), np.empty(0))
+    assert inlet_ratio(at, film, h_star) == pytest.approx(1.0, abs=1e-3)
