@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import softehl
+from softehl.cases.paper.states import PAPER
 from softehl.cases.seal.report import PICTURES, style, write_plots
 from softehl.cases.seal.report.curve import plain_ticks
 from softehl.cases.seal.report.section import Scale, View, draw_view
@@ -32,7 +33,7 @@ PRESSED = softehl.ORing(
 DEFAULT = softehl.ORing()
 SWEPT = softehl.ORing(stroke="in", speeds=SPEEDS, error_estimate=False)
 STABLE = softehl.ORing(stroke="in", speeds=(100.0,), error_estimate=False)
-PAPERS = STABLE.model_copy(update={"mesh": "uniform", "upwinding": 0.0})
+PAPERS = STABLE.model_copy(update=PAPER)
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "README.md"
 
 _STYLE: Any = {
