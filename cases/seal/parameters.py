@@ -13,6 +13,9 @@ from softehl.cases.seal.fitting import fitted
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
 
+_LOWEST_ESTIMATED = 3
+"""Least pressure order whose error is well below what the meshes differ by."""
+
 # strict again on the item: the list itself is lax so that a TOML array becomes a tuple
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 
@@ -53,7 +56,7 @@ class ORing(Parameters):
     solid: Literal["fbar", "taylor", "q4"] = key(
         "taylor", "solid element", bounds='"fbar", "taylor" or "q4"'
     )
-    sealed_pressure: float = key(1.0, "sealed pressure p_s", unit="MPa", ge=0)
+    sealed_pressure: float = key(1.0, "sealed pressure p_s", unit="MPa", ge=0, le=100)
     stroke: Literal["out", "in", "both"] = key(
         "both", "direction of the rod", bounds='"out" (to the air side), "in" or "both"'
     )
@@ -66,7 +69,7 @@ class ORing(Parameters):
         strict=False,
     )
     pressure_viscosity: float = key(
-        0.02, "pressure-viscosity coefficient alpha of (13)", unit="1/MPa", ge=0
+        0.02, "pressure-viscosity coefficient alpha of (13)", unit="1/MPa", ge=0, le=1
     )
     shear_traction: bool = key(True, "whether the shear stress (17) acts on the seal")
     rotation: Literal["fixed", "free"] = key(
@@ -113,13 +116,15 @@ class ORing(Parameters):
         ge=0,
     )
 
-    inner_diameter: float = key(50.39, "inner diameter of the seal D_inner", unit="mm", gt=0)
+    inner_diameter: float = key(
+        50.39, "inner diameter of the seal D_inner", unit="mm", gt=0, le=5000
+    )
     section_diameter: float = key(3.53, "diameter of the section D_seal", unit="mm", gt=0)
     rod_diameter: float = key(50.0, "rod diameter D_rod", unit="mm", gt=0)
     housing_diameter: float = key(56.30, "inner diameter of the housing D_housing", unit="mm", gt=0)
-    mu_1: float = key(3.04, "Mooney-Rivlin parameter mu_1 of (3)", unit="MPa", gt=0)
-    mu_2: float = key(0.62, "Mooney-Rivlin parameter mu_2 of (3)", unit="MPa", ge=0)
-    bulk_modulus: float = key(500.0, "bulk modulus kappa of (6)", unit="MPa", gt=0)
+    mu_1: float = key(3.04, "Mooney-Rivlin parameter mu_1 of (3)", unit="MPa", gt=0, le=1000)
+    mu_2: float = key(0.62, "Mooney-Rivlin parameter mu_2 of (3)", unit="MPa", ge=0, le=1000)
+    bulk_modulus: float = key(500.0, "bulk modulus kappa of (6)", unit="MPa", gt=0, le=1e5)
     viscosity: float = key(
         6.59e-8,
         "viscosity eta_0 at zero pressure of (13)",
@@ -188,11 +193,26 @@ class ORing(Parameters):
         return speeds
 
     @model_validator(mode="after")
+    def _rule_is_rich_enough(self) -> Self:
+        points, order = self.quadrature_points, self.pressure_order
+        if points is not None and points < order:
+            raise ValueError(
+                f"quadrature_points = {points} cannot hold {order + 1} pressures of a segment "
+                f"(pressure_order = {order}); give at least {order}, or leave it out"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _tolerance_has_an_estimate(self) -> Self:
         if self.tolerance is not None and not (self.error_estimate and self.mesh == "graded"):
             raise ValueError(
                 f"tolerance = {self.tolerance:g} needs an estimate of the error; "
                 'set error_estimate = true and mesh = "graded"'
+            )
+        if self.tolerance is not None and self.pressure_order < _LOWEST_ESTIMATED:
+            raise ValueError(
+                f"tolerance = {self.tolerance:g}: meshes do not show the error of pressure_order = "
+                f"{self.pressure_order}; use an order of at least {_LOWEST_ESTIMATED}"
             )
         return self
 
@@ -232,8 +252,8 @@ class ORing(Parameters):
                 f"groove_width = {self.groove_width:g} mm; it must be at least "
                 f"section_diameter, {self.section_diameter:g} mm"
             )
-        if 2 * abs(self.groove_centre) > self.groove_width - self.section_diameter:
-            limit = 0.5 * (self.groove_width - self.section_diameter)
+        limit = 0.5 * (self.groove_width - self.section_diameter)
+        if abs(self.groove_centre) > limit + 1e-9 * self.groove_width:
             raise ValueError(
                 f"groove_centre = {self.groove_centre:g} mm; the round section must lie between "
                 f"the walls, {-limit:g} to {limit:g} mm"
