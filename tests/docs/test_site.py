@@ -70,7 +70,9 @@ def test_every_page_is_on_the_front_page() -> None:
     front = (ROOT / "docs" / "index.md").read_text()
     trees = "\n".join(re.findall(r"```\{toctree\}(.*?)```", front, re.DOTALL))
     listed = set(re.findall(r"^([\w-]+)$", trees, re.MULTILINE))
-    assert listed == {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"}
+    pages = {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"}
+    assert listed == pages
+    assert {f"{page}.md" for page in pages} <= set(links(ROOT / "docs" / "index.md"))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=is_named)
