@@ -71,6 +71,7 @@ docs: $(VENV)/.docs
 
 pictures: $(VENV)/.kernels
 	$(BIN)/python docs/pictures.py
+	PYTHONPATH=. $(BIN)/python docs/gallery/pictures.py
 
 clean:
 	rm -rf $(VENV) .venv-other build dist src/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,137 @@
+"""The pictures of the gallery, from the lines of its pages: `make pictures`.
+
+An entry's blocks are run, and what they leave behind is drawn.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from PIL import Image
+
+from tests.docs.pages import Reader, blocks
+
+HERE = Path(__file__).resolve().parent
+SIZE = (7.2, 2.7)  # inches
+BLUE, ORANGE, GREY = "#1f5fa8", "#d9661f", "0.45"
+
+_STYLE: Any = {
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.linewidth": 0.7,
+    "figure.dpi": 160,
+    "font.size": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "lines.markersize": 4,
+}
+
+
+def main(names: list[str]) -> None:
+    """Draw these entries, or all of them."""
+    matplotlib.use("agg")
+    with matplotlib.rc_context(_STYLE):
+        for name in names or ENTRIES:
+            figure = Figure(SIZE, layout="constrained")
+            with namespace(name) as space:
+                ENTRIES[name](figure, space)
+            save(figure, HERE / "pictures" / f"{name}.png")
+
+
+@contextlib.contextmanager
+def namespace(entry: str) -> Iterator[dict[str, Any]]:
+    """What the blocks of an entry leave behind, in the folder in which they were run."""
+    reader = Reader(HERE / "models")
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        for block in blocks((HERE / f"{entry}.md").read_text(encoding="utf-8")):
+            reader.read(block)
+        yield reader.namespace
+
+
+def save(figure: Figure, path: Path) -> None:
+    """With 128 colours: small files, the same every time."""
+    figure.savefig(path, metadata={"Software": None})
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+    print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+
+
+def draw_cells(axes: Any, places: Any, cells: Any, values: Any, **given: Any) -> Any:
+    """Cells with one value each; their corners come first."""
+    drawn = PolyCollection(places[cells[:, :4]], array=values, edgecolors="face", **given)
+    axes.add_collection(drawn)
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    return drawn
+
+
+def cook(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.25])
+    result = space["panel"](16)
+    mesh = result.system.mesh
+    drawn = draw_cells(
+        left,
+        result.deformed(("u_x", "u_y")),
+        mesh.cells["quad4"],
+        result.fields("rubber")["sigma_xx"].mean(axis=1),
+        cmap="RdBu_r",
+        clim=(-0.15, 0.15),
+    )
+    outline = np.array([(0, 0), (48, 44), (48, 60), (0, 44), (0, 0)])
+    left.plot(*outline.T, color=GREY, lw=0.8, ls="--")
+    figure.colorbar(drawn, ax=left, label="Cauchy stress along x [MPa]", shrink=0.85)
+    sizes = (1, 2, 4, 8, 16)
+    flat = [space["panel"](n).at((48, 60))["u_y"] for n in sizes]
+    thick = [space["thick"](n).at((48, 60, 0))["u_y"] for n in sizes]
+    right.plot(sizes, thick, "o-", color=BLUE, label="free across its thickness (hex8)")
+    right.plot(sizes, flat, "s-", color=ORANGE, label="plane strain (quad4)")
+    theirs = [5.154, 8.724, 12.025, 13.608, 14.129]
+    right.plot(sizes, theirs, "k+", ms=9, label="deal.II, Q1")
+    right.set_xscale("log", base=2)
+    right.set_xticks(sizes, [str(n) for n in sizes])
+    right.set(xlabel="cells along a side", ylabel="lift of the upper corner [mm]", ylim=(0, 16))
+    right.legend(loc="lower right")
+
+
+def plasticity(figure: Figure, space: dict[str, Any]) -> None:
+    early, late, right = figure.subplots(1, 3, width_ratios=[1, 1, 1.4])
+    path, W = space["pulled"](16), space["W"]
+    first = next(r for r in path if r.t > 0.149)
+    for axes, result, most in ((early, first, 1.0), (late, path[-1], 10.0)):
+        mesh, alpha = result.system.mesh, result.fields("steel")["alpha"].mean(axis=1)
+        places = result.deformed(("u_x", "u_y")) if result is path[-1] else mesh.points
+        drawn = draw_cells(
+            axes, places, mesh.cells["quad8"], 100 * alpha, cmap="magma_r", clim=(0, most)
+        )
+        axes.set_title(f"pulled by {0.2 * result.t:.2f} mm")
+        figure.colorbar(drawn, ax=axes, label="plastic strain [%]", extend="max", shrink=0.8)
+    for name, colour, marker in (("coarse", BLUE, "s"), ("fine", ORANGE, "o")):
+        steps = space[name]
+        pulled = [0.2 * r.t for r in steps]
+        stress = [r.reaction("end")["u_y"] / W for r in steps]
+        label = f"{len(steps[0].system.mesh.cells['quad8'])} cells"
+        right.plot(pulled, stress, marker + "-", color=colour, ms=3, label=label)
+    right.axhline(space["limit"], color="k", ls="--", lw=0.9, label="exact limit load")
+    right.set(xlabel="displacement of the end [mm]", ylabel="mean stress at the end [MPa]")
+    right.set(xlim=(0, 0.205), ylim=(0, 290))
+    right.legend(loc="lower right")
+
+
+ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
+    "cook": cook,
+    "plasticity": plasticity,
+}
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
