@@ -52,6 +52,7 @@ class Outcome:
     states: what the observer was told, in the words of the case.  unknowns: their numbers, "total"
     and those of parts.  kernel_signatures: kernel name -> signature of the compiled kernel.
     solvers: "linear" -> the linear solver in use, "solver" -> the way that was asked for.
+    numbers: what else is to be known of the run as a whole, name with unit -> value.
     stages: their cost; empty where the observer was told all that is to be recorded.
     """
 
@@ -62,6 +63,7 @@ class Outcome:
     kernel_signatures: Mapping[str, str]
     stages: tuple[StageRecord, ...] = ()
     solvers: Mapping[str, str] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def converged(self) -> bool:

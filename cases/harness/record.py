@@ -32,7 +32,7 @@ from softehl.runtime.io import write_csv, write_json
 from softehl.runtime.library import library_of
 
 _OURS = ("run.json", "curve.csv")
-_SIZE = ("kernels", "kernel_library", "unknowns", "solvers")
+_SIZE = ("kernels", "kernel_library", "unknowns", "solvers", "numbers")
 _PACKAGES = (
     *("softehl", "numpy", "scipy", "cffi", "pypardiso"),
     *("pydantic", "click", "rich", "meshio", "matplotlib"),
@@ -167,6 +167,7 @@ class RunRecord:
                 "kernel_library": library_of().kind,
                 "unknowns": dict(outcome.unknowns),
                 "solvers": dict(outcome.solvers),
+                "numbers": dict(outcome.numbers),
             }
         self._stages = [stage for outcome in outcomes for stage in outcome.stages] or None
 

@@ -168,6 +168,12 @@ class SealSystem:
         """Nominal pressures (n,) of an obstacle on the nodes that may touch it, MPa, >= 0."""
         return np.maximum(-x[self.layout.part(name)], 0.0)
 
+    def reaction(self, name: str, x: Array) -> float:
+        """Sum of the normal forces of a wall on the section, N."""
+        nodes, segments = self.section.chains[WALLS[name]]
+        areas = tributary_areas(self.mesh.points, segments, nodes)
+        return float(self.pressing(name, x) @ areas)
+
     def axial_force(self, x: Array) -> float:
         """Force that the hold exerts on the section, to the air side, N."""
         return -float(x[self.layout.part(AXIAL)][0])

@@ -16,6 +16,7 @@ from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.estimate import coarser_system, h_star_error
+from softehl.cases.seal.failure import explained
 from softehl.cases.seal.film import (
     FastFilm,
     first_film,
@@ -30,6 +31,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.refinement import carried_contact
 from softehl.cases.seal.results import (
+    contact_numbers,
     contact_pressure,
     contact_state,
     film_numbers,
@@ -237,19 +239,19 @@ def run(
     """
     newton = newton or Newton(max_iterations=10, linear=choose(parameters.linear))
     driver, settings = PathDriver(observer, newton), settings or PathSettings()
-    state, rotation = RunState(), parameters.rotation
+    state = RunState()
     route = ContactRoute(settings, driver.follow, driver.newton, ContactStore(contacts))
     found = route.contact(parameters)
     if isinstance(found, StageFailed):
-        state.failures.append(found.explain("contact", rotation))
+        state.failures.append(explained(found, "contact", parameters))
         return _outcome(build_system(parameters), driver, state)  # its size alone is reported
     seal = _begun(FilmPath(found[0], settings, driver), found[1], observer, state)
     strokes: tuple[Stroke, ...] = ("out", "in")
     for stroke in strokes if parameters.stroke == "both" else (parameters.stroke,):
         failed = seal.stroke(stroke)
         if failed is not None:
-            state.failures.append(failed.explain(f"stroke {stroke}", rotation))
-    return _outcome(seal.system, driver, state)
+            state.failures.append(explained(failed, f"stroke {stroke}", parameters))
+    return _outcome(seal.system, driver, state, contact_numbers(seal.system, seal.x))
 
 
 def _begun(path: FilmPath, x: Array, observer: Observer, state: RunState) -> SealRun:
@@ -266,7 +268,12 @@ def _begun(path: FilmPath, x: Array, observer: Observer, state: RunState) -> Sea
     return seal if isinstance(y, StageFailed) else replace(seal, coarser=(coarser, y))
 
 
-def _outcome(system: SealSystem, driver: PathDriver, state: RunState) -> Outcome:
+def _outcome(
+    system: SealSystem,
+    driver: PathDriver,
+    state: RunState,
+    numbers: Mapping[str, float] | None = None,
+) -> Outcome:
     blocks, failures = system.problem.assembler.blocks, state.failures
     return Outcome(
         states=tuple(state.states),
@@ -276,4 +283,5 @@ def _outcome(system: SealSystem, driver: PathDriver, state: RunState) -> Outcome
         kernel_signatures={b.kernel.name: b.kernel.signature for b in blocks},
         stages=tuple(driver.records),
         solvers={"solver": system.parameters.solver, "linear": driver.newton.linear.name},
+        numbers=numbers or {},
     )

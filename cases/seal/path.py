@@ -18,7 +18,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.predictor import Predictor
-from softehl.runtime.solve.solution import Branch, Point, Status
+from softehl.runtime.solve.solution import Branch, Point
 from softehl.runtime.solve.steps import StepRule
 
 FOLD = (
@@ -32,10 +32,6 @@ CLOSED = 0.05
 CLOSING = (
     "the film closes: at a node it is only {:.2g} um thick there, and would be negative beyond; "
     "use a finer mesh (larger density) or a higher pressure_order"
-)
-
-ROLLING = (
-    'with rotation = "free" hardly anything but the film turns or holds the section: use "fixed"'
 )
 
 
@@ -115,7 +111,7 @@ class StageFailed:
         stage, branch = self.stage, self.branch
         goal = f"{stage.name} {stage.shown(stage.stop):.5g}"
         if not branch.points:
-            return f"{goal} was not reached, not even the start: {branch.message}"
+            return f"{goal} was not reached, not even its start"
         reached = stage.shown(branch.points[-1].parameter)
         return f"{goal} was not reached, only {reached:.5g}"
 
@@ -124,12 +120,7 @@ class StageFailed:
         """Why a path ends on the way, and what may help."""
         if self.last is not None and self.last.h_min < CLOSED * self.last.h_star:
             return CLOSING.format(1e3 * self.last.h_min)
-        return FOLD if self.branch.points else self.branch.status.advice
-
-    def explain(self, where: str, rotation: str) -> tuple[Status, str]:
-        """Status and message of a run that ends here."""
-        advice = ROLLING if rotation == "free" else self.advice
-        return self.branch.status, f"{where}: {self.message}; {advice}"
+        return FOLD
 
 
 Followed: TypeAlias = Array | StageFailed

@@ -8,10 +8,11 @@ from math import pi
 
 import numpy as np
 
+from softehl.cases.seal.catalogue import Ring, fill, squeeze, stretch
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.state import ContactState, FilmState, Profile, Section
-from softehl.cases.seal.system import FACET, FILM, SOLID
+from softehl.cases.seal.system import AIR_WALL, FACET, FILM, SEALED_WALL, SOLID
 from softehl.cases.seal.verdict import FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
@@ -147,6 +148,30 @@ def contact_pressure(system: SealSystem, sealed_pressure: float, x: Array) -> Ar
     pressure[: system.section.lowest] += sealed_pressure
     pressure[system.section.lowest] += 0.5 * sealed_pressure  # the pressure ends at this node
     return np.asarray(pressure)
+
+
+def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
+    """Fit of the ring in its gland; axial forces on it in the contact state x, + to the air side.
+
+    The sealed pressure acts on what lies between its two ends; forces of the walls are in excess of
+    it. Their sum with that of the hold is zero in equilibrium.
+    """
+    p, section = system.parameters, system.section
+    ring = Ring("", p.inner_diameter, p.section_diameter)
+    bottom, crown = system.deformed(x)[list(section.pressed_ends), 1]
+    forces = {
+        "air_wall_N": -system.reaction(AIR_WALL, x),
+        "sealed_wall_N": system.reaction(SEALED_WALL, x),
+        "hold_N": system.axial_force(x),
+        "sealed_pressure_N": p.sealed_pressure * pi * float(crown**2 - bottom**2),
+    }
+    return {
+        "stretch_percent": stretch(p.inner_diameter, p.rod_diameter),
+        "squeeze_percent": squeeze(p.section_diameter, 0.5 * (p.housing_diameter - p.rod_diameter)),
+        "fill_percent": fill(ring, p.rod_diameter, p.housing_diameter, p.groove_width),
+        **forces,
+        "axial_sum_N": sum(forces.values()),
+    }
 
 
 def housing_pressure(system: SealSystem, x: Array) -> Array:

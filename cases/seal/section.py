@@ -67,6 +67,11 @@ class SealSection:
         return int(np.argmin(self.mesh.points[self.mesh.arc_nodes, 1]))
 
     @property
+    def pressed_ends(self) -> tuple[int, int]:
+        """Nodes at which the sealed pressure of the contact ends: on the arc, at the crown."""
+        return int(self.mesh.arc_nodes[self.lowest]), int(self._sealed_side()[0, 0])
+
+    @property
     def area(self) -> float:
         """Area of the section, mm^2."""
         return pi * self.disc.radius**2

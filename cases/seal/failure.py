@@ -1,0 +1,76 @@
+"""Why a run ended early, in the words of the problem: ring, gland, pressure, film."""
+
+from __future__ import annotations
+
+from softehl.cases.seal import catalogue
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import StageFailed
+from softehl.runtime.solve.solution import Status
+
+ROLLING = (
+    'with rotation = "free" hardly anything but the film turns or holds the section: use "fixed"'
+)
+
+_GLAND = (
+    "glands with a squeeze of 6 to 30 %, a stretch of 0 to 6 % and a width of 1.02 to 2 sections "
+    "are known to run (docs/limits.md); try one nearer to these, or a finer mesh (larger density)"
+)
+_PRESSURE = (
+    "the rubber is driven into the corner between wall and rod there; try a lower sealed_pressure, "
+    "a harder rubber (mu_1, mu_2) or a finer mesh (larger density)"
+)
+_FILM = (
+    "the film is hardest to build on the instroke at p_s above twice the shear modulus; try a "
+    "finer mesh (larger density), a lower sealed_pressure or a harder rubber"
+)
+
+
+def explained(failed: StageFailed, where: str, p: ORing) -> tuple[Status, str]:
+    """Status and message of a run that ends with this stage.
+
+    where: which part of the run it was.
+    """
+    if p.rotation == "free":
+        text = f"{failed.message}; {ROLLING}"
+    else:
+        text = _contact(failed, p) or f"{failed.message}; {_film_advice(failed)}"
+    return failed.branch.status, f"{where}: {text}"
+
+
+def _contact(failed: StageFailed, p: ORing) -> str:
+    """Of a stage that ends before there is a film; empty for others."""
+    name = failed.stage.name.split(": ")[-1]
+    points = failed.branch.points
+    reached = points[-1].parameter if points else 0.0
+    if name == "squeeze":
+        way = f"only {100.0 * reached:.0f} % of the way"
+        return f"{_ring(p)} can be pressed into its gland ({_gland(p)}) {way}; {_GLAND}"
+    if name == "lean":
+        return (
+            f"{_ring(p)} cannot be pushed against the wall of the air side ({_gland(p)}); {_GLAND}"
+        )
+    if name == "sealed pressure":
+        return (
+            f"sealed pressure {p.sealed_pressure:g} MPa was not reached, only {reached:.4g} MPa "
+            f"({reached / p.shear_modulus:.2g} times the shear modulus, {_gland(p)}); {_PRESSURE}"
+        )
+    if name.startswith("contact") and name != "contact to film":
+        return f"{name} was not found ({_gland(p)}, p_s = {p.sealed_pressure:g} MPa); {_PRESSURE}"
+    return ""
+
+
+def _film_advice(failed: StageFailed) -> str:
+    name = failed.stage.name.split(": ")[-1]
+    return _FILM if name in ("contact to film", "shear") else failed.advice
+
+
+def _ring(p: ORing) -> str:
+    stretch = catalogue.stretch(p.inner_diameter, p.rod_diameter)
+    ring = f"{p.inner_diameter:g} x {p.section_diameter:g} mm"
+    return f"a ring of {ring}, stretched by {stretch:.2g} %,"
+
+
+def _gland(p: ORing) -> str:
+    depth = 0.5 * (p.housing_diameter - p.rod_diameter)
+    squeeze = catalogue.squeeze(p.section_diameter, depth)
+    return f"squeeze {squeeze:.3g} %, width {p.groove_width:g} mm"
