@@ -24,6 +24,7 @@ from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.unknowns import Elements, Numbering, Slot, slots
+from softehl.runtime.follow import LoadPath, follow
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.march import Clock, March, Method
 from softehl.runtime.mesh.cells import CELLS
@@ -273,6 +274,26 @@ class Study:
             clock = Clock((0.0,), system.at_rest()[None], system.histories(), dt)
         settings = March(method, tolerance, _SMALLEST * dt, newton or _newton())
         return settings.run(system, clock, until, None if checkpoint is None else Path(checkpoint))
+
+    def follow(
+        self,
+        *,
+        step: float,
+        until: Callable[[Result], bool],
+        newton: Newton | None = None,
+        most: int = 1000,
+    ) -> LoadPath:
+        """The path from load factor 0 on, by arc length: it passes limit points of the load.
+
+        step: length of the first and longest step. A length counts the load factor, and the
+        unknowns in units of what they change by per load factor in the beginning. until: is given
+        each result; the path ends where it says True. most: points at most. History is committed
+        after each point. Raises StudyError; NotConverged if the end is not reached: its `reached`
+        is the last Result, or None.
+        """
+        if not (np.isfinite(step) and step > 0.0):
+            raise StudyError(f"step = {step}: must be positive")
+        return follow(self.system(), step, until, newton or _newton(), most)
 
     def system(self) -> System:
         """What is written down, as equations.  Raises StudyError for what does not fit together."""

@@ -128,9 +128,50 @@ def plasticity(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="lower right")
 
 
+def balloon(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.3])
+    results, stretch = space["path"].results, space["stretch"]
+    angle = np.linspace(0, np.pi, 181)
+    arc = np.column_stack([np.cos(angle), np.sin(angle)])
+    for wanted, colour in zip(
+        (6.0, 3.3, 1.53, 1.0), ("#c6dbef", "#6baed6", BLUE, "k"), strict=True
+    ):
+        result = min(results, key=lambda r: abs(stretch(r) - wanted))
+        ends = result.system.mesh.points[:, 0] + result.values("u")
+        inside, outside = ends.min(), ends.max()
+        ring = np.vstack([inside * arc, outside * arc[::-1]])
+        left.fill(*ring.T, color=colour, lw=0.5, label=f"stretch {stretch(result):.2f}")
+    left.set_aspect("equal")
+    left.set_axis_off()
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, -0.28), ncols=2)
+    fine = np.linspace(1.0005, 6.0, 300)
+    right.plot(fine, [1e3 * space["exact"](s) for s in fine], color=GREY, label="quadrature")
+    right.plot(
+        [stretch(r) for r in results],
+        [1e3 * r.t for r in results],
+        "o",
+        color=BLUE,
+        ms=3,
+        label="arc length",
+    )
+    for limit in space["path"].limits:
+        here = 1 + limit.x[0] / space["A"]
+        right.plot(here, 1e3 * limit.parameter, "D", color=ORANGE, ms=6)
+        text = f"{limit.kind} {1e3 * limit.parameter:.2f} kPa"
+        below = limit.kind == "minimum"
+        shift = (0, -14) if below else (8, 8)
+        right.annotate(
+            text, (here, 1e3 * limit.parameter), shift, textcoords="offset points", color=ORANGE
+        )
+    right.set(xlabel="stretch of the inside", ylabel="pressure of the gas [kPa]")
+    right.set(xlim=(0.9, 6.1), ylim=(0, 75))
+    right.legend(loc="lower right")
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
+    "balloon": balloon,
 }
 
 if __name__ == "__main__":

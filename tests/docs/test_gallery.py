@@ -66,7 +66,7 @@ def test_cook_in_plane_strain_takes_35_lines() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "row"), [("hex20", "3-D, `hex20`")])
+@pytest.mark.parametrize(("kind", "row"), [("hex20", "3-D, `hex20`"), ("hex27", "3-D, `hex27`")])
 def test_cook_with_quadratic_elements(
     kind: str, row: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

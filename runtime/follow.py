@@ -1,0 +1,63 @@
+"""Paths of a study along which the load may turn back: arc length, limit points located."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.result import Result
+from softehl.runtime.solve.arclength import Arclength
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point, Solution
+from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPath:
+    """Converged results in order, and where the load factor turned.
+
+    limits: each with `parameter` (the load factor), `kind` ("maximum" or "minimum") and `x`.
+    """
+
+    results: tuple[Result, ...]
+    limits: tuple[LimitPoint, ...]
+
+
+def follow(
+    system: System, step: float, until: Callable[[Result], bool], newton: Newton, most: int
+) -> LoadPath:
+    """What `Study.follow` says.  Raises NotConverged."""
+    state = [(system.at_rest(), system.histories())]  # after the last converged point
+    results: list[Result] = []
+
+    def problem_at(t: float) -> Problem:
+        return system.problem(system.still(t, *state[0]))
+
+    def keep(point: Point) -> None:
+        problem, x = problem_at(point.parameter), point.solution.x
+        state[0] = x, system.committed(problem, x, state[0][1])
+        results.append(Result(system, problem, point, state[0][1]))
+
+    with np.errstate(all="ignore"):
+        first = newton.solve(problem_at(step), state[0][0])
+    if not first.converged:
+        raise _stopped(first, results)
+    scale = float(np.sqrt(np.mean((first.x - state[0][0]) ** 2))) / step
+    rule = StepRule(step, 1e-6 * step, step)
+    path = Arclength(newton, rule, x_scale=scale or 1.0, max_points=most, name="load factor")
+    branch = path.follow(
+        problem_at, 0.0, state[0][0], until=lambda _: until(results[-1]), on_point=keep
+    )
+    if not branch.converged:
+        raise _stopped(branch, results)
+    return LoadPath((*results,), branch.limit_points)
+
+
+def _stopped(found: Solution | Branch, results: list[Result]) -> NotConverged:
+    error = NotConverged(found)
+    error.reached = results[-1] if results else None
+    return error
