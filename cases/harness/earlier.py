@@ -94,7 +94,7 @@ def read_earlier(folder: Path, run: Run, version: str | None) -> Earlier:
 
 def _has_rows(path: Path) -> bool:
     try:
-        return path.read_bytes().count(b"\n") != 1
+        return len(path.read_bytes().splitlines()) != 1
     except OSError:
         return True
 
