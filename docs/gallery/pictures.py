@@ -168,10 +168,31 @@ def balloon(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="lower right")
 
 
+def heat(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2)
+    results = space["heating"]
+    place = results[0].system.mesh.points[:, 0]
+    for wanted, colour in ((9, "#9ecae1"), (60, "#6baed6"), (200, BLUE), (600, "#08306b")):
+        result = min(results, key=lambda r: abs(r.t - wanted))
+        left.plot(place, result.values("T"), color=colour, label=f"{result.t:.0f} s")
+    left.plot(place, space["steady"].values("T"), "k--", lw=1, label="steady")
+    left.plot(0.1, 927.0, "k+", ms=10, label="NAFEMS T2")
+    left.set(xlabel="place [m]", ylabel="temperature [K]", ylim=(-20, 1050))
+    left.legend(loc="lower left", ncols=2)
+    results = space["swinging"](80, 0.125)
+    times = [r.t for r in results]
+    for x, colour in ((0.1, GREY), (0.09, "#6baed6"), (0.08, BLUE), (0.06, ORANGE)):
+        right.plot(times, [r.at((x,))["T"] for r in results], color=colour, label=f"at {x} m")
+    right.plot(32, 36.60, "k+", ms=10, label="NAFEMS T3")
+    right.set(xlabel="time [s]", ylabel="temperature [°C]", xlim=(0, 33), ylim=(-5, 135))
+    right.legend(loc="upper left", ncols=2)
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
     "balloon": balloon,
+    "heat": heat,
 }
 
 if __name__ == "__main__":
