@@ -109,9 +109,9 @@ def test_newton_converges_quadratically_with_it() -> None:
 
 @pytest.mark.parametrize("reynolds", TREATMENTS)
 def test_it_damps_the_oscillation_and_amplifies_it_with_its_sign_reversed(reynolds: str) -> None:
-    """At 400 mm/s; measured 0.017, 0.057, 0.70 for "fe" and 0.015, 0.094, 0.52 for "dg"."""
+    """At 400 mm/s; measured 0.017, 0.057, 0.75 for "fe" and 0.014, 0.094, 0.61 for "dg"."""
     damped, plain, amplified = (
-        solved(c, reynolds=reynolds).states[-1].oscillation_index for c in (1.0, 0.0, -0.2)
+        solved(c, reynolds=reynolds).states[-1].oscillation_index for c in (1.0, 0.0, -0.25)
     )
     assert damped < 0.4 * plain
     assert amplified > 4 * plain
@@ -122,9 +122,8 @@ def test_the_section_is_as_stiff_against_a_zigzag_as_the_theory_takes_it_to_be(s
     """k / (2 pi G) is 28 zeta(3) / pi^4 = 0.346 of a half-space whose trace is linear."""
     system = build_system(oring(density=1, solid=solid))
     nodes, layout = system.mesh.arc_nodes, system.layout
-    problem = system.problem.with_parameters(spring={"stiffness": 1.0})
     multipliers = [layout.dofs(name) for name in ("pressure", "rod", "rotation")]
-    problem = problem.with_fixed(multipliers, [0.0, 0.0, 0.0])
+    problem = system.problem.with_fixed(multipliers, [0.0, 0.0, 0.0])
     load = np.zeros(layout.total)
     load[2 * nodes + 1] = 2.0 * np.pi * system.mesh.points[nodes, 1] * (-1.0) ** np.arange(28)
     moved = spsolve(problem.linearise(system.at_rest())[1], load)[2 * nodes + 1]
