@@ -188,11 +188,41 @@ def heat(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="upper left", ncols=2)
 
 
+def fbar(figure: Figure, space: dict[str, Any]) -> None:
+    first, second, right = figure.subplots(1, 3, width_ratios=[1, 1, 1.5])
+    for axes, model, words in ((first, "standard", "standard"), (second, "potential", "F-bar")):
+        result = space["panel"](model, 20)
+        drawn = draw_cells(
+            axes,
+            result.deformed(("u_x", "u_y")),
+            result.system.mesh.cells["quad4"],
+            result.fields("rubber")["pressure"].mean(axis=1),
+            cmap="RdBu_r",
+            clim=(-25, 25),
+        )
+        axes.set_title(words)
+    bar = figure.colorbar(drawn, ax=(first, second), label="pressure [MPa]", extend="both")
+    bar.ax.tick_params(labelsize=7.5)
+    sizes = (2, 4, 10, 15, 20)
+    looks = {"standard": ("o-", GREY), "potential": ("o-", BLUE)}
+    looks |= {"classical": ("s-", ORANGE), "spatial": ("^-", "#6baed6")}
+    for model, (marker, colour) in looks.items():
+        lifts = [space["panel"](model, n).at((48, 60))["u_y"] for n in sizes]
+        right.plot(sizes, lifts, marker, color=colour, ms=3, label=model)
+    theirs = [6.1414, 6.7463, 6.8242, 6.8589]
+    right.plot(sizes[1:], theirs, "k+", ms=9, label="OpenGeoSys, F-bar")
+    right.plot(sizes[1:], [2.2867, 2.8407, 3.3746, 3.8812], "kx", ms=5, label="the same, standard")
+    right.set(xlabel="cells along a side", ylabel="lift of the upper corner [mm]", ylim=(0, 7.5))
+    right.set_xticks(sizes)
+    right.legend(loc="lower right", ncols=2, fontsize=7)
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
     "balloon": balloon,
     "heat": heat,
+    "fbar": fbar,
 }
 
 if __name__ == "__main__":
