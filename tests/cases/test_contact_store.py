@@ -98,6 +98,8 @@ def plain(**changes: Any) -> Outcome:
 
 def test_every_parameter_either_matters_or_does_not() -> None:
     assert set(OTHER) | OTHER_WORDS | {"tolerance"} == set(WITHOUT_INFLUENCE)
+    assert contact_key(case(rod=50.5)) == contact_key(case(rod_diameter=50.5))
+    assert contact_key(case(rod=50.5)) != contact_key(case())
     assert set(CHANGED) == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
     key = contact_key(case())
     assert contact_key(case(**OTHER)) == key
