@@ -42,7 +42,8 @@ ERRORS = (
 
 def case(**changes: Any) -> ORing:
     given = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (1600.0,)}
-    return ORing(**{"mesh": "uniform", **given, **changes})
+    paper = {"mesh": "uniform", "arc_start": -34.0, "arc_end": 43.0}
+    return ORing(**{**paper, **given, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -195,9 +196,8 @@ def test_a_sweep_here(serial: list[Curve]) -> None:
     assert [curve.parameters for curve in serial] == SWEEP
     assert all(curve.converged for curve in serial)
     folder = serial[0].folder.parent
-    assert (
-        serial[2].folder.name == "density=1-mesh=uniform-sealed_pressure=0.5-stroke=out-speeds=1600"
-    )
+    name = "density=1-mesh=uniform-sealed_pressure=0.5-stroke=out-speeds=1600"
+    assert serial[2].folder.name == f"{name}-arc_start=-34-arc_end=43"
     assert len(list((folder / "contacts").iterdir())) == 2
     assert len(list(folder.iterdir())) == 5
     assert [contact_stages(curve) for curve in serial] == [
