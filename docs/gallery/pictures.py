@@ -217,12 +217,29 @@ def fbar(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="lower right", ncols=2, fontsize=7)
 
 
+def cahn_hilliard(figure: Figure, space: dict[str, Any]) -> None:
+    *maps, right = figure.subplots(1, 4, width_ratios=[1, 1, 1, 1.5])
+    results = space["results"]
+    for axes, wanted in zip(maps, (0.002, 0.04, 0.2), strict=True):
+        result = min(results, key=lambda r: abs(r.t - wanted))
+        mesh, c = result.system.mesh, result.values("c")
+        x, y = mesh.points.T
+        drawn = axes.tricontourf(x, y, c, levels=np.linspace(-1.1, 1.1, 23), cmap="RdBu_r")
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        axes.set_title(f"t = {result.t:.3f}")
+    figure.colorbar(drawn, ax=maps, label="concentration", ticks=[-1, 0, 1], shrink=0.7)
+    right.plot([r.t for r in results], space["energy"], color=BLUE)
+    right.set(xlabel="time", ylabel="energy", ylim=(0, 0.26), xlim=(0, 0.2))
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
     "balloon": balloon,
     "heat": heat,
     "fbar": fbar,
+    "cahn-hilliard": cahn_hilliard,
 }
 
 if __name__ == "__main__":
