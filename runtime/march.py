@@ -138,7 +138,10 @@ class March:
         if order == 1:
             share = step.dt / (step.dt + clock.times[0] - clock.times[1])
         worst = 0.0
+        rated = {slot.name for block in system.blocks.values() for slot in block.rates.values()}
         for name in system.numbering.layout.names:
+            if rated and name not in rated:
+                continue  # it follows from the others, and its start may be anything
             part = system.numbering.layout.part(name)
             size = max(float(np.abs(x[part]).max(initial=0.0)), 1e-300)
             worst = max(worst, share * float(np.abs(difference[part]).max(initial=0.0)) / size)

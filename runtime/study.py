@@ -254,7 +254,8 @@ class Study:
         """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
 
         dt: length of the (first) step. method: "euler" (backward) or "bdf2". tolerance: largest
-        local error of a step, relative to each unknown's largest value; steps then adapt, else
+        local error of a step, relative to the largest value of each unknown (of those with a rate,
+        where there are any); steps then adapt, else
         they are dt, but for those that Newton's method needs shorter. History is committed and
         values of steps before (data u_old, `Model.rates`) are renewed after every converged step.
         checkpoint: file that is rewritten after each step; restart: such a file, from which the

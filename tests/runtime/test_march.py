@@ -96,6 +96,22 @@ def test_adaptive_steps_keep_the_tolerance() -> None:
     assert len(fewer) < len(results)
 
 
+def test_an_unknown_without_a_rate_does_not_choose_the_steps() -> None:
+    """A multiple of u that is zero at the start, where it is wrong: the steps are those of u."""
+    m = Model("follower", nodes=1, rule=quadrature.point_rule())
+    ((u,),) = m.nodal_unknowns("u")
+    ((w,),) = m.nodal_unknowns("w")
+    m.weak_form([(w - 5 * u, w)])
+    times = []
+    for with_follower in (False, True):
+        study = rod(10)
+        if with_follower:
+            study.add("follower", m.finish(), on=lambda x: x[:, 0] == 0.5)
+        march = study.march(dt=1e-4, until=0.1, method="bdf2", tolerance=1e-2)
+        times.append([result.t for result in march])
+    np.testing.assert_allclose(times[0], times[1], rtol=1e-9)
+
+
 def test_history_relaxes_as_the_closed_form_of_backward_euler() -> None:
     study = Study(Mesh.line(2.0, cells=3))
     study.add("bar", maxwell(), E=10.0, tau=0.5)
