@@ -68,11 +68,12 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(30))
-def test_a_tenth_of_the_random_matrix(number: int) -> None:
-    """What docs/limits.md says of it: nearly every state is found; `ok` is never far off."""
+@pytest.mark.parametrize("number", [2, 3, 4])
+def test_glands_of_the_random_sample(number: int) -> None:
+    """Some of those that docs/limits.md has; others take minutes."""
     p = drawn(number)
     outcome = run(p, Silent())
+    assert outcome.states
     for state in outcome.states:
         assert state.verdict != OK or abs(state.h_star_error_percent) <= 2.0
         assert state.verdict != OK or 0.95 <= state.inlet_ratio <= 1.02
