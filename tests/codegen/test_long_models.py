@@ -9,7 +9,6 @@ import pytest
 import sympy as sp
 
 from softehl.codegen import pipeline
-from softehl.codegen.abi import Target
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.graph.graph import Graph, Op
 from softehl.codegen.graph.traverse import Recursion, recursion
@@ -69,17 +68,15 @@ def test_two_thousand_names() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("target", [Target.SIMD, Target.SCALAR])
-def test_ten_thousand_names(target: Target) -> None:
-    d = chain(10_000, "residual", "tangent")
-    functions = pipeline.compile_model(d, target).functions
-    assert functions["tangent"].chosen.operations > 10 * 10_000
+def test_ten_thousand_names() -> None:
+    functions = pipeline.compile_model(chain(10_000, "residual")).functions
+    assert functions["residual"].chosen.operations > 10_000
 
 
 @pytest.mark.slow
-def test_five_thousand_terms() -> None:
-    functions = pipeline.compile_model(addition(5_000, "residual", "tangent")).functions
-    assert functions["residual"].chosen.operations > 3 * 5_000
+def test_a_thousand_terms() -> None:
+    functions = pipeline.compile_model(addition(1_000, "residual", "tangent")).functions
+    assert functions["residual"].chosen.operations > 3 * 1_000
 
 
 def test_a_deep_expression_is_lowered() -> None:
