@@ -43,12 +43,20 @@ def _executor(jobs: int) -> AbstractContextManager[Executor | None]:
 def is_complete(request: Request, store: Store) -> bool:
     """Whether a run has ended that was asked for all these speeds (reached or not)."""
     earlier = _earlier(request, store)
-    if earlier is None or earlier[0] not in ENDED:
+    if earlier is None or earlier[0] not in ENDED or not _has_its_files(request, store):
         return False
     wanted = request.parameters
     return set(strokes_of(wanted)) <= set(strokes_of(earlier[1])) and set(wanted.speeds) <= set(
         earlier[1].speeds
     )
+
+
+def _has_its_files(request: Request, store: Store) -> bool:
+    """Whether every file that run.json names is there: a lost one is computed again."""
+    folder = store.run_folder(request.setup)
+    content = read_json(folder / "run.json")
+    rows = [*content.get("states", ()), *content.get("rejected", ())]
+    return all((folder / name).exists() for row in rows for name in row.get("files", ()))
 
 
 def _run(request: Request, store: Store, resume: bool) -> Run:

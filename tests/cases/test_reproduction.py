@@ -61,6 +61,17 @@ def test_a_small_version_of_everything_and_nothing_twice(
     assert all(first[name] == content for name, content in again.items())
 
 
+def test_a_lost_file_is_computed_again(tmp_path: Path) -> None:
+    store, request = Store(tmp_path), ask(setup(1, 0.5), [1600.0])
+    computing.compute([request], store, resume=False, jobs=1)
+    assert computing.is_complete(request, store)
+    (lost,) = store.run_folder(request.setup).glob("profile_*.csv")
+    lost.unlink()
+    assert not computing.is_complete(request, store)
+    computing.compute([request], store, resume=True, jobs=1)
+    assert lost.exists()
+
+
 def test_runs_side_by_side_are_the_same_as_one_by_one(tmp_path: Path) -> None:
     requests = [ask(setup(1, p_s), [1600.0]) for p_s in (0.0, 0.5)]
     stores = [Store(tmp_path / name) for name in ("one", "two")]
