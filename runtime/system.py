@@ -14,7 +14,7 @@ from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie,
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.unknowns import Numbering, Slot
 from softehl.runtime.kernels import Kernel
-from softehl.runtime.mesh.mesh import Mesh, Predicate
+from softehl.runtime.mesh.mesh import Mesh, Predicate, place_text
 
 Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"
 """A side or group by name, a predicate of places (n, dim), node numbers, or one place (a tuple)."""
@@ -224,8 +224,3 @@ def shown(where: object) -> str:
     if callable(where):
         return getattr(where, "__name__", "predicate")
     return repr(where) if isinstance(where, str | tuple) else "nodes"
-
-
-def place_text(x: Array) -> str:
-    """Coordinates, for messages."""
-    return "(" + ", ".join(f"{value:.4g}" for value in x) + ")"

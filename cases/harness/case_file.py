@@ -5,7 +5,6 @@ it is ever evaluated.  Whatever is wrong ends in one :class:`BadInput`, a single
 was given and what is allowed.
 """
 
-import difflib
 import json
 import re
 import tomllib
@@ -20,6 +19,7 @@ from softehl.cases.harness.case import AnyCase, Run, load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters
 from softehl.cases.harness.units import is_quantity
+from softehl.runtime.names import meant
 
 Shipped = Mapping[str, str]
 """Name of a case that ships -> its module, which is imported when the case is needed."""
@@ -81,7 +81,7 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
         table = tomllib.loads(_text(Path(given)))
     except FileNotFoundError:
         raise BadInput(
-            f"no case or file {given!r}{_meant(given, shipped)}; "
+            f"no case or file {given!r}{meant(given, shipped)}; "
             f"allowed: a TOML file or one of {', '.join(shipped)}"
         ) from None
     except OSError as error:
@@ -92,7 +92,7 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     if not isinstance(name, str) or name not in shipped:
         shown = "no case" if name is None else f"case = {_shown(name)}"
         allowed = " or ".join(f'case = "{known}"' for known in shipped)
-        raise BadInput(f"{given}: {shown}{_meant(str(name), shipped)}; allowed: {allowed}")
+        raise BadInput(f"{given}: {shown}{meant(str(name), shipped)}; allowed: {allowed}")
     return name, table
 
 
@@ -112,7 +112,7 @@ def _validate(
     for key in values:
         if key not in kind.model_fields:
             raise BadInput(
-                f"{origins[key]}: unknown key {_shorten(key)!r}{_meant(key, known)}; "
+                f"{origins[key]}: unknown key {_shorten(key)!r}{meant(key, known)}; "
                 f"allowed: {', '.join(known)}"
             )
     try:
@@ -140,11 +140,6 @@ def _one_line(
         f"{origins[key]}: {key} = {_shown(values[key])}: {reason}{more}; "
         f"allowed: {kind.model_fields[key].description}"
     )
-
-
-def _meant(given: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(given, list(known), n=1)
-    return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def _shown(value: object) -> str:

@@ -1,6 +1,5 @@
 """`softehl reproduce`: choose items, compute their runs, write pictures, tables and captions."""
 
-import difflib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,15 +12,15 @@ from softehl.cases.paper.drawing import write_picture
 from softehl.cases.paper.item import Item, Scope
 from softehl.cases.paper.states import Store, merged
 from softehl.runtime.io import write_csv, write_text
+from softehl.runtime.names import meant
 
 
 def chosen(names: Sequence[str]) -> list[Item]:
     """The items of these names, all of them if there are none.  Raises BadInput."""
     for name in names:
         if name not in ITEMS:
-            close = difflib.get_close_matches(name, list(ITEMS), n=1)
-            meant = f" (did you mean {close[0]!r}?)" if close else ""
-            raise BadInput(f"no table or figure {name!r}{meant}; allowed: {', '.join(ITEMS)}")
+            hint = meant(name, ITEMS)
+            raise BadInput(f"no table or figure {name!r}{hint}; allowed: {', '.join(ITEMS)}")
     return [ITEMS[name] for name in dict.fromkeys(names or ITEMS)]
 
 

@@ -204,8 +204,8 @@ class Mesh:
         nearest = int(distance.argmin())
         if distance[nearest] > _NEAR * self._size:
             raise MeshError(
-                f"no node at {_place(place)}; the nearest is number {nearest} at "
-                f"{_place(self.points[nearest])}"
+                f"no node at {place_text(place)}; the nearest is number {nearest} at "
+                f"{place_text(self.points[nearest])}"
             )
         return nearest
 
@@ -226,7 +226,7 @@ class Mesh:
                 parent = _parent_place(cell, places[row], place)
                 if parent is not None:
                     return nodes[row], cell.shape(parent[None])[0]
-        raise MeshError(f"{_place(place)} lies outside the mesh")
+        raise MeshError(f"{place_text(place)} lies outside the mesh")
 
     @cached_property
     def _size(self) -> float:
@@ -249,7 +249,7 @@ class Mesh:
                 count = int((smallest <= 0.0).sum())
                 raise MeshError(
                     f"{count} of {len(nodes)} {kind} are turned inside out or flat, such as number "
-                    f"{worst} at {_place(places[worst].mean(axis=0))}: number its nodes in the "
+                    f"{worst} at {place_text(places[worst].mean(axis=0))}: number its nodes in the "
                     "order of VTK (in the plane counterclockwise)"
                 )
 
@@ -291,5 +291,6 @@ def _once(faces: Integers, kind: Cell) -> Integers:
     return np.ascontiguousarray(faces[np.sort(first[count == 1])])
 
 
-def _place(x: Array) -> str:
+def place_text(x: Array) -> str:
+    """Coordinates, for messages."""
     return "(" + ", ".join(f"{value:.4g}" for value in x) + ")"
