@@ -33,6 +33,11 @@ _UNARY: dict[Op, Callable[[Number], Number]] = {
     Op.SINH: lambda a: (mpmath.exp(a) - mpmath.exp(-a)) / 2,
     Op.COSH: lambda a: (mpmath.exp(a) + mpmath.exp(-a)) / 2,
     Op.TANH: mpmath.tanh,
+    Op.ASINH: mpmath.asinh,
+    Op.ACOSH: mpmath.acosh,
+    Op.ATANH: mpmath.atanh,
+    Op.ERF: mpmath.erf,
+    Op.ERFC: mpmath.erfc,
     Op.NOT: lambda a: not a,
 }
 _BINARY: dict[Op, Callable[[Number, Number], Number]] = {

@@ -47,6 +47,11 @@ class Op(StrEnum):
     SINH = "sinh"
     COSH = "cosh"
     TANH = "tanh"
+    ASINH = "asinh"
+    ACOSH = "acosh"
+    ATANH = "atanh"
+    ERF = "erf"
+    ERFC = "erfc"
     ATAN2 = "atan2"
     LT = "lt"
     LE = "le"
@@ -61,9 +66,10 @@ class Op(StrEnum):
 
 
 BOOLEAN = frozenset({Op.LT, Op.LE, Op.EQ, Op.AND, Op.OR, Op.NOT})
-ELEMENTARY = frozenset(
-    {Op.TAN, Op.ASIN, Op.ACOS, Op.ATAN, Op.SINH, Op.COSH, Op.TANH},
+ODD = frozenset(
+    {Op.TAN, Op.ASIN, Op.ATAN, Op.SINH, Op.TANH, Op.ASINH, Op.ATANH, Op.ERF},
 )
+ELEMENTARY = ODD | {Op.ACOS, Op.COSH, Op.ACOSH, Op.ERFC}
 """Functions of one argument that are those of the C library and nothing more."""
 _CALLS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS, *ELEMENTARY})
 FREE = frozenset({Op.CONST, Op.PI, Op.INPUT, Op.NAME})
@@ -281,7 +287,7 @@ class Graph:
             return self.zero
         if op is Op.EXP and a is self.zero:
             return self.one
-        if a is self.zero and op in (Op.TAN, Op.ASIN, Op.ATAN, Op.SINH, Op.TANH):
+        if a is self.zero and op in ODD:
             return a
         if op in (Op.SQRT, Op.CBRT) and a in (self.zero, self.one):
             return a

@@ -77,6 +77,16 @@ def _derivative_of_call(g: Graph, n: Node, a: Node) -> Node:
             return g.call(Op.SINH, a)
         case Op.TANH:
             return g.sub(g.one, g.mul(n, n))
+        case Op.ASINH:
+            return g.recip(g.call(Op.SQRT, g.add(g.one, g.mul(a, a))))
+        case Op.ACOSH:
+            return g.recip(g.call(Op.SQRT, g.neg(_one_minus_square(g, a))))
+        case Op.ATANH:
+            return g.recip(_one_minus_square(g, a))
+        case Op.ERF:
+            return _bell(g, a)
+        case Op.ERFC:
+            return g.neg(_bell(g, a))
         case _:
             raise DifferentiationError(f"no derivative rule for {n.op}")
 
@@ -84,3 +94,9 @@ def _derivative_of_call(g: Graph, n: Node, a: Node) -> Node:
 def _one_minus_square(g: Graph, a: Node) -> Node:
     """(1 - a)(1 + a), which keeps its digits near a = 1."""
     return g.mul(g.sub(g.one, a), g.add(g.one, a))
+
+
+def _bell(g: Graph, a: Node) -> Node:
+    """2 / sqrt(pi) exp(-a^2), the derivative of the error function."""
+    scale = g.mul(g.const(2), g.recip(g.call(Op.SQRT, g.pi())))
+    return g.mul(scale, g.call(Op.EXP, g.neg(g.mul(a, a))))

@@ -54,10 +54,15 @@ _FUNCTIONS: dict[type, Op] = {
     sp.sinh: Op.SINH,
     sp.cosh: Op.COSH,
     sp.tanh: Op.TANH,
+    sp.asinh: Op.ASINH,
+    sp.acosh: Op.ACOSH,
+    sp.atanh: Op.ATANH,
+    sp.erf: Op.ERF,
+    sp.erfc: Op.ERFC,
 }
 SUPPORTED = (
     "+ - * / **, sqrt, cbrt, log, exp, sin, cos, tan, asin, acos, atan, atan2, sinh, cosh, tanh, "
-    "Abs, sign, Heaviside, Min, Max, Piecewise"
+    "asinh, acosh, atanh, erf, erfc, Abs, sign, Heaviside, Min, Max, Piecewise"
 )
 
 

@@ -185,6 +185,8 @@ def test_what_cannot_be_offered_is_named(asked: dict[str, Any], message: str) ->
 FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
     "circular": lambda x, y: sp.tan(x) * sp.asin(x) - sp.acos(y / 3) ** 2 + sp.atan(x * y),
     "hyperbolic": lambda x, y: sp.sinh(x) * sp.cosh(y) + sp.tanh(x * y) * x,
+    "area": lambda x, y: sp.asinh(x * y) + x * sp.acosh(2 + y) + sp.atanh(y * x) * sp.asinh(y),
+    "error": lambda x, y: sp.erf(x) * sp.erfc(3 * y) + x * sp.erfc(2 + x * y) + sp.erf(y) ** 2,
     "plane angle": lambda x, y: sp.atan2(y, x) ** 2 * x + sp.atan2(x, -y) * y,
     "steps": lambda x, y: sp.sign(x) * y**3 + sp.Heaviside(y) * x**3 + sp.Heaviside(x - 9) * x**2,
     "extrema": lambda x, y: sp.Max(x, y) ** 3 + sp.Min(x, y, 0) ** 2 * y + sp.Abs(x - y) ** 3,
