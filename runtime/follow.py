@@ -11,7 +11,7 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.result import Result
 from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point, Solution
+from softehl.runtime.solve.solution import LimitPoint, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.system import System
 
@@ -45,7 +45,7 @@ def follow(
     with np.errstate(all="ignore"):
         first = newton.solve(problem_at(step), state[0][0])
     if not first.converged:
-        raise _stopped(first, results)
+        raise NotConverged(first)
     scale = float(np.sqrt(np.mean((first.x - state[0][0]) ** 2))) / step
     rule = StepRule(step, 1e-6 * step, step)
     path = Arclength(newton, rule, x_scale=scale or 1.0, max_points=most, name="load factor")
@@ -53,11 +53,5 @@ def follow(
         problem_at, 0.0, state[0][0], until=lambda _: until(results[-1]), on_point=keep
     )
     if not branch.converged:
-        raise _stopped(branch, results)
+        raise NotConverged(branch, results[-1] if results else None)
     return LoadPath((*results,), branch.limit_points)
-
-
-def _stopped(found: Solution | Branch, results: list[Result]) -> NotConverged:
-    error = NotConverged(found)
-    error.reached = results[-1] if results else None
-    return error

@@ -15,7 +15,8 @@ from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point, Solution
-from softehl.runtime.system import Step, StudyError, System
+from softehl.runtime.statement.records import StudyError
+from softehl.runtime.system import Step, System
 
 Method: TypeAlias = Literal["euler", "bdf2"]
 

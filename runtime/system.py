@@ -2,79 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler
-from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie, amount
+from softehl.runtime.fem.loads import Tie, amount
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.unknowns import Numbering, Slot
-from softehl.runtime.kernels import Kernel
-from softehl.runtime.mesh.mesh import Mesh, Predicate, place_text
-
-Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"
-"""A side or group by name, a predicate of places (n, dim), node numbers, or one place (a tuple)."""
-Number: TypeAlias = float | Callable[[float], float]
-"""A parameter: a number, or a function of time or load factor."""
-
-AUTOMATIC = ("rate", "dt", "t")
-"""Parameters that a study gives where a page has them and the user does not."""
-
-
-class StudyError(ValueError):
-    """What was asked of a study cannot be; the message says what was given and what is allowed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Elements of one page.
-
-    nodes: (n, k). kind: of the cells or faces. data: name -> (n,) of those that the user gave.
-    previous: column of the kernel's data -> name and node of the unknown whose value at the step
-    before it is; rates: likewise of what `rates` adds. initial: (n, points, k) point data at the
-    start, or None.
-    """
-
-    name: str
-    kernel: Kernel
-    nodes: Integers
-    kind: str
-    slots: tuple[Slot, ...]
-    shared: frozenset[str]
-    data: Mapping[str, Array]
-    previous: Mapping[str, Slot]
-    rates: Mapping[str, Slot]
-    initial: Array | None
-    parameters: Mapping[str, Number]
-
-
-@dataclass(frozen=True, eq=False)
-class Condition:
-    """Prescribed values of an unknown at nodes."""
-
-    where: Where
-    nodes: Integers
-    name: str
-    value: Amount
-
-    @property
-    def words(self) -> str:
-        """What was asked for, for messages."""
-        return f"fix({shown(self.where)}, {self.name}=...)"
-
-
-@dataclass(frozen=True, eq=False)
-class Force:
-    """A load, a spring or a tie: elements of a kernel of ours on unknowns of one name."""
-
-    label: str
-    kernel: DeadLoad | NodalForce | Spring | Tie
-    nodes: Integers
-    name: str
+from softehl.runtime.fem.unknowns import Numbering
+from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.statement.records import Block, Condition, Force, Number, StudyError
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,10 +156,3 @@ class System:
             known[numbers], by[numbers] = values, k
         fixed = np.flatnonzero(by >= 0)
         return fixed, known[fixed]
-
-
-def shown(where: object) -> str:
-    """A place that was meant, for messages."""
-    if callable(where):
-        return getattr(where, "__name__", "predicate")
-    return repr(where) if isinstance(where, str | tuple) else "nodes"

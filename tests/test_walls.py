@@ -27,7 +27,7 @@ ORDER = {
     ),
     "runtime": (
         *("arrays names", "tuning", "library", "io", "calls", "kernels", "mesh", "fem", "solve"),
-        *("system", "result", "follow march", "study", "engines"),
+        *("statement", "system", "equations result", "follow load march", "study", "engines"),
     ),
     "cases": ("harness", "seal", "oring slider", "paper", "shipped", "cli document"),
 }

@@ -63,10 +63,10 @@ class NotConverged(RuntimeError):  # noqa: N818 (named after what it is)
     reached: the last state that was reached, where there is one (a study's Result).
     """
 
-    def __init__(self, result: Solution | Branch) -> None:
+    def __init__(self, result: Solution | Branch, reached: Any = None) -> None:
         super().__init__(f"{result.status.value}: {result.message}. {result.status.advice}")
         self.result = result
-        self.reached: Any = None
+        self.reached = reached
 
 
 @dataclass(frozen=True, eq=False)

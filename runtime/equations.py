@@ -1,0 +1,111 @@
+"""From what was written down to equations: numbering, blocks of elements, the system."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.fem.loads import Spring, Tie
+from softehl.runtime.fem.unknowns import Elements, Numbering
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.names import listed, meant
+from softehl.runtime.statement.records import Block, Force, Statement, StudyError
+from softehl.runtime.system import System
+
+
+def equations(statement: Statement) -> System:
+    """What is written down, as equations.  Raises StudyError for what does not fit together."""
+    if not statement.blocks:
+        raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
+    mesh, pages = statement.mesh, statement.blocks.values()
+    elements = [Elements(b.name, b.nodes, b.slots, b.shared) for b in pages]
+    numbering = Numbering.of(len(mesh.points), elements)
+    for c in statement.conditions:
+        _require(c.name, c.nodes, numbering, c.words, every=False)
+    forces, implied = _forces(statement, numbering)
+    ties = {f.label: len(f.nodes) for f in forces if isinstance(f.kernel, Tie)}
+    layout = replace(
+        numbering.layout,
+        names=(*numbering.layout.names, *ties),
+        counts=(*numbering.layout.counts, *ties.values()),
+    )
+    writer = _Writer(mesh, replace(numbering, layout=layout))
+    blocks = [writer.page(b) for b in pages] + [writer.force(f) for f in forces if len(f.nodes)]
+    return System(
+        mesh,
+        writer.numbering,
+        Assembler.build(layout.total, blocks),
+        dict(statement.blocks),
+        (*statement.conditions,),
+        implied,
+        {name: _at_start(statement, name, numbering) for name in statement.start},
+    )
+
+
+def _forces(
+    statement: Statement, numbering: Numbering
+) -> tuple[tuple[Force, ...], tuple[Force, ...]]:
+    """Forces to be solved for, and ties both sides of which are prescribed."""
+    forces, implied = [], []
+    for force in statement.forces:
+        _require(force.name, force.nodes, numbering, force.label, every=True)
+        if isinstance(force.kernel, Tie):
+            # where both sides are prescribed nothing is left for a multiplier to do
+            both = np.isin(force.nodes, statement.prescribed(force.name)).all(axis=1)
+            implied.append(replace(force, nodes=force.nodes[both]))
+            force = replace(force, nodes=force.nodes[~both])
+        forces.append(force)
+    return (*forces,), (*implied,)
+
+
+def _require(name: str, nodes: Integers, numbering: Numbering, words: str, *, every: bool) -> None:
+    """Raise StudyError unless the nodes have an unknown of this name."""
+    if name not in numbering.nodal:
+        known = listed(numbering.nodal)
+        raise StudyError(
+            f"{words}: no unknown {name!r}{meant(name, numbering.nodal)}; at nodes: {known}"
+        )
+    there = numbering.nodal[name][nodes] >= 0
+    if not (there.all() if every else there.any()):
+        raise StudyError(f"{words}: no page has the unknown {name!r} there")
+
+
+def _at_start(statement: Statement, name: str, numbering: Numbering) -> Array:
+    """Values of an unknown at every node, (points,)."""
+    start = statement.start[name]
+    _require(name, start.nodes, numbering, f"start({name}=...)", every=False)
+    found = np.zeros(len(statement.mesh.points))
+    found[start.nodes] = start.values
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Writer:
+    """Blocks of an assembler on a mesh with numbered unknowns."""
+
+    mesh: Mesh
+    numbering: Numbering
+
+    def page(self, block: Block) -> ElementBlock:
+        n = len(block.nodes)
+        width = len(block.kernel.coordinates)
+        places = self.mesh.points[block.nodes].reshape(n, -1) if width else np.empty((n, 0))
+        given = [block.data[d] for d in block.kernel.data if d in block.data]
+        data = np.stack(given, axis=1) if given else None  # what else there is comes with steps
+        return ElementBlock(
+            block.name, block.kernel, places, self.numbering.dofs[block.name], data=data
+        )
+
+    def force(self, force: Force) -> ElementBlock:
+        dofs = self.numbering.nodal[force.name][force.nodes]
+        places = self.mesh.points[force.nodes].reshape(len(dofs), -1)
+        if isinstance(force.kernel, Tie):
+            places = self.mesh.points[force.nodes[:, 0]]
+            dofs = np.column_stack([dofs, self.numbering.layout.dofs(force.label)])
+        constant = isinstance(force.kernel, Spring | Tie)
+        return ElementBlock(
+            force.label, force.kernel, places, np.ascontiguousarray(dofs), constant=constant
+        )

@@ -1,0 +1,51 @@
+"""Load steps of a study, from one load factor to another: cut and grown as Newton needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.result import Result
+from softehl.runtime.solve.continuation import Continuation
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import NotConverged, Point
+from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.system import System
+
+SMALLEST = 1e-6
+"""Of the whole load or time: a path is given up where steps become shorter."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadSteps:
+    """How a load is applied: in so many steps, each result handed to `on_step`."""
+
+    steps: int
+    newton: Newton
+    on_step: Callable[[Result], object]
+
+    def run(self, system: System, start: Result | None, until: float) -> Result:
+        """The result at load factor `until`.  Raises NotConverged."""
+        x0 = system.at_rest() if start is None else start.x
+        begin = 0.0 if start is None else start.t
+        histories = system.histories() if start is None else start.histories
+        state = [(x0, histories)]  # after the last converged step
+        reached: list[Result] = []
+
+        def problem_at(t: float) -> Problem:
+            return system.problem(system.still(t, *state[0]))
+
+        def keep(point: Point) -> None:
+            problem, x = problem_at(point.parameter), point.solution.x
+            state[0] = x, system.committed(problem, x, state[0][1])
+            reached[:] = [Result(system, problem, point, state[0][1])]
+            self.on_step(reached[0])
+
+        first = abs(until - begin) / self.steps
+        rule = StepRule(first, min(SMALLEST, first), first)
+        path = Continuation(self.newton, rule, name="load factor")
+        branch = path.follow(problem_at, begin, until, x0, on_point=keep)
+        if not branch.converged:
+            raise NotConverged(branch, reached[0] if reached else None)
+        return reached[0]

@@ -1,0 +1,1 @@
+"""What a study has been told: pages on elements, supports, loads, values at the start."""

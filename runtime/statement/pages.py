@@ -1,0 +1,113 @@
+"""A page on elements of a mesh: which elements, what its arguments are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.unknowns import Slot, slots
+from softehl.runtime.kernels import Kernel
+from softehl.runtime.mesh.mesh import Mesh, Predicate
+from softehl.runtime.statement.given import datum, known, parameter
+from softehl.runtime.statement.records import AUTOMATIC, Block, StudyError
+
+Elements = tuple[str, Integers]
+"""Kind of cells or faces and their nodes (n, k)."""
+
+
+def elements_of(
+    mesh: Mesh, name: str, kernel: Kernel, on: str | Predicate | None, cells: str | None
+) -> Elements:
+    """The elements of a kernel.  Raises StudyError, MeshError."""
+    if on is not None and cells is not None:
+        raise StudyError(f"{name!r}: give cells=... or on=..., not both")
+    if on is not None and kernel.nodes == 1:
+        return "point1", mesh.nodes(on)[:, None]
+    there = mesh.faces(on) if on is not None else mesh.cells_of(cells)
+    fit = {kind: nodes for kind, nodes in there.items() if nodes.shape[1] == kernel.nodes}
+    if len(fit) != 1 or (cells is None and len(there) > 1):
+        kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in there.items())
+        place = "the mesh" if on is None and cells is None else repr(cells or on)
+        raise StudyError(
+            f"{name!r}: {kernel.name} has {kernel.nodes} nodes, {place} has {kinds}"
+            + ("; name groups of cells of one kind" if len(there) > 1 else "")
+        )
+    return next(iter(fit.items()))
+
+
+def page_on(
+    mesh: Mesh,
+    name: str,
+    kernel: Kernel,
+    elements: Elements,
+    shared: Sequence[str],
+    given: Mapping[str, Any],
+) -> Block:
+    """A block of elements with everything its page needs.  Raises StudyError."""
+    kind, nodes = elements
+    _require_fit(mesh, kernel)
+    found = slots(kernel)
+    known("unknown", shared, [s.name for s in found if s.node is None], kernel.name)
+    previous, rates = _automatic(kernel, found)
+    known("argument", given, _arguments(kernel), kernel.name)
+    needed = [p for p in kernel.parameters if p not in AUTOMATIC]
+    needed += [d for d in kernel.data if d not in previous and d not in rates]
+    missing = [a for a in needed if a not in given]
+    if missing:
+        raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}")
+    for p in kernel.parameters:
+        parameter(name, p, given.get(p, 0.0))
+    centres = mesh.points[nodes].mean(axis=1)
+    data = {d: datum(name, d, given[d], centres) for d in kernel.data if d in given}
+    return Block(
+        name=name,
+        kernel=kernel,
+        nodes=nodes,
+        kind=kind,
+        slots=found,
+        shared=frozenset(shared),
+        data=data,
+        previous={d: s for d, s in previous.items() if d not in data},
+        rates={d: s for d, s in rates.items() if d not in data},
+        initial=_initial(name, kernel, given, centres),
+        parameters={p: given[p] for p in kernel.parameters if p in given},
+    )
+
+
+def _require_fit(mesh: Mesh, kernel: Kernel) -> None:
+    if kernel.interpolated is not None:
+        raise StudyError(
+            f"{kernel.name} interpolates {kernel.interpolated}: a study has unknowns at nodes "
+            "and cells only; assemble it by softehl.ElementBlock"
+        )
+    if kernel.coordinates and len(kernel.coordinates) != mesh.dimension:
+        raise StudyError(
+            f"{kernel.name} has {len(kernel.coordinates)} coordinates a node "
+            f"({', '.join(kernel.coordinates)}), the mesh has {mesh.dimension}"
+        )
+
+
+def _arguments(kernel: Kernel) -> list[str]:
+    return [*kernel.parameters, *kernel.data, *kernel.point_data]
+
+
+def _automatic(kernel: Kernel, found: Sequence[Slot]) -> tuple[dict[str, Slot], dict[str, Slot]]:
+    """Data u_old1, ... and u_rate1, ... of nodal unknowns u: what a study fills itself."""
+    nodal = {f"{s.name}{{}}{s.node + 1}": s for s in found if s.node is not None}
+    previous = {label.format("_old"): slot for label, slot in nodal.items()}
+    rates = {label.format("_rate"): slot for label, slot in nodal.items()}
+    return tuple(  # type: ignore[return-value]
+        {d: table[d] for d in kernel.data if d in table} for table in (previous, rates)
+    )
+
+
+def _initial(block: str, kernel: Kernel, given: Mapping[str, Any], centres: Array) -> Array | None:
+    """Point data at the start, (n, points, k): numbers or functions of the centres, else zero."""
+    if not kernel.point_data:
+        return None
+    columns = [datum(block, name, given.get(name, 0.0), centres) for name in kernel.point_data]
+    points = len(kernel.default_rule.weights)
+    return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)

@@ -1,0 +1,111 @@
+"""The records of a boundary-value problem as it was written down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie
+from softehl.runtime.fem.unknowns import Slot
+from softehl.runtime.kernels import Kernel
+from softehl.runtime.mesh.mesh import Mesh, Predicate
+
+Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"
+"""A side or group by name, a predicate of places (n, dim), node numbers, or one place (a tuple)."""
+Number: TypeAlias = float | Callable[[float], float]
+"""A parameter: a number, or a function of time or load factor."""
+Datum: TypeAlias = float | Array | Callable[[Array], Array]
+"""Data of elements: one number, (n,) numbers, or a function of their centres (n, dim)."""
+
+AUTOMATIC = ("rate", "dt", "t")
+"""Parameters that a study gives where a page has them and the user does not."""
+
+
+class StudyError(ValueError):
+    """What was asked of a study cannot be; the message says what was given and what is allowed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Elements of one page.
+
+    nodes: (n, k). kind: of the cells or faces. data: name -> (n,) of those that the user gave.
+    previous: column of the kernel's data -> name and node of the unknown whose value at the step
+    before it is; rates: likewise of what `rates` adds. initial: (n, points, k) point data at the
+    start, or None.
+    """
+
+    name: str
+    kernel: Kernel
+    nodes: Integers
+    kind: str
+    slots: tuple[Slot, ...]
+    shared: frozenset[str]
+    data: Mapping[str, Array]
+    previous: Mapping[str, Slot]
+    rates: Mapping[str, Slot]
+    initial: Array | None
+    parameters: Mapping[str, Number]
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """Prescribed values of an unknown at nodes."""
+
+    where: Where
+    nodes: Integers
+    name: str
+    value: Amount
+
+    @property
+    def words(self) -> str:
+        """What was asked for, for messages."""
+        return f"fix({shown(self.where)}, {self.name}=...)"
+
+
+@dataclass(frozen=True, eq=False)
+class Force:
+    """A load, a spring or a tie: elements of a kernel of ours on unknowns of one name."""
+
+    label: str
+    kernel: DeadLoad | NodalForce | Spring | Tie
+    nodes: Integers
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Values of an unknown at nodes at the start, (n,) each."""
+
+    nodes: Integers
+    values: Array
+
+
+@dataclass(eq=False)
+class Statement:
+    """A boundary-value problem that is being written down, in the order of the script.
+
+    start: of each unknown what was said last.
+    """
+
+    mesh: Mesh
+    blocks: dict[str, Block] = field(default_factory=dict)
+    conditions: list[Condition] = field(default_factory=list)
+    forces: list[Force] = field(default_factory=list)
+    start: dict[str, Start] = field(default_factory=dict)
+
+    def prescribed(self, name: str) -> Integers:
+        """Nodes at which an unknown is prescribed."""
+        parts = [c.nodes for c in self.conditions if c.name == name]
+        return np.concatenate([np.empty(0, dtype=np.int64), *parts])
+
+
+def shown(where: object) -> str:
+    """A place that was meant, for messages."""
+    if callable(where):
+        return getattr(where, "__name__", "predicate")
+    return repr(where) if isinstance(where, str | tuple) else "nodes"
