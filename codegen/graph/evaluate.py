@@ -57,8 +57,8 @@ _BINARY: dict[Op, Callable[[Number, Number], Number]] = {
 class State:
     """Arguments of one element: exact numbers, as doubles or mpmath values.
 
-    `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative);
-    `point_data` [point][entry].
+    `rule` holds rows (coordinates..., weight); `basis` [point][mode] = (value, xi-derivative)
+    of each field; `point_data` [point][entry].
     """
 
     coordinates: Sequence[Number]
@@ -66,7 +66,7 @@ class State:
     data: Sequence[Number] = ()
     parameters: Sequence[Number] = ()
     rule: Sequence[Sequence[Number]] = ((1,),)
-    basis: Sequence[Sequence[tuple[Number, Number]]] = ()
+    basis: Sequence[Sequence[Sequence[Number]]] = ()
     point_data: Sequence[Sequence[Number]] = ()
 
 

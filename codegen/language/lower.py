@@ -66,6 +66,20 @@ SUPPORTED = (
 )
 
 
+def _decimal(e: sp.Float) -> Fraction:
+    """The decimal as which a float was written, exactly.
+
+    What rounding has touched has more digits than anybody writes: 1 / 3, 0.1 + 0.2.
+    """
+    text = str(e)
+    if not e.is_finite or sp.Float(text, precision=e._prec) != e:
+        raise ModelError(
+            f"{sp.N(e, 17)} is a rounded number; write an exact one, e.g. Rational(1, 3) for 1 / 3 "
+            "or Rational('0.1') where decimals are added or multiplied"
+        )
+    return Fraction(text)
+
+
 PIECES = 60
 """Pieces of one Piecewise: each is a branch inside the one before."""
 
@@ -121,7 +135,7 @@ class Lowering:
         if e is sp.E:
             return self.g.call(Op.EXP, self.g.one)
         if isinstance(e, sp.Float):
-            raise ModelError(f"{e} is a rounded number; write an exact one, e.g. Rational(1, 3)")
+            return self.g.const(_decimal(e))
         if e in self.bound:  # a name that is written out
             return self.bound[e]
         if hasattr(e, "definition"):
@@ -183,6 +197,8 @@ class Lowering:
         base = yield self._lower(base)
         if exponent.is_negative:
             self._divisor(base, e)
+        if isinstance(exponent, sp.Float):
+            return self.g.power(base, _decimal(exponent))
         if isinstance(exponent, sp.Rational):
             return self.g.power(base, Fraction(int(exponent.p), int(exponent.q)))
         power = yield self._lower(exponent)

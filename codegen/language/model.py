@@ -66,7 +66,7 @@ class Model:
         self._coordinates: tuple[str, ...] = ()
         self._unknowns: list[str] = []
         self._interpolated: str | None = None
-        self._components = 2
+        self._components = 0
         self._directions: list[Node] = []
         self._nodal: list[tuple[int, int]] = []
         self._places: list[tuple[str, int | None]] = []
@@ -82,6 +82,7 @@ class Model:
         self._fields: list[tuple[str, Node]] = []
         self._potential: Node | None = None
         self._product = False
+        self._norms = 0
         self._derivatives: list[tuple[str, Node]] = []
         self._example: dict[str, float] = {}
         self._conditions: list[Condition] = []
@@ -133,7 +134,10 @@ class Model:
         return symbol
 
     def interpolated(self, name: str) -> tuple[sp.Symbol, sp.Symbol]:
-        """Value and xi-derivative of a field with any number of element unknowns (`modes`)."""
+        """Value and xi-derivative of a field with any number of element unknowns (`modes`).
+
+        Each further field has modes of its own, which follow those of the fields before it.
+        """
         return self.interpolated_sides(name)[0]
 
     def interpolated_sides(self, *names: str) -> list[tuple[sp.Symbol, sp.Symbol]]:
@@ -142,13 +146,16 @@ class Model:
         An interior facet has two: the traces from its sides.  The basis holds both components
         of each field for every mode, zero where a mode belongs to another field.
         """
-        if self._interpolated:
-            raise ModelError(f"{names[0]}: the element interpolates {self._interpolated} already")
-        self._interpolated, self._components = ", ".join(names), 2 * len(names)
+        before = self._components
         labels = [label for name in names for label in (name, f"{name}_xi")]
+        for name in names:
+            if name in self._symbols:
+                raise ModelError(f"the name {name} is used twice in model {self.name}")
+        self._interpolated = ", ".join([*filter(None, [self._interpolated]), *names])
+        self._components += len(labels)
         xi = sp.Symbol("xi", real=True)
         symbols = []
-        for k, label in enumerate(labels):
+        for k, label in enumerate(labels, start=before):
             node = self.graph.input("interpolated", k, varying=True)
             symbols.append(self._name(label, node, xi, known=False))
         for p, p_xi in zip(symbols[::2], symbols[1::2], strict=True):
@@ -274,6 +281,17 @@ class Model:
         if derivative is not None:
             self._given[node] = {self._lower(s): self._lower(e) for s, e in derivative.items()}
         return self._name(name, node, expression, given=derivative)
+
+    def norm(self, values: Any) -> Any:
+        """Length of a scalar, list or matrix: the root of the sum of its squares.
+
+        Where it is zero its derivatives are zero too, first and second: a direction that does not
+        exist contributes nothing.  (Of lengths below 1e-154 the squares are zero.)
+        """
+        self._norms += 1
+        squares = sum(v**2 for v in Entries.of(values).values)
+        square = self.define(f"norm_{self._norms}_squared", squares)
+        return sp.Piecewise((sp.sqrt(square), square > 0), (sp.Integer(0), True))
 
     def implicit(
         self,
@@ -439,7 +457,7 @@ class Model:
             tasks=self._tasks,
             conditions=tuple(self._conditions),
             nodal=tuple(self._nodal),
-            components=self._components,
+            components=self._components or 2,
             places=tuple(self._places),
             history=tuple(name for name, _ in self._history),
         )

@@ -87,8 +87,7 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
     def about_one(name: str) -> float:
         return vary(given[name]) if name in given else rng.uniform(0.5, 1.5)
 
-    modes = 2 if d.interpolated else 0
-    unknowns = [*d.unknowns, *(d.interpolated for _ in range(modes) if d.interpolated)]
+    unknowns = [*d.unknowns, *(name for name in _fields(d) for _ in range(2))]
     dofs = [vary(given[n]) if n in given else spread * rng.uniform(-1, 1) for n in unknowns]
     rule = _rule(d)
     return State(
@@ -97,7 +96,7 @@ def draw(d: Definition, rng: random.Random, attempt: int = 0) -> State:
         data=[about_one(a.name) for a in d.data],
         parameters=[about_one(a.name) for a in d.parameters],
         rule=rule,
-        basis=[_linear(float(p[0])) for p in rule] if modes else (),
+        basis=[_linear(float(p[0]), len(_fields(d))) for p in rule] if d.interpolated else (),
         point_data=[[about_one(a.name) for a in d.point_data] for _ in rule],
     )
 
@@ -128,9 +127,18 @@ def _rule(d: Definition) -> list[tuple[float, ...]]:
     return [tuple(float(v) for v in (*p, w)) for p, w in pairs]
 
 
-def _linear(xi: float) -> list[tuple[float, float]]:
-    """Value and slope of the two linear shape functions."""
-    return [((1 - xi) / 2, -0.5), ((1 + xi) / 2, 0.5)]
+def _fields(d: Definition) -> list[str]:
+    """Names of the interpolated fields."""
+    return d.interpolated.split(", ") if d.interpolated else []
+
+
+def _linear(xi: float, fields: int) -> list[tuple[float, ...]]:
+    """Values and slopes of the two linear shape functions of each field, zero for the others."""
+    shapes = ((1 - xi) / 2, -0.5), ((1 + xi) / 2, 0.5)
+    none = (0.0, 0.0)
+    return [
+        (*none * k, *shape, *none * (fields - 1 - k)) for k in range(fields) for shape in shapes
+    ]
 
 
 def fault(definition: Definition, state: State) -> str | None:

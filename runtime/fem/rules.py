@@ -88,6 +88,25 @@ def facet_rule(m_p: int) -> Rule:
     return Rule(np.empty((1, 0)), np.ones(1), basis)
 
 
+def several(*rules: Rule) -> Rule:
+    """The rule of an element with several interpolated fields, from one rule with basis for each.
+
+    The modes of the first field come first; each is zero in the components of the other fields.
+    All rules have the same points.  Raises ValueError.
+    """
+    first, bases = rules[0], [rule.basis for rule in rules if rule.basis is not None]
+    alike = all(np.array_equal(r.points, first.points) for r in rules)
+    if len(bases) < len(rules) or not alike:
+        raise ValueError("several(...): each rule needs a basis, and all the same points")
+    count = [b.shape[1] for b in bases]
+    basis = np.zeros((len(first.weights), sum(count), sum(b.shape[2] for b in bases)))
+    mode = component = 0
+    for b in bases:
+        basis[:, mode : mode + b.shape[1], component : component + b.shape[2]] = b
+        mode, component = mode + b.shape[1], component + b.shape[2]
+    return Rule(first.points, first.weights, basis)
+
+
 @cache
 def trace_rule(m_p: int, kind: Kind = "gauss", points: int | None = None) -> Rule:
     """The film rule with both ends of the segment added, of weight 0 where they were missing.

@@ -191,8 +191,11 @@ def test_extrema_and_absolute_value() -> None:
 @pytest.mark.parametrize(
     ("expression", "message"),
     [
-        (x * 0.1, "0.1.* is a rounded number; write an exact one"),
-        (x**0.5, "0.5.* is a rounded number"),
+        (x * (1 / 3), "0.33333333333333331 is a rounded number; write an exact one"),
+        (x ** (2 / 3), "0.66666666666666663 is a rounded number"),
+        (x * (0.1 + 0.2), "0.30000000000000004 is a rounded number; .*where decimals are added"),
+        (x * sp.pi.evalf(), "3.14159265358979.* is a rounded number"),
+        (x * sp.Float("inf"), "inf"),
         (x + sp.Symbol("stiffness", real=True), "symbol stiffness is not declared"),
         (sp.Symbol("x"), "symbol x is not declared"),  # not the real one that was declared
         (
@@ -252,11 +255,22 @@ def test_unknowns_come_before_the_interpolated_field() -> None:
         m.unknown("u")
 
 
-def test_a_second_interpolated_field_is_refused() -> None:
+def test_an_interpolated_field_is_declared_once() -> None:
     m = model()
     m.interpolated("p")
-    with pytest.raises(ModelError, match="q: the element interpolates p already"):
-        m.interpolated("q")
+    m.interpolated("q")
+    with pytest.raises(ModelError, match="the name p is used twice in model throwaway"):
+        m.interpolated("p")
+
+
+def test_decimals_are_what_they_are_written_as() -> None:
+    assert lowered(x * 0.1) is not None
+    half, one, other = sp.Rational(1, 2), sp.Rational(1, 10), sp.Rational(-37, 10**9)
+    for written, exact_one in ((x * 0.1, x * one), (x**0.5, x**half), (y - 3.7e-8, y + other)):
+        _, lower = lowering()
+        assert lower(written) is lower(exact_one)
+    _, lower = lowering()
+    assert lower(sp.Float("0.1", 40) * x) is lower(x / 10)
 
 
 def test_a_given_derivative_of_a_matrix_is_refused() -> None:

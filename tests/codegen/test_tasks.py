@@ -17,7 +17,7 @@ from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools.oracle import Oracle
-from softehl.runtime.fem.rules import film_rule
+from softehl.runtime.fem.rules import film_rule, several
 from softehl.runtime.kernels import ArgumentError, Kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors
 
@@ -126,6 +126,42 @@ def test_product_of_an_interpolated_field(tmp_path: Path) -> None:
     assert off(slope, Oracle(d).derivative(at, "parameters", 0)) <= 1e-14
 
 
+def two_fields() -> Definition:
+    """A pressure of order 2 and a temperature of order 1 that know each other."""
+    m = Model("two_fields", nodes=1, rule=quadrature.gauss(3, 1))
+    u = m.unknown("u")
+    p, p_xi = m.interpolated("p")
+    T, T_xi = m.interpolated("T")
+    (k,) = m.parameters(k="conductivity")
+    m.weak_form([(p_xi * sp.exp(-T), p_xi), (k * T_xi + u * p**2, T_xi), (p * T, u)])
+    m.fields(product=p * T_xi)
+    return m.finish()
+
+
+def test_two_interpolated_fields(tmp_path: Path) -> None:
+    d = two_fields()
+    kernel = compiled(d, tmp_path)
+    rule = several(film_rule(2, "gauss", 3), film_rule(1, "gauss", 3))
+    assert rule.basis is not None
+    assert rule.basis.shape == (3, 5, 4)
+    dofs = np.array([[0.7, 0.3, 0.9, -0.2, 1.1, 0.4]])
+    given: dict[str, Any] = {"parameters": [1.4], "rule": rule}
+    at = element_state(kernel, (), dofs, **given)
+    r, K = kernel.tangent(np.zeros((1, 0)), dofs, **given)
+    assert off(r[0], Oracle(d).residual(at)) <= 1e-14
+    assert off(K[0], Oracle(d).tangent(at)) <= 1e-14
+    xi = rule.points[:, 0]
+    p = 0.3 * xi * (xi - 1) / 2 + 0.9 * (1 - xi**2) - 0.2 * xi * (xi + 1) / 2
+    expected = p * 0.5 * (0.4 - 1.1)
+    found = kernel.fields_at(np.zeros((1, 0)), dofs, **given)[0, :, 0]
+    np.testing.assert_allclose(found, expected, rtol=1e-13)
+
+
+def test_fields_on_different_points_are_refused() -> None:
+    with pytest.raises(ValueError, match="each rule needs a basis, and all the same points"):
+        several(film_rule(2, "gauss", 3), film_rule(1, "gauss", 2))
+
+
 # ------------------------------------------------------------------------------------ what is made
 
 
@@ -205,3 +241,23 @@ def test_functions_and_their_derivatives(name: str, unroll: bool, tmp_path: Path
     kernel = compiled(d, tmp_path)
     for at in ((0.4, -0.7), (-0.3, 0.2), (0.6, 0.5)):
         assert max(tangent_errors(d, kernel, (), at, parameters=[0.3])) <= 1e-14
+
+
+def test_the_length_of_a_vector_and_its_derivatives(tmp_path: Path) -> None:
+    """Also where it is zero: there they are zero; the plain root has none (not-a-number)."""
+    m = Model("length", nodes=1, rule=quadrature.point_rule())
+    s = [m.unknown("x"), m.unknown("y")]
+    m.potential(m.integral("Pi", m.norm(s) ** 3 + m.norm(s) * sp.exp(s[0])))
+    d = m.finish()
+    kernel = compiled(d, tmp_path)
+    for at in ((0.4, -0.7), (-3e-9, 2e-9)):
+        assert max(tangent_errors(d, kernel, (), at)) <= 1e-14
+    r, K = kernel.tangent(np.zeros((1, 0)), np.zeros((1, 2)))
+    assert not r.any()
+    assert not K.any()
+    m = Model("root", nodes=1, rule=quadrature.point_rule())
+    s = [m.unknown("x"), m.unknown("y")]
+    m.potential(m.integral("Pi", sp.sqrt(s[0] ** 2 + s[1] ** 2)))
+    (tmp_path / "root").mkdir()
+    r = compiled(m.finish(), tmp_path / "root").residual(np.zeros((1, 0)), np.zeros((1, 2)))
+    assert np.isnan(r).all()
