@@ -261,6 +261,34 @@ void softehl_solid_taylor_fields(
     const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
 void softehl_follower_pressure_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,

@@ -19,6 +19,7 @@ SHIPPED = {
     "solid_q4": Shipped(4, 8, energy=True, fields=True),
     "solid_fbar": Shipped(4, 8, fields=True),
     "solid_taylor": Shipped(4, 8, energy=True, fields=True),
+    "solid_taylor_mean": Shipped(4, 8, energy=True, fields=True),
     "follower_pressure": Shipped(2, 4),
     "contact": Shipped(1, 3),
     "film": Shipped(2, 4, fields=True),

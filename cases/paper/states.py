@@ -34,6 +34,7 @@ PAPER: dict[str, Any] = {
     "mesh": "uniform",
     "upwinding": 0.0,
     "error_estimate": False,
+    "solid": "taylor",
     "arc_start": -34.0,
     "arc_end": 43.0,
 }

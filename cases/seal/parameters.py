@@ -53,8 +53,10 @@ class ORing(Parameters):
         bounds="left out = any",
         gt=0,
     )
-    solid: Literal["fbar", "taylor", "q4"] = key(
-        "taylor", "solid element", bounds='"fbar", "taylor" or "q4"'
+    solid: Literal["taylor_mean", "taylor", "fbar", "q4"] = key(
+        "taylor_mean",
+        "solid element",
+        bounds='"taylor_mean" (passes the patch test), "taylor" (the paper\'s), "fbar" or "q4"',
     )
     sealed_pressure: float = key(1.0, "sealed pressure p_s", unit="MPa", ge=0, le=100)
     stroke: Literal["out", "in", "both"] = key(

@@ -11,6 +11,7 @@ ALL: dict[str, Callable[[], Definition]] = {
     "solid_q4": solid.plain,
     "solid_fbar": solid.fbar,
     "solid_taylor": solid.taylor,
+    "solid_taylor_mean": solid.taylor_mean,
     "follower_pressure": boundary.follower_pressure,
     "contact": contact.augmented_lagrangian,
     "film": film.reynolds_segment,

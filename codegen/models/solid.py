@@ -1,4 +1,4 @@
-"""Axisymmetric 4-node hyperelastic solids, energy (3)-(6): plain, F-bar, Taylor-expanded.
+"""Axisymmetric 4-node hyperelastic solids, energy (3)-(6): plain, F-bar, two Taylor-expanded.
 
 Units mm, MPa, N; nodes counterclockwise in (z, r); unknowns u_z1, u_r1, ..., u_z4, u_r4.
 """
@@ -21,7 +21,7 @@ PAPER = (materials.MOONEY_RIVLIN, materials.VOLUMETRIC)
 
 
 def _element(name: str, doc: str, terms: Terms) -> tuple[Model, Any, Any, Any]:
-    """Arguments that the three solids share: coordinates, displacements, terms of the energy."""
+    """Arguments that the solids share: coordinates, displacements, terms of the energy."""
     m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), unroll=True, doc=doc)
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
@@ -126,4 +126,87 @@ def _expanded(m: Model, X: Any, centre: kin.Quad4, xi: Any, eta: Any) -> tuple[A
             )
         )
         N.append(m.define(f"N_{a}", (1 + p * xi + q * eta) / 4))
+    return dN, N
+
+
+def taylor_mean(name: str = "solid_taylor_mean", terms: Terms = PAPER) -> Definition:
+    """Taylor-expanded element that passes the patch test on every quadrilateral.
+
+    With a_0, b_a and gamma_a of the centre, u = a_0 + (b . u) X + (gamma . u) xi eta, so that dN_a
+    is b_a + gamma_a grad(xi eta). As `solid_taylor` this takes grad(xi eta) and N_a / R to first
+    order in xi and eta, but their zeroth terms are the exact means over the element, weighted with
+    the radius (after Korelc and Wriggers 1997), the first-order ones have zero mean, and the
+    weights are the true ones. Forces of a constant stress are then exact, and so is a homogeneous
+    strain at every point.
+    The isochoric energy is taken at the 2x2 points, the volumetric one of the mean gradient.
+    """
+    m, X, u, material = _element(name, taylor_mean.__doc__ or "", terms)
+    e = kin.quad4(m, "", X, *m.point())
+    ring = m.define("ring", e.R * e.detJ)
+    volume = m.integral("volume", ring)
+    (dN0, hoop0), (dN, hoop) = _about_mean(m, X, e, (ring, volume))
+    F = kin.gradient(m, "", dN, hoop, u)
+    F0 = kin.gradient(m, "0", dN0, hoop0, u)
+    isochoric, volumetric = material
+    I1, I2, _ = kin.invariants(m, "", F)
+    energy = m.integral("isochoric", ring * isochoric(I1, I2))
+    m.potential(2 * sp.pi * (energy + volume * volumetric(m.define("I3_0", F0.J**2))))
+    # The stress combines the point's isochoric part with the mean volume ratio.
+    shared = F.scaled(m.define("to_J0", (F0.J / F.J) ** sp.Rational(1, 3)))
+    _fields(m, X, u, e.N, shared, material)
+    return m.finish()
+
+
+def _about_mean(m: Model, X: Any, e: kin.Quad4, weights: tuple[Any, Any]) -> Any:
+    """dN_a and N_a / R: their means over the element, and with the first-order terms at the point.
+
+    weights: R detJ at the point, and its integral.
+    """
+    (ring, volume), (xi, eta) = weights, m.point()
+    centre = kin.quad4(m, "0", X, sp.Integer(0), sp.Integer(0))
+
+    def mean(label: str, weighted: Any) -> Any:
+        return m.define(f"mean_{label}", m.integral(f"sum_{label}", weighted) / volume)
+
+    def both(label: str, weighted: Any, first: Any) -> tuple[Any, Any]:
+        at_mean = mean(label, weighted)
+        return at_mean, m.define(label, at_mean + first)
+
+    s, t = m.define("s", xi - mean("xi", ring * xi)), m.define("t", eta - mean("eta", ring * eta))
+    bulge = []  # grad(xi eta)
+    for c, here, there in zip("zr", _parent_slopes(e), _parent_slopes(centre), strict=True):
+        first = (t * there[0] + s * there[1]) / centre.detJ
+        bulge.append(both(f"bulge_{c}", e.R * (eta * here[0] + xi * here[1]), first))
+    # N_a / R = (1 + p xi + q eta + p q xi eta) / (4 R); the last term has no mean
+    (R_xi, R_eta), scale = centre.dX[1], 1 / (4 * centre.R)
+    hoop = [
+        both(f"hoop_{n}", e.detJ * x / 4, first * scale)
+        for n, x, first in (
+            ("1", 1, -(s * R_xi + t * R_eta) / centre.R),
+            ("xi", xi, s),
+            ("eta", eta, t),
+        )
+    ]
+    return [
+        _with_bulge(m, X, centre.dN, label, [g[k] for g in bulge], [h[k] for h in hoop])
+        for k, label in enumerate(("_mean", "_point"))
+    ]
+
+
+def _parent_slopes(e: kin.Quad4) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    """detJ times the derivatives of xi and eta by Z, and by R."""
+    (z_xi, z_eta), (r_xi, r_eta) = e.dX
+    return (r_eta, -r_xi), (-z_eta, z_xi)
+
+
+def _with_bulge(m: Model, X: Any, b: Any, label: str, bulge: Any, hoop: Any) -> tuple[Any, Any]:
+    """b_a + gamma_a grad(xi eta), and the hoop terms from those of 1, xi, eta."""
+    signs = [p * q for p, q in shapes.QUAD_NODES]
+    h_z, h_r = (shapes.interpolate(signs, x) for x in X)
+    dN, N = [], []
+    for a, (p, q) in enumerate(shapes.QUAD_NODES):
+        gamma = (p * q - h_z * b[a][0] - h_r * b[a][1]) / 4
+        terms = zip("zr", b[a], bulge, strict=True)
+        dN.append([m.define(f"dN{label}_{a}{c}", g + gamma * k) for c, g, k in terms])
+        N.append(m.define(f"hoop{label}_{a}", hoop[0] + p * hoop[1] + q * hoop[2]))
     return dN, N

@@ -28,7 +28,11 @@ TABLE_1 = {
 def test_defaults_are_table_1() -> None:
     parameters = ORing()
     assert {key: getattr(parameters, key) for key in TABLE_1} == TABLE_1
-    assert (parameters.density, parameters.pressure_order, parameters.solid) == (2, 4, "taylor")
+    assert (parameters.density, parameters.pressure_order, parameters.solid) == (
+        2,
+        4,
+        "taylor_mean",
+    )
     assert parameters.speeds == (1600.0, 800.0, 400.0, 200.0, 100.0)
     assert (parameters.stroke, parameters.sealed_pressure) == ("both", 1.0)
 

@@ -75,8 +75,8 @@ def motion(rng: np.random.Generator, X: Array, strain: float) -> Array:
 
 
 def solids(rng: np.random.Generator) -> Iterator[Case]:
-    """All three solids on three materials: a seal-sized ring, near the axis, stiff."""
-    for family in ("solid_q4", "solid_fbar", "solid_taylor"):
+    """All four solids on three materials: a seal-sized ring, near the axis, stiff."""
+    for family in ("solid_q4", "solid_fbar", "solid_taylor", "solid_taylor_mean"):
         for label, radius, size, strain, material in (
             ("ring", 25.0, 0.1, 0.3, MATERIALS[0]),
             ("near the axis", 1.5, 0.6, 0.2, MATERIALS[1]),

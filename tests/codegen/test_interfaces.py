@@ -42,7 +42,7 @@ def without_interface(patch: pytest.MonkeyPatch) -> None:
 # ----------------------------------------------------------------------------------- what is found
 
 
-@pytest.mark.parametrize("name", ["solid_q4", "solid_fbar", "solid_taylor"])
+@pytest.mark.parametrize("name", ["solid_q4", "solid_fbar", "solid_taylor", "solid_taylor_mean"])
 def test_modes_of_a_quadrilateral_are_those_of_walsh_and_hadamard(name: str) -> None:
     d = ALL[name]()
     interface = interface_of(d)

@@ -49,6 +49,7 @@ RESIDUALS: dict[str, Oracle] = {
     "solid_q4": _plain(solids.residual_q4),
     "solid_fbar": _plain(solids.residual_fbar),
     "solid_taylor": _plain(solids.residual_taylor),
+    "solid_taylor_mean": _plain(solids.residual_taylor_mean),
     "follower_pressure": _single(boundary.residual_pressure),
     "contact": _contact(boundary.residual_contact),
     "film": _film(film.residual_film),
@@ -62,6 +63,7 @@ TANGENTS: dict[str, Oracle] = {
     "solid_q4": _plain(solids.tangent_q4),
     "solid_fbar": _plain(solids.tangent_fbar),
     "solid_taylor": _plain(solids.tangent_taylor),
+    "solid_taylor_mean": _plain(solids.tangent_taylor_mean),
     "follower_pressure": _single(boundary.tangent_pressure),
     "contact": _contact(boundary.tangent_contact),
     "film": _film(film.tangent_film),
@@ -74,6 +76,7 @@ TANGENTS: dict[str, Oracle] = {
 ENERGIES: dict[str, Oracle] = {
     "solid_q4": _plain(solids.energy_q4),
     "solid_taylor": _plain(solids.energy_taylor),
+    "solid_taylor_mean": _plain(solids.energy_taylor_mean),
     "mean_rotation": _plain(section.energy_rotation),
     "mean_axial": _plain(section.energy_axial),
     "axial_spring": _single(section.energy_spring),
@@ -82,6 +85,7 @@ FIELDS: dict[str, Oracle] = {
     "solid_q4": _plain(solids.fields_q4),
     "solid_fbar": _plain(solids.fields_fbar),
     "solid_taylor": _plain(solids.fields_taylor),
+    "solid_taylor_mean": _plain(solids.fields_taylor_mean),
     "film": _film(film.fields_film),
     "film_facet": _plain(facet.fields_facet),
 }

@@ -1,4 +1,4 @@
-"""Axisymmetric four-node solids: plain, F-bar and Taylor-expanded, section coordinates (Z, R).
+"""Axisymmetric four-node solids: plain, F-bar and two Taylor-expanded, in (Z, R).
 
 Every function takes the 8 node coordinates (reference), the 8 displacements and the parameters
 (mu_1, mu_2, kappa), all exact numbers; energies in N mm, residuals in N.
@@ -6,7 +6,7 @@ Every function takes the 8 node coordinates (reference), the 8 displacements and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from tests.reference import material
@@ -178,6 +178,80 @@ def tangent_taylor(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> M
     return hessian(lambda v: _energy_taylor(geometry, v, parameters), u)
 
 
+def mean_points(X: Coordinates) -> tuple[list[Point], Point]:
+    """Gauss points with expansions about the means over the element, and the means themselves.
+
+    Means of dN_a and N_a / R are weighted with 2 pi R dA, by 4 x 4 points; the first-order terms
+    are differences at the centre, less their own means. Shapes are those that, over the radius of
+    the point, give the hoop term.
+    """
+    line, weights = gauss(4)
+    places = [(x, y, v * w) for x, v in zip(line, weights) for y, w in zip(line, weights)]  # noqa: B905
+    fine = [(xi, eta, w, point(X, xi, eta)) for xi, eta, w in places]
+    volume = mp.fsum(w * at.volume for _, _, w, at in fine)
+
+    def mean(value: Callable[[Number, Number, Point], Number]) -> Number:
+        return mp.fsum(w * at.volume * value(xi, eta, at) for xi, eta, w, at in fine) / volume
+
+    def terms(at: Point, a: int) -> Vector:
+        return [*at.gradients[a], at.shapes[a] / at.radius]
+
+    middle = mean(lambda xi, eta, at: xi), mean(lambda xi, eta, at: eta)
+    zeroth = [[mean(lambda xi, eta, at: terms(at, a)[k]) for k in range(3)] for a in range(4)]  # noqa: B023
+    ahead, behind = point(X, STEP, mpf(0)), point(X, -STEP, mpf(0))
+    above, below = point(X, mpf(0), STEP), point(X, mpf(0), -STEP)
+    radius = mean(lambda xi, eta, at: at.radius)
+    points = []
+    for xi, eta in gauss_places():
+        exact, rows = point(X, xi, eta), []
+        for a in range(4):
+            by_xi = differences_of(terms(ahead, a), terms(behind, a))
+            by_eta = differences_of(terms(above, a), terms(below, a))
+            rows.append(
+                [
+                    g + (xi - middle[0]) * k + (eta - middle[1]) * n
+                    for g, k, n in zip(zeroth[a], by_xi, by_eta, strict=True)
+                ]
+            )
+        shapes = [row[2] * exact.radius for row in rows]
+        points.append(Point(shapes, [(r[0], r[1]) for r in rows], exact.radius, exact.area))
+    area = volume / (2 * PI * radius)
+    whole = Point([z[2] * radius for z in zeroth], [(z[0], z[1]) for z in zeroth], radius, area)
+    return points, whole
+
+
+def differences_of(ahead: Vector, behind: Vector) -> Vector:
+    """Central differences from values one STEP ahead and behind."""
+    return [(a - b) / (2 * STEP) for a, b in zip(ahead, behind, strict=True)]
+
+
+def energy_taylor_mean(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+    """Isochoric part at the Gauss points, volumetric part of the mean gradient."""
+    return _energy_mean(mean_points(X), u, parameters)
+
+
+def _energy_mean(
+    geometry: tuple[list[Point], Point], u: Sequence[Number], parameters: Sequence[Number]
+) -> Number:
+    points, whole = geometry
+    mu_1, mu_2, kappa = parameters
+    shear = mp.fsum(at.volume * material.isochoric(at.deformation(u), mu_1, mu_2) for at in points)
+    I3 = material.third_invariant(whole.deformation(u))
+    return shear + whole.volume * material.volumetric(I3, kappa)
+
+
+def residual_taylor_mean(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Vector:
+    """Gradient of the energy."""
+    geometry = mean_points(X)
+    return differences(lambda v: _energy_mean(geometry, v, parameters), u)
+
+
+def tangent_taylor_mean(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Matrix:
+    """Second differences of the energy."""
+    geometry = mean_points(X)
+    return hessian(lambda v: _energy_mean(geometry, v, parameters), u)
+
+
 def fields_q4(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
     """z, r, J and the Cauchy stress zz, rr, tt, zr at the Gauss points of the plain element."""
     return [_row(X, u, at, at.deformation(u), parameters) for at in gauss_points(X)]
@@ -193,9 +267,23 @@ def fields_fbar(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number
 
 def fields_taylor(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
     """J of the centre; Cauchy stress = isochoric Kirchhoff stress of the point / J + dW_v/dJ."""
-    rows, (expanded, centre) = [], taylor_points(X)
+    return _fields_expanded(taylor_points(X), X, u, parameters)
+
+
+def fields_taylor_mean(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
+    """The same with J of the mean gradient."""
+    return _fields_expanded(mean_points(X), X, u, parameters)
+
+
+def _fields_expanded(
+    geometry: tuple[list[Point], Point],
+    X: Coordinates,
+    u: Sequence[Number],
+    parameters: Sequence[Number],
+) -> Matrix:
+    rows, (expanded, whole) = [], geometry
     mu_1, mu_2, kappa = parameters
-    J = material.determinant(centre.deformation(u))
+    J = material.determinant(whole.deformation(u))
     mean = differences(lambda x: material.volumetric(x[0] ** 2, kappa), [J])[0]
     for at, exact in zip(expanded, gauss_points(X), strict=True):
         zz, zr, rz, rr, tt = F = at.deformation(u)

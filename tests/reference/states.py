@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-SOLIDS = ("solid_q4", "solid_fbar", "solid_taylor")
+SOLIDS = ("solid_q4", "solid_fbar", "solid_taylor", "solid_taylor_mean")
 ORDERS = (1, 2, 3, 4, 5, 7)
 UNIT = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) / 2
 
