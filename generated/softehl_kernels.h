@@ -289,6 +289,118 @@ void softehl_solid_taylor_mean_fields(
     const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_yeoh_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_yeoh_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_yeoh_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_yeoh_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_ogden_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_ogden_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_ogden_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_ogden_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_arruda_boyce_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_arruda_boyce_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_arruda_boyce_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_arruda_boyce_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_gent_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_gent_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_gent_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_solid_taylor_mean_gent_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
 void softehl_follower_pressure_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -430,6 +542,216 @@ void softehl_axial_spring_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent);
 void softehl_axial_spring_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_mooney_rivlin_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_mooney_rivlin_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_mooney_rivlin_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_mooney_rivlin_d_mu_1(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_mooney_rivlin_d_mu_2(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_yeoh_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_yeoh_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_yeoh_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_yeoh_d_c_1(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_yeoh_d_c_2(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_yeoh_d_c_3(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_d_mu_1(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_d_alpha_1(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_d_mu_2(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_d_alpha_2(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_d_mu_3(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_ogden_d_alpha_3(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_arruda_boyce_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_arruda_boyce_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_arruda_boyce_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_arruda_boyce_d_mu(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_arruda_boyce_d_lambda_m(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_gent_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_gent_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_gent_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_gent_d_mu(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_sheet_gent_d_J_m(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,

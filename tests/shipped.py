@@ -15,11 +15,23 @@ class Shipped:
     fields: bool = False
 
 
+RUBBERS = {
+    "yeoh": {"c_1": 1.5, "c_2": -0.03, "c_3": 0.002},
+    "ogden": {
+        **{"mu_1": 3.04, "alpha_1": 1.3, "mu_2": 0.62, "alpha_2": 5.0},
+        **{"mu_3": -0.1, "alpha_3": -2.0},
+    },
+    "arruda_boyce": {"mu": 2.1, "lambda_m": 4.0},
+    "gent": {"mu": 2.1, "J_m": 30.0},
+}
+"""Solids beside the paper's and values of their parameters (MPa)."""
+
 SHIPPED = {
     "solid_q4": Shipped(4, 8, energy=True, fields=True),
     "solid_fbar": Shipped(4, 8, fields=True),
     "solid_taylor": Shipped(4, 8, energy=True, fields=True),
     "solid_taylor_mean": Shipped(4, 8, energy=True, fields=True),
+    **{f"solid_taylor_mean_{name}": Shipped(4, 8, energy=True, fields=True) for name in RUBBERS},
     "follower_pressure": Shipped(2, 4),
     "contact": Shipped(1, 3),
     "film": Shipped(2, 4, fields=True),
@@ -28,11 +40,13 @@ SHIPPED = {
     "mean_rotation": Shipped(4, 9, energy=True),
     "mean_axial": Shipped(4, 9, energy=True),
     "axial_spring": Shipped(4, 8, energy=True),
+    **{f"sheet_{name}": Shipped(1, 2, energy=True) for name in ("mooney_rivlin", *RUBBERS)},
 }
 ENERGIES = tuple(name for name, s in SHIPPED.items() if s.energy)
 FIELDS = tuple(name for name, s in SHIPPED.items() if s.fields)
 
 VALUES = {
+    **{name: value for rubber in RUBBERS.values() for name, value in rubber.items()},
     "mu_1": 3.04,
     "mu_2": 0.62,
     "kappa": 500.0,

@@ -123,6 +123,13 @@ def invariants(m: Model, label: str, F: Gradient) -> tuple[Any, Any, Any]:
     return scale * I1, scale**2 * I2, I3
 
 
+def isochoric_right_cauchy_green(m: Model, label: str, F: Gradient) -> Any:
+    """J^(-2/3) F^T F (3, 3): the squares of its principal stretches have the product 1."""
+    scale = m.define(f"J{label}_to_minus_two_thirds", (F.J**2) ** sp.Rational(-1, 3))
+    C = sp.diag(scale * (F.plane.T * F.plane), scale * F.hoop**2)
+    return m.define(f"C{label}", C)
+
+
 def cauchy(m: Model, W: Callable[[Gradient], Any], F: Gradient) -> tuple[Any, ...]:
     """J and the Cauchy stress P F^T / J, P = dW/dF: J, sigma_zz, sigma_rr, sigma_tt, sigma_zr."""
     plane, hoop = m.define("F_of_stress", F.plane), m.define("F_of_stress_t", F.hoop)

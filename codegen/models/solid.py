@@ -20,9 +20,9 @@ Terms = tuple[materials.Energy, materials.Energy]
 PAPER = (materials.MOONEY_RIVLIN, materials.VOLUMETRIC)
 
 
-def _element(name: str, doc: str, terms: Terms) -> tuple[Model, Any, Any, Any]:
+def _element(name: str, doc: str, terms: Terms, unroll: bool = True) -> tuple[Model, Any, Any, Any]:
     """Arguments that the solids share: coordinates, displacements, terms of the energy."""
-    m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), unroll=True, doc=doc)
+    m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), unroll=unroll, doc=doc)
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
     return m, X, u, [term.declared(m) for term in terms]
@@ -31,8 +31,15 @@ def _element(name: str, doc: str, terms: Terms) -> tuple[Model, Any, Any, Any]:
 def _energy(m: Model, label: str, F: kin.Gradient, material: Any) -> Any:
     """W(F) of (3)."""
     isochoric, volumetric = material
-    I1, I2, I3 = kin.invariants(m, label, F)
-    return isochoric(I1, I2) + volumetric(I3)
+    *bars, I3 = kin.invariants(m, label, F)
+    return _isochoric(m, label, F, isochoric, bars) + volumetric(I3)
+
+
+def _isochoric(m: Model, label: str, F: kin.Gradient, term: materials.Term, bars: Any) -> Any:
+    """The isochoric term; bars: I1bar and I2bar."""
+    if term.of == "invariants":
+        return term(*bars)
+    return m.principal(f"isochoric{label}", kin.isochoric_right_cauchy_green(m, label, F), term)
 
 
 def _fields(m: Model, X: Any, u: Any, N: Any, F: kin.Gradient, material: Any) -> None:
@@ -90,11 +97,11 @@ def taylor(name: str = "solid_taylor", terms: Terms = PAPER) -> Definition:
     F = kin.gradient(m, "", dN, [n / R for n in N], u)
     F0 = kin.gradient(m, "0", centre.dN, [n / centre.R for n in centre.N], u)
     isochoric, volumetric = material
-    I1, I2, _ = kin.invariants(m, "", F)
+    *bars, _ = kin.invariants(m, "", F)
     ring = 2 * sp.pi * R * centre.detJ
     volume = 8 * sp.pi * centre.R * centre.detJ
     m.potential(
-        m.integral("isochoric", ring * isochoric(I1, I2))
+        m.integral("shear", ring * _isochoric(m, "", F, isochoric, bars))
         + volume * volumetric(m.define("I3_0", F0.J**2))
     )
     # The stress combines the point's isochoric part with the centre's volume ratio.
@@ -129,7 +136,9 @@ def _expanded(m: Model, X: Any, centre: kin.Quad4, xi: Any, eta: Any) -> tuple[A
     return dN, N
 
 
-def taylor_mean(name: str = "solid_taylor_mean", terms: Terms = PAPER) -> Definition:
+def taylor_mean(
+    name: str = "solid_taylor_mean", terms: Terms = PAPER, unroll: bool = True
+) -> Definition:
     """Taylor-expanded element that passes the patch test on every quadrilateral.
 
     With a_0, b_a and gamma_a of the centre, u = a_0 + (b . u) X + (gamma . u) xi eta, so that dN_a
@@ -140,7 +149,7 @@ def taylor_mean(name: str = "solid_taylor_mean", terms: Terms = PAPER) -> Defini
     strain at every point.
     The isochoric energy is taken at the 2x2 points, the volumetric one of the mean gradient.
     """
-    m, X, u, material = _element(name, taylor_mean.__doc__ or "", terms)
+    m, X, u, material = _element(name, taylor_mean.__doc__ or "", terms, unroll)
     e = kin.quad4(m, "", X, *m.point())
     ring = m.define("ring", e.R * e.detJ)
     volume = m.integral("volume", ring)
@@ -148,8 +157,8 @@ def taylor_mean(name: str = "solid_taylor_mean", terms: Terms = PAPER) -> Defini
     F = kin.gradient(m, "", dN, hoop, u)
     F0 = kin.gradient(m, "0", dN0, hoop0, u)
     isochoric, volumetric = material
-    I1, I2, _ = kin.invariants(m, "", F)
-    energy = m.integral("isochoric", ring * isochoric(I1, I2))
+    *bars, _ = kin.invariants(m, "", F)
+    energy = m.integral("shear", ring * _isochoric(m, "", F, isochoric, bars))
     m.potential(2 * sp.pi * (energy + volume * volumetric(m.define("I3_0", F0.J**2))))
     # The stress combines the point's isochoric part with the mean volume ratio.
     shared = F.scaled(m.define("to_J0", (F0.J / F.J) ** sp.Rational(1, 3)))

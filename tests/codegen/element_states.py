@@ -12,6 +12,7 @@ from softehl.codegen.graph.evaluate import State
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.rules import Kind, facet_rule, film_rule
 from softehl.runtime.kernels import Kernel, Rule, load_kernel
+from tests.shipped import RUBBERS
 
 MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))
 
@@ -84,6 +85,18 @@ def solids(rng: np.random.Generator) -> Iterator[Case]:
         ):
             X = quad(rng, radius, size)
             yield _case(family, label, X, motion(rng, X, strain), material)
+
+
+def rubbers(rng: np.random.Generator) -> Iterator[Case]:
+    """The Taylor-expanded solid and the sheet of other materials."""
+    for name, own in RUBBERS.items():
+        X = quad(rng, 25.0, 0.1)
+        given = [*own.values(), 500.0]
+        yield _case(f"solid_taylor_mean_{name}", "ring", X, motion(rng, X, 0.3), given)
+    paper = dict(zip(("mu_1", "mu_2"), MATERIALS[0], strict=False))
+    for name, values in {"mooney_rivlin": paper, **RUBBERS}.items():
+        given = list(values.values())
+        yield _case(f"sheet_{name}", "pulled", [[0.1, 25.4]], [0.5, -0.2], given)
 
 
 def boundaries(rng: np.random.Generator) -> Iterator[Case]:
@@ -159,6 +172,7 @@ def all_cases() -> list[Case]:
     """Every case of every family: the same in every run."""
     rng = np.random.default_rng(20251)
     cases = [*solids(rng), *boundaries(rng), *supports(rng)]
+    cases += rubbers(np.random.default_rng(1972))
     kinds: tuple[Kind, ...] = ("gauss", "lobatto")
     for m_p in range(1, 6):
         for kind in kinds:

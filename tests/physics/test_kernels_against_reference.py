@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from softehl.runtime.kernels import load_kernel
-from tests.reference import film, material, oracles, rules, solids, upwind
+from tests.reference import film, material, oracles, rules, sheet, solids, upwind
 from tests.reference.calling import call, rule_of
 from tests.reference.differentiate import PI, Matrix, Vector, hessian, jacobian, numbers
 from tests.reference.states import SOLIDS, State, all_states, thin_film_states
@@ -52,10 +52,27 @@ def test_energy_agrees_with_the_reference(state: State) -> None:
     """W_v near J = 1 is a small difference of terms of the size of kappa: that is the scale."""
     exact = float(oracles.energy(state))
     scale = abs(exact)
-    if state.family in SOLIDS:
+    if state.family.startswith("solid_"):
         X = numbers(state.coordinates)
-        scale += 1e-3 * state.parameters[2] * float(sum(at.volume for at in solids.gauss_points(X)))
+        scale += (
+            1e-3 * state.parameters[-1] * float(sum(at.volume for at in solids.gauss_points(X)))
+        )
     assert abs(call("energy", state)[0] - exact) <= 1e-12 * scale
+
+
+@pytest.mark.parametrize(
+    "state", [s for s in STATES if s.family.startswith("sheet_")], ids=lambda s: s.id
+)
+def test_stresses_by_parameters_agree_with_the_reference(state: State) -> None:
+    law = material.LAWS[state.family.removeprefix("sheet_")]
+    e, own = numbers(state.dofs), numbers(state.parameters)
+    exact = doubles(jacobian(lambda v: sheet.residual(e, v, law), own))
+    kernel = load_kernel(state.family)
+    X, dofs = np.array([state.coordinates]), np.array([state.dofs])
+    for name, column in zip(kernel.parameters, exact.T, strict=True):
+        found = kernel.derivative(name, X, dofs, parameters=np.array(state.parameters))[0]
+        assert np.abs(found - column).max() <= 1e-12 * max(np.abs(column).max(), 1e-3)
+        assert not column.any() or np.abs(1.001 * found - column).max() > 1e-5 * abs(column).max()
 
 
 @pytest.mark.parametrize(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 
-from tests.reference import boundary, facet, film, section, solids, upwind
+from tests.reference import boundary, facet, film, section, sheet, solids, upwind
 from tests.reference.differentiate import Matrix, Number, Vector, mpf, numbers
+from tests.reference.material import LAWS
 from tests.reference.states import State
 
 TOLERANCE = 1e-12
@@ -33,6 +34,10 @@ def _single(function: Callable[..., Any]) -> Callable[[State], Any]:
     return call
 
 
+def _sheet(function: Callable[..., Any], law: Any) -> Callable[[State], Any]:
+    return lambda s: function(*_exact(s)[1:], law)
+
+
 def _contact(function: Callable[..., Any]) -> Callable[[State], Any]:
     def call(s: State) -> Any:
         X, u, parameters = _exact(s)
@@ -45,11 +50,18 @@ def _exact(s: State) -> tuple[Vector, Vector, Vector]:
     return numbers(s.coordinates), numbers(s.dofs), numbers(s.parameters)
 
 
+OTHERS = {name: law for name, law in LAWS.items() if name != "mooney_rivlin"}
+
 RESIDUALS: dict[str, Oracle] = {
     "solid_q4": _plain(solids.residual_q4),
     "solid_fbar": _plain(solids.residual_fbar),
     "solid_taylor": _plain(solids.residual_taylor),
     "solid_taylor_mean": _plain(solids.residual_taylor_mean),
+    **{
+        f"solid_taylor_mean_{n}": _plain(partial(solids.residual_taylor_mean, law=law))
+        for n, law in OTHERS.items()
+    },
+    **{f"sheet_{n}": _sheet(sheet.residual, law) for n, law in LAWS.items()},
     "follower_pressure": _single(boundary.residual_pressure),
     "contact": _contact(boundary.residual_contact),
     "film": _film(film.residual_film),
@@ -64,6 +76,11 @@ TANGENTS: dict[str, Oracle] = {
     "solid_fbar": _plain(solids.tangent_fbar),
     "solid_taylor": _plain(solids.tangent_taylor),
     "solid_taylor_mean": _plain(solids.tangent_taylor_mean),
+    **{
+        f"solid_taylor_mean_{n}": _plain(partial(solids.tangent_taylor_mean, law=law))
+        for n, law in OTHERS.items()
+    },
+    **{f"sheet_{n}": _sheet(sheet.tangent, law) for n, law in LAWS.items()},
     "follower_pressure": _single(boundary.tangent_pressure),
     "contact": _contact(boundary.tangent_contact),
     "film": _film(film.tangent_film),
@@ -77,6 +94,11 @@ ENERGIES: dict[str, Oracle] = {
     "solid_q4": _plain(solids.energy_q4),
     "solid_taylor": _plain(solids.energy_taylor),
     "solid_taylor_mean": _plain(solids.energy_taylor_mean),
+    **{
+        f"solid_taylor_mean_{n}": _plain(partial(solids.energy_taylor_mean, law=law))
+        for n, law in OTHERS.items()
+    },
+    **{f"sheet_{n}": _sheet(sheet.energy, law) for n, law in LAWS.items()},
     "mean_rotation": _plain(section.energy_rotation),
     "mean_axial": _plain(section.energy_axial),
     "axial_spring": _single(section.energy_spring),
@@ -86,6 +108,10 @@ FIELDS: dict[str, Oracle] = {
     "solid_fbar": _plain(solids.fields_fbar),
     "solid_taylor": _plain(solids.fields_taylor),
     "solid_taylor_mean": _plain(solids.fields_taylor_mean),
+    **{
+        f"solid_taylor_mean_{n}": _plain(partial(solids.fields_taylor_mean, law=law))
+        for n, law in OTHERS.items()
+    },
     "film": _film(film.fields_film),
     "film_facet": _plain(facet.fields_facet),
 }

@@ -1,7 +1,8 @@
 """Axisymmetric four-node solids: plain, F-bar and two Taylor-expanded, in (Z, R).
 
 Every function takes the 8 node coordinates (reference), the 8 displacements and the parameters
-(mu_1, mu_2, kappa), all exact numbers; energies in N mm, residuals in N.
+(mu_1, mu_2, kappa), all exact numbers; energies in N mm, residuals in N. The one
+expanded about its means takes any isochoric `law`, whose parameters come before kappa.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from tests.reference.rules import gauss
 
 CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 Coordinates = Sequence[Number]
+Law = Callable[..., Number]
+"""Isochoric term of an energy, of a deformation gradient and its own parameters."""
 
 
 @dataclass(frozen=True)
@@ -225,31 +228,40 @@ def differences_of(ahead: Vector, behind: Vector) -> Vector:
     return [(a - b) / (2 * STEP) for a, b in zip(ahead, behind, strict=True)]
 
 
-def energy_taylor_mean(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Number:
+def energy_taylor_mean(
+    X: Coordinates,
+    u: Sequence[Number],
+    parameters: Sequence[Number],
+    law: Law = material.isochoric,
+) -> Number:
     """Isochoric part at the Gauss points, volumetric part of the mean gradient."""
-    return _energy_mean(mean_points(X), u, parameters)
+    return _energy_mean(mean_points(X), u, parameters, law)
 
 
 def _energy_mean(
-    geometry: tuple[list[Point], Point], u: Sequence[Number], parameters: Sequence[Number]
+    geometry: tuple[list[Point], Point], u: Sequence[Number], parameters: Sequence[Number], law: Law
 ) -> Number:
     points, whole = geometry
-    mu_1, mu_2, kappa = parameters
-    shear = mp.fsum(at.volume * material.isochoric(at.deformation(u), mu_1, mu_2) for at in points)
+    *own, kappa = parameters
+    shear = mp.fsum(at.volume * law(at.deformation(u), *own) for at in points)
     I3 = material.third_invariant(whole.deformation(u))
     return shear + whole.volume * material.volumetric(I3, kappa)
 
 
-def residual_taylor_mean(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Vector:
+def residual_taylor_mean(
+    X: Coordinates, u: Vector, parameters: Sequence[Number], law: Law = material.isochoric
+) -> Vector:
     """Gradient of the energy."""
     geometry = mean_points(X)
-    return differences(lambda v: _energy_mean(geometry, v, parameters), u)
+    return differences(lambda v: _energy_mean(geometry, v, parameters, law), u)
 
 
-def tangent_taylor_mean(X: Coordinates, u: Vector, parameters: Sequence[Number]) -> Matrix:
+def tangent_taylor_mean(
+    X: Coordinates, u: Vector, parameters: Sequence[Number], law: Law = material.isochoric
+) -> Matrix:
     """Second differences of the energy."""
     geometry = mean_points(X)
-    return hessian(lambda v: _energy_mean(geometry, v, parameters), u)
+    return hessian(lambda v: _energy_mean(geometry, v, parameters, law), u)
 
 
 def fields_q4(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
@@ -270,9 +282,14 @@ def fields_taylor(X: Coordinates, u: Sequence[Number], parameters: Sequence[Numb
     return _fields_expanded(taylor_points(X), X, u, parameters)
 
 
-def fields_taylor_mean(X: Coordinates, u: Sequence[Number], parameters: Sequence[Number]) -> Matrix:
+def fields_taylor_mean(
+    X: Coordinates,
+    u: Sequence[Number],
+    parameters: Sequence[Number],
+    law: Law = material.isochoric,
+) -> Matrix:
     """The same with J of the mean gradient."""
-    return _fields_expanded(mean_points(X), X, u, parameters)
+    return _fields_expanded(mean_points(X), X, u, parameters, law)
 
 
 def _fields_expanded(
@@ -280,14 +297,15 @@ def _fields_expanded(
     X: Coordinates,
     u: Sequence[Number],
     parameters: Sequence[Number],
+    law: Law = material.isochoric,
 ) -> Matrix:
     rows, (expanded, whole) = [], geometry
-    mu_1, mu_2, kappa = parameters
+    *own, kappa = parameters
     J = material.determinant(whole.deformation(u))
     mean = differences(lambda x: material.volumetric(x[0] ** 2, kappa), [J])[0]
     for at, exact in zip(expanded, gauss_points(X), strict=True):
         zz, zr, rz, rr, tt = F = at.deformation(u)
-        P = differences(lambda G: material.isochoric(G, mu_1, mu_2), F)
+        P = differences(lambda G: law(G, *own), F)
         stress = [
             (P[0] * zz + P[1] * zr) / J + mean,
             (P[2] * rz + P[3] * rr) / J + mean,

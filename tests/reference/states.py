@@ -93,6 +93,34 @@ def solid_states() -> Iterator[State]:
             yield State(family, label, _tuple(X), _tuple(u), material)
 
 
+RUBBERS = {
+    "yeoh": ((1.5, -0.03, 0.002), (0.4, 0.1, 0.05)),
+    "ogden": ((3.04, 1.3, 0.62, 5.0, -0.1, -2.0), (0.63, 1.3, 0.0, 2.0, 0.0, 2.0)),
+    "arruda_boyce": ((2.1, 4.0), (0.7, 1.8)),
+    "gent": ((2.1, 30.0), (0.7, 6.0)),
+}
+"""Two sets of parameters of the isochoric terms beside the paper's, MPa."""
+
+
+def rubber_states() -> Iterator[State]:
+    """The same elements of other materials; sheets pulled, pressed and sheared, of all of them."""
+    rng = np.random.default_rng(1972)
+    for name, (first, second) in RUBBERS.items():
+        for label, radius, size, strain, own in (
+            ("paper", 25.0, 0.1, 0.3, first),
+            ("inner", 1.5, 0.8, 0.3, second),
+            ("small-strain", 25.0, 0.05, 0.02, first),
+        ):
+            X = quad(rng, radius, size)
+            u = displacement(rng, X, strain, 0.2)
+            yield State(f"solid_taylor_mean_{name}", label, _tuple(X), _tuple(u), (*own, 500.0))
+    for name, sets in {"mooney_rivlin": ((3.04, 0.62), (0.9, 0.0)), **RUBBERS}.items():
+        for k, own in enumerate(sets):
+            for e in ((0.6, -0.3), (-0.2, -0.25), (0.3, 0.3), (0.02, 0.0)):
+                label = f"{k}-{e[0]}-{e[1]}"
+                yield State(f"sheet_{name}", label, (0.1, 25.4), e, tuple(own))
+
+
 def boundary_states() -> Iterator[State]:
     """Follower pressure, and contact in both branches with full and partial force weight."""
     rng = np.random.default_rng(1991)
@@ -197,5 +225,5 @@ def thin_film_states() -> Iterator[State]:
 
 def all_states() -> list[State]:
     """Every state of every family."""
-    bodies = [*solid_states(), *boundary_states(), *section_states()]
+    bodies = [*solid_states(), *rubber_states(), *boundary_states(), *section_states()]
     return [*bodies, *film_states(), *upwind_states(), *facet_states()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,9 @@ def arguments(name: str, n: int, rng: np.random.Generator) -> tuple[tuple[Array,
 
 
 def methods(kernel: Kernel) -> dict[str, Call]:
-    return {t: getattr(kernel, "fields_at" if t == "fields" else t) for t in kernel.tasks}
+    by = {t: partial(kernel.derivative, t[2:]) for t in kernel.tasks if t.startswith("d_")}
+    own = {"fields": "fields_at"}
+    return {t: by.get(t) or getattr(kernel, own.get(t, t)) for t in kernel.tasks}
 
 
 def solid(n: int, rng: np.random.Generator) -> tuple[Kernel, Array, Array]:
@@ -120,7 +123,7 @@ def test_shapes_and_kinds_of_results(name: str, rng: np.random.Generator) -> Non
     for task, call in methods(kernel).items():
         result = call(*positional, **named)
         arrays = result if isinstance(result, tuple) else (result,)
-        assert [a.shape for a in arrays] == shapes[task]
+        assert [a.shape for a in arrays] == shapes.get(task, [(n, ndof)])
         assert all(a.dtype == np.float64 and np.isfinite(a).all() for a in arrays)
         assert all(a.any() for a in arrays)
 
