@@ -27,9 +27,10 @@ class LoadSteps:
 
     def run(self, system: System, start: Result | None, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
-        x0 = system.at_rest() if start is None else start.x
+        share = system.share
+        x0 = system.at_rest() if start is None else share.own(start.x)
         begin = 0.0 if start is None else start.t
-        histories = system.histories() if start is None else start.histories
+        histories = system.histories() if start is None else share.own_state(start.state)
         state = [(x0, histories)]  # after the last converged step
         reached: list[Result] = []
 
@@ -39,6 +40,7 @@ class LoadSteps:
         def keep(point: Point) -> None:
             problem, x = problem_at(point.parameter), point.solution.x
             state[0] = x, system.committed(problem, x, state[0][1])
+            share.reached("load factor", point.parameter, point.solution)
             reached[:] = [Result(system, problem, point, state[0][1])]
             self.on_step(reached[0])
 

@@ -13,6 +13,7 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
+from softehl.runtime.share import Share
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point, Solution
 from softehl.runtime.statement.records import StudyError
@@ -43,11 +44,21 @@ class Clock:
         """The present time."""
         return self.times[0]
 
-    def save(self, path: Path) -> None:
-        """Write what a restart needs, atomically."""
-        parts = {f"history {name}": values for name, values in self.histories.items()}
-        arrays = {"times": np.array(self.times), "states": self.states, "dt": np.array(self.dt)}
-        write_arrays(path, {**arrays, **parts})
+    @classmethod
+    def begin(cls, system: System, start: Result | None, dt: float) -> Clock:
+        """At time 0, or where `start` stands."""
+        if start is None:
+            return cls((0.0,), system.at_rest()[None], system.histories(), dt)
+        own = system.share.own_state(start.state)
+        return cls((start.t,), system.share.own(start.x)[None], own, dt)
+
+    def save(self, path: Path, share: Share) -> None:
+        """Write what a restart needs, on any number of processes, atomically."""
+        state, states = share.whole_state(self.histories), share.whole(self.states)
+        parts = {f"history {name}": values for name, values in state.items()}
+        arrays = {"times": np.array(self.times), "states": states, "dt": np.array(self.dt)}
+        if share.first:
+            write_arrays(path, {**arrays, **parts})
 
     @classmethod
     def load(cls, path: Path, system: System) -> Clock:
@@ -56,11 +67,13 @@ class Clock:
         if found is None:
             raise StudyError(f"restart: {str(path)!r} is missing or damaged")
         histories = {n[8:]: v for n, v in found.items() if n.startswith("history ")}
-        expected = {name: v.shape for name, v in system.histories().items()}
+        whole, share = system.everywhere, system.share
+        expected = {name: v.shape for name, v in whole.histories().items()}
         shapes = {name: v.shape for name, v in histories.items()}
-        if found.get("states", np.empty((0, 0))).shape[1:] != (system.size,) or shapes != expected:
+        if found.get("states", np.empty((0, 0))).shape[1:] != (whole.size,) or shapes != expected:
             raise StudyError(f"restart: {str(path)!r} holds another study")
-        return cls(tuple(found["times"].tolist()), found["states"], histories, float(found["dt"]))
+        states, times = share.own(found["states"]), tuple(found["times"].tolist())
+        return cls(times, states, share.own_state(histories), float(found["dt"]))
 
 
 @dataclass(frozen=True)
@@ -86,7 +99,7 @@ class March:
             dt = _towards(until - clock.t, clock.dt)
             result, clock = self._step(system, clock, dt)
             if checkpoint is not None:
-                clock.save(checkpoint)
+                clock.save(checkpoint, system.share)
             yield result
 
     def _step(self, system: System, clock: Clock, dt: float) -> tuple[Result, Clock]:
@@ -114,6 +127,7 @@ class March:
             following = min(_GROWTH * wanted, clock.dt)
         states = np.vstack([solution.x, clock.states])[:3]
         times = (step.t, *clock.times)[:3]
+        system.share.reached("time", step.t, solution)
         reached = Result(system, problem, Point(step.t, solution), after)
         return reached, Clock(times, states, after, following)
 
@@ -144,8 +158,8 @@ class March:
             if rated and name not in rated:
                 continue  # it follows from the others, and its start may be anything
             part = system.numbering.layout.part(name)
-            size = max(float(np.abs(x[part]).max(initial=0.0)), 1e-300)
-            worst = max(worst, share * float(np.abs(difference[part]).max(initial=0.0)) / size)
+            size, off = (_largest(system, values[part]) for values in (x, difference))
+            worst = max(worst, share * off / max(size, 1e-300))
         if worst == 0.0:
             return _GROWTH
         return float(_SAFETY * math.pow(self.tolerance / worst, 1.0 / (order + 1)))
@@ -154,6 +168,10 @@ class March:
         if factor * dt < self.smallest:
             raise NotConverged(replace(solution, message=f"{solution.message}; dt = {dt:.3g}"))
         return factor * dt
+
+
+def _largest(system: System, values: Array) -> float:
+    return system.share.largest(float(np.abs(values).max(initial=0.0)))
 
 
 def _towards(left: float, dt: float) -> float:

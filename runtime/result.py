@@ -27,7 +27,11 @@ _AXES = ("x", "y", "z", "r")
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A converged state of a study."""
+    """A converged state of a study.
+
+    Where it is spread over processes, every method is called by all of them, and gives all the
+    same. histories: of the elements of this process.
+    """
 
     system: System
     problem: Problem
@@ -39,10 +43,15 @@ class Result:
         """The load factor, or the time."""
         return self.point.parameter
 
-    @property
+    @cached_property
     def x(self) -> Array:
         """All unknowns, (n,)."""
-        return self.point.solution.x
+        return self.system.share.whole(self.point.solution.x)
+
+    @property
+    def state(self) -> dict[str, Array]:
+        """What points remember: block -> (cells, points, k)."""
+        return self.system.share.whole_state(self.histories)
 
     @property
     def iterations(self) -> int:
@@ -63,9 +72,9 @@ class Result:
 
         Raises KeyError that names what there is.
         """
-        numbers = self.system.numbering.nodal.get(name)
+        numbers = self._whole.numbering.nodal.get(name)
         if numbers is None:
-            layout = self.system.numbering.layout
+            layout = self._whole.numbering.layout
             if name not in layout.names:
                 known = ", ".join(layout.names)
                 raise KeyError(f"no unknown {name!r}{meant(name, layout.names)}; there are {known}")
@@ -79,7 +88,7 @@ class Result:
         """
         nodes, weights = self.system.mesh.locate(np.asarray(place, dtype=np.float64))
         found = {}
-        for name, numbers in self.system.numbering.nodal.items():
+        for name, numbers in self._whole.numbering.nodal.items():
             there = numbers[nodes]
             # an unknown of lower order stands at corners only: interpolated by the cell's corners
             if (there[np.abs(weights) > 1e-9] >= 0).all():
@@ -98,20 +107,21 @@ class Result:
 
     def fields(self, block: str) -> dict[str, Array]:
         """Fields of a block's page at its quadrature points: name -> (cells, points)."""
-        blocks = self.system.blocks
+        blocks = self._whole.blocks
         if block not in blocks:
             known = ", ".join(blocks)
             raise KeyError(f"no block {block!r}{meant(block, blocks)}; there are {known}")
-        found = self.problem.fields(block, self.x)
+        found = self.problem.fields(block, self.point.solution.x)
+        share = self.system.share
         new = [f"new_{name}" for name in blocks[block].kernel.history]
-        return {name: values for name, values in found.items() if name not in new}
+        return {n: share.whole_cells(block, v) for n, v in found.items() if n not in new}
 
     def at_nodes(self, block: str) -> dict[str, Array]:
         """Fields of a block averaged to nodes: name -> (points,), nan away from the block.
 
         Every cell counts with the mean of its points.
         """
-        nodes = self.system.blocks[block].nodes
+        nodes = self._whole.blocks[block].nodes
         count = np.bincount(nodes.ravel(), minlength=len(self.system.mesh.points))
         found = {}
         for name, values in self.fields(block).items():
@@ -125,13 +135,19 @@ class Result:
         """What the supports do, (n,): internal less external forces, zero but for rounding where
         nothing is prescribed.
         """
-        return self.problem.assembler.residual(self.x, self.problem.parameters)
+        x = self.point.solution.x
+        own = self.problem.assembler.residual(x, self.problem.parameters)
+        return self.system.share.whole_forces(own)
+
+    @property
+    def _whole(self) -> System:
+        return self.system.everywhere
 
     def reaction(self, where: str | Predicate) -> dict[str, float]:
         """Sums of the reactions at the nodes of a side: unknown -> force."""
         nodes = self.system.mesh.nodes(where)
         found = {}
-        for name, numbers in self.system.numbering.nodal.items():
+        for name, numbers in self._whole.numbering.nodal.items():
             there = numbers[nodes]
             found[name] = float(self._forces[there[there >= 0]].sum())
         return found
@@ -151,7 +167,7 @@ class Result:
         mesh, target = self.system.mesh, Path(path)
         if target.suffix != ".vtu":
             raise ValueError(f"write({str(path)!r}): results are written as .vtu")
-        nodal = {name: self.values(name) for name in self.system.numbering.nodal}
+        nodal = {name: self.values(name) for name in self._whole.numbering.nodal}
         points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dimension)))
         found = meshio.Mesh(
             points,
@@ -166,7 +182,7 @@ class Result:
         """Means of fields: block.field -> for each kind of cell (m,), nan outside the block."""
         mesh = self.system.mesh
         found: dict[str, list[Array]] = {}
-        for name, block in self.system.blocks.items():
+        for name, block in self._whole.blocks.items():
             if block.kind not in mesh.cells or not block.kernel.fields:
                 continue
             rows = {tuple(row): k for k, row in enumerate(mesh.cells[block.kind].tolist())}

@@ -20,6 +20,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Integers
+from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie
 from softehl.runtime.follow import LoadPath, follow
@@ -30,7 +31,6 @@ from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.names import listed
 from softehl.runtime.result import Result
-from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement import given as read
 from softehl.runtime.statement.pages import elements_of, page_on
@@ -167,17 +167,20 @@ class Study:
         start: Result | None = None,
         newton: Newton | None = None,
         on_step: Callable[[Result], object] | None = None,
+        engine: AnyEngine = None,
     ) -> Result:
         """The solution at load factor `until`, from 0 (or from `start`) in `steps` steps.
 
         Steps are cut where Newton's method fails and grow again; history is committed after each.
-        on_step is given the result of every converged step. Raises StudyError; NotConverged if
-        the end is not reached: its `reached` is the last Result, or None.
+        on_step is given the result of every converged step. engine: "serial", "petsc" (on all
+        processes that mpirun started) or an engine with settings. Raises StudyError; NotConverged
+        if the end is not reached: its `reached` is the last Result, or None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
-        system = self.system() if start is None else start.system
-        path = LoadSteps(steps, newton or _newton(), on_step or _nothing)
+        where = engine_of(engine)
+        system = where.spread(self.system() if start is None else start.system)
+        path = LoadSteps(steps, where.newton(newton), on_step or _nothing)
         return path.run(system, start, until)
 
     def march(
@@ -191,6 +194,7 @@ class Study:
         checkpoint: str | Path | None = None,
         restart: str | Path | None = None,
         newton: Newton | None = None,
+        engine: AnyEngine = None,
     ) -> Iterator[Result]:
         """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
 
@@ -200,21 +204,20 @@ class Study:
         they are dt, but for those that Newton's method needs shorter. History is committed and
         values of steps before (data u_old, `Model.rates`) are renewed after every converged step.
         checkpoint: file that is rewritten after each step; restart: such a file, from which the
-        march goes on bitwise as if it had not stopped. Raises StudyError, NotConverged.
+        march goes on bitwise as if it had not stopped, with `engine` "petsc" on any number of
+        processes. Raises StudyError, NotConverged.
         """
         if method not in ("euler", "bdf2"):
             raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
         for name, value in (("dt", dt), ("until", until), ("tolerance", tolerance)):
             if value is not None and not (np.isfinite(value) and value > 0.0):
                 raise StudyError(f"{name} = {value}: must be positive")
-        system = self.system() if start is None else start.system
+        where = engine_of(engine)
+        system = where.spread(self.system() if start is None else start.system)
+        clock = Clock.begin(system, start, dt)
         if restart is not None:
             clock = Clock.load(Path(restart), system)
-        elif start is not None:
-            clock = Clock((start.t,), start.x[None], start.histories, dt)
-        else:
-            clock = Clock((0.0,), system.at_rest()[None], system.histories(), dt)
-        settings = March(method, tolerance, SMALLEST * dt, newton or _newton())
+        settings = March(method, tolerance, SMALLEST * dt, where.newton(newton))
         return settings.run(system, clock, until, None if checkpoint is None else Path(checkpoint))
 
     def follow(
@@ -235,7 +238,7 @@ class Study:
         """
         if not (np.isfinite(step) and step > 0.0):
             raise StudyError(f"step = {step}: must be positive")
-        return follow(self.system(), step, until, newton or _newton(), most)
+        return follow(self.system(), step, until, Serial().newton(newton), most)
 
     def system(self) -> System:
         """What is written down, as equations.  Raises StudyError for what does not fit together."""
@@ -259,10 +262,6 @@ def _load(source: Source, model: str | None) -> Kernel:
     import softehl
 
     return softehl.load_kernel(source, model)  # type: ignore[arg-type]
-
-
-def _newton() -> Newton:
-    return Newton(linear=choose("auto"))
 
 
 def _nothing(result: Result) -> None:

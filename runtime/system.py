@@ -13,6 +13,7 @@ from softehl.runtime.fem.loads import Tie, amount
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.share import ALONE, Share
 from softehl.runtime.statement.records import Block, Condition, Force, Number, StudyError
 
 
@@ -39,7 +40,8 @@ class System:
     """Numbering and assembler, which all steps share.
 
     conditions: prescribed values, as they were written down. implied: ties both sides of which
-    are prescribed: checked, not solved. start: name -> (points,) initial values.
+    are prescribed: checked, not solved. start: name -> (points,) initial values. share: how the
+    unknowns are spread over processes; whole: where they are, the system of all of them.
     """
 
     mesh: Mesh
@@ -49,6 +51,13 @@ class System:
     conditions: tuple[Condition, ...]
     implied: tuple[Force, ...] = ()
     start: Mapping[str, Array] = field(default_factory=dict)
+    share: Share = ALONE
+    whole: System | None = None
+
+    @property
+    def everywhere(self) -> System:
+        """The equations of all processes."""
+        return self.whole or self
 
     @property
     def size(self) -> int:
@@ -106,7 +115,9 @@ class System:
             numbers = [given[name] for name in block.kernel.parameters]
             parameters[block.name] = np.array([v(step.t) if callable(v) else v for v in numbers])
         layout = self.numbering.layout
-        return Problem(assembler, layout, parameters, fixed=fixed, values=values)
+        here = Problem(assembler, layout, parameters, fixed=fixed, values=values)
+        posed: Problem = self.share.posed(here)
+        return posed
 
     def _data(self, page: Block, step: Step) -> Array | None:
         """Data of the elements of a page, (n, k), in the kernel's order."""

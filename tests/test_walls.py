@@ -27,7 +27,8 @@ ORDER = {
     ),
     "runtime": (
         *("arrays names", "tuning", "library", "io", "calls", "kernels", "mesh", "fem", "solve"),
-        *("statement", "system", "equations result", "follow load march", "study", "engines"),
+        *("share", "statement", "system", "equations result", "engines"),
+        *("follow load march", "study"),
     ),
     "cases": ("harness", "seal", "oring slider", "paper", "shipped", "cli document"),
 }

@@ -15,7 +15,7 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.checks import not_finite, require_sound_elements
-from softehl.runtime.fem.pattern import Pattern, build_pattern
+from softehl.runtime.fem.pattern import Pattern, Structure
 from softehl.runtime.kernels import Rule
 
 _PIECE = 1 << 18  # entries of the tangents that are evaluated before they are added up
@@ -176,7 +176,7 @@ class Assembler:
 
     size: int
     blocks: tuple[ElementBlock, ...]
-    pattern: Pattern
+    structure: Structure
     memo: Memo = field(default_factory=Memo)
 
     @classmethod
@@ -190,7 +190,12 @@ class Assembler:
             raise ValueError(f"two blocks have the same name: {', '.join(names)}")
         for block in blocks:
             require_sound_elements(block)
-        return cls(size, tuple(blocks), build_pattern(size, [block.dofs for block in blocks]))
+        return cls(size, tuple(blocks), Structure(size, tuple(block.dofs for block in blocks)))
+
+    @property
+    def pattern(self) -> Pattern:
+        """Sparsity of the tangent, and where every element entry goes in it."""
+        return self.structure.pattern
 
     def block(self, name: str) -> ElementBlock:
         """The block of that name; KeyError if there is none."""

@@ -143,14 +143,16 @@ def _shown(place: Array) -> str:
 
 def not_finite(block: ElementBlock, *results: Array) -> str:
     """The first element of a block with a result, (n, ...), that is not finite; empty if none."""
-    n = len(block.dofs)
-    if not n:
+    wrong = rows_not_finite(*results)
+    if not len(wrong):
         return ""
-    wrong: Flags = np.zeros(n, dtype=bool)
+    more = f" and {len(wrong) - 1} more" if len(wrong) > 1 else ""
+    return element_name(block, int(wrong[0])) + more
+
+
+def rows_not_finite(*results: Array) -> Integers:
+    """Numbers of the elements that have a result, (n, ...), that is not finite."""
+    wrong: Flags = np.zeros(len(results[0]), dtype=bool)
     for result in results:
-        wrong |= ~np.isfinite(result.reshape(n, -1)).all(axis=1)
-    if not wrong.any():
-        return ""
-    row, others = int(np.flatnonzero(wrong)[0]), int(wrong.sum()) - 1
-    more = f" and {others} more" if others else ""
-    return element_name(block, row) + more
+        wrong |= ~np.isfinite(result).all(axis=tuple(range(1, result.ndim)))
+    return np.flatnonzero(wrong)

@@ -58,7 +58,8 @@ class DeadLoad(_Kernel):
 
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Minus the virtual work of the load, (n, k)."""
-        places = coordinates.reshape(len(coordinates), len(self.face.nodes), -1)
+        n, nodes = len(coordinates), len(self.face.nodes)
+        places = coordinates.reshape(n, nodes, coordinates.shape[1] // nodes)
         points, weights = self.face.rule(4)
         shape = self.face.shape(points)
         x = np.einsum("qk,nkc->nqc", shape, places)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -41,6 +42,27 @@ class Pattern:
         return csc_array(structure, shape=(self.size, self.size), copy=False)
 
 
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Dof maps, (n, ndof) each, of element blocks over `size` unknowns; ValueError if one points
+    outside. Their pattern is built when it is first asked for: it is the largest thing of all,
+    and whoever keeps the matrix elsewhere never asks.
+    """
+
+    size: int
+    dof_maps: tuple[Integers, ...]
+
+    def __post_init__(self) -> None:
+        for dofs in self.dof_maps:
+            if dofs.size and (dofs.min() < 0 or dofs.max() >= self.size):
+                raise ValueError(f"a dof map points outside the {self.size} unknowns")
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """See `build_pattern`."""
+        return build_pattern(self.size, self.dof_maps)
+
+
 def build_pattern(size: int, dof_maps: Sequence[Integers]) -> Pattern:
     """Pattern of the matrix of order `size` to which elements with these dofs contribute.
 
@@ -50,8 +72,6 @@ def build_pattern(size: int, dof_maps: Sequence[Integers]) -> Pattern:
     """
     parts = [_NewEntries(np.arange(size)[:, None])]  # so that every diagonal entry is there
     for dofs in dof_maps:
-        if dofs.size and (dofs.min() < 0 or dofs.max() >= size):
-            raise ValueError(f"a dof map points outside the {size} unknowns")
         parts.append(_NewEntries.of(dofs, parts[1:]))
     order, rows, starts = _sorted_entries(size, parts)
     fresh = np.empty(len(rows), dtype=bool)

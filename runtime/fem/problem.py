@@ -7,6 +7,7 @@ the same assembler.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -27,7 +28,7 @@ from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import Guard
 from softehl.runtime.names import listed
 
-_ROUNDING = 8.0 * np.finfo(np.float64).eps
+ROUNDING = 8.0 * np.finfo(np.float64).eps
 """What the residual of an element may be off by, relative to the stiffness times the largest number
 that its kernel adds: a few roundings."""
 
@@ -165,7 +166,7 @@ class Problem:
             return np.inf
         noise = np.zeros_like(r)
         if K is not None:
-            noise = _ROUNDING * np.asarray(abs(K) @ (np.abs(x) + self.assembler.reach()))
+            noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + self.assembler.reach()))
         free: Flags = np.ones(len(r), dtype=bool)
         free[self.fixed] = False
         wanted = x.copy()
@@ -257,6 +258,9 @@ class Problem:
 
 
 def _ratio(defect: Array, size: Array) -> float:
-    """2-norm of a defect over that of what it is measured by; 0 where there is no defect."""
-    off = float(np.linalg.norm(defect))
-    return off / float(np.linalg.norm(size)) if off > 0.0 else 0.0
+    return ratio(float(np.linalg.norm(defect)), float(np.linalg.norm(size)))
+
+
+def ratio(off: float, size: float) -> float:
+    """Norm of a defect over that of what it is measured by; 0 where there is no defect."""
+    return (off / size if size else math.inf) if off > 0.0 else 0.0

@@ -1,0 +1,51 @@
+"""What a study asks of an engine, and the engines by name."""
+
+from __future__ import annotations
+
+from typing import Protocol, TypeAlias
+
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.statement.records import StudyError
+from softehl.runtime.system import System
+
+
+class Engine(Protocol):
+    """Spreads the equations of a study, and knows the linear solver that goes with that."""
+
+    def spread(self, system: System) -> System:
+        """The part of the equations that this process has; see `runtime.share`."""
+        ...
+
+    def newton(self, given: Newton | None) -> Newton:
+        """Newton's method as it was asked for, on the engine's linear solver."""
+        ...
+
+
+AnyEngine: TypeAlias = "str | Engine | None"
+"""An engine, or the name of one; None is "serial"."""
+
+
+class Serial:
+    """Everything in this process, with the linear solver that is asked for."""
+
+    def spread(self, system: System) -> System:
+        """See `Engine`."""
+        return system
+
+    def newton(self, given: Newton | None) -> Newton:
+        """See `Engine`."""
+        return given or Newton(linear=choose("auto"))
+
+
+def engine_of(engine: AnyEngine) -> Engine:
+    """The engine of that name.  Raises StudyError for an unknown one, or where PETSc is missing."""
+    if engine is None or engine == "serial":
+        return Serial()
+    if engine == "petsc":
+        from softehl.runtime.engines.petsc import Petsc
+
+        return Petsc()
+    if isinstance(engine, str):
+        raise StudyError(f'engine = {engine!r}: allowed are "serial" and "petsc"')
+    return engine

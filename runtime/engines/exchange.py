@@ -1,0 +1,95 @@
+"""Vectors that are spread over processes: own unknowns, copies of the neighbours', sums, norms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.engines.local import Part
+from softehl.runtime.engines.mpi import petsc, world
+from softehl.runtime.engines.partition import Partition
+
+
+@dataclass(eq=False)
+class Exchange:
+    """Between local vectors (m,), in the order of `Part.unknowns`, and PETSc's.
+
+    numbers: (m,) PETSc's number of each local unknown. owned: (k,) local numbers of own unknowns,
+    and places: (k,) where they stand in this process's piece of PETSc's vectors.
+    vector, copies: work space. sent: bytes that went to other processes, counted.
+    """
+
+    numbers: Integers
+    owned: Integers
+    places: Integers
+    vector: Any
+    copies: Any
+    scatter: Any
+    ghosts: int
+    sent: int = field(default=0)
+
+    @classmethod
+    def of(cls, part: Part, partition: Partition) -> Exchange:
+        """The exchange of the unknowns of a part."""
+        PETSc, comm = petsc(), world()
+        numbers = partition.numbers[part.unknowns]
+        first, last = partition.starts[comm.rank : comm.rank + 2]
+        vector = PETSc.Vec().createMPI((int(last - first), int(partition.starts[-1])), comm=comm)
+        vector.setBlockSize(1)
+        copies = PETSc.Vec().createSeq(len(numbers))
+        chosen = PETSc.IS().createGeneral(numbers.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        scatter = PETSc.Scatter().create(vector, chosen, copies, None)
+        ghosts = len(numbers) - len(part.owned)
+        places = numbers[part.owned] - first
+        return cls(numbers, part.owned, places, vector, copies, scatter, ghosts)
+
+    def local(self, vector: Any) -> Array:
+        """The local vector (m,) of one of PETSc's: own values and copies of the neighbours'."""
+        mode = petsc().ScatterMode.FORWARD
+        self.scatter.scatter(vector, self.copies, petsc().InsertMode.INSERT_VALUES, mode)
+        self.sent += 8 * self.ghosts
+        return np.array(self.copies.array_r)
+
+    def added(self, x: Array) -> Array:
+        """Of sums (m,) over own elements those over all: of own unknowns, (k,)."""
+        return self._back(x, petsc().InsertMode.ADD_VALUES)
+
+    def highest(self, x: Array) -> Array:
+        """Of numbers (m,), at least 0, the largest of any process: of own unknowns, (k,)."""
+        return self._back(x, petsc().InsertMode.MAX_VALUES)
+
+    def _back(self, x: Array, mode: Any) -> Array:
+        self.copies.array[:] = x
+        self.vector.set(0.0)
+        self.scatter.scatter(self.copies, self.vector, mode, petsc().ScatterMode.REVERSE)
+        self.sent += 8 * self.ghosts
+        return np.array(self.vector.array_r[self.places])
+
+    def to_petsc(self, own: Array) -> Any:
+        """A new vector of PETSc's with these own values (k,)."""
+        found = self.vector.duplicate()
+        found.array[self.places] = own
+        return found
+
+
+def total(values: Array) -> Array:
+    """Sums over processes."""
+    found = np.empty_like(values)
+    world().Allreduce(np.ascontiguousarray(values), found)
+    return found
+
+
+def largest(value: float) -> float:
+    """The largest number of any process; nan where one is."""
+    found = np.empty(2)
+    world().Allreduce(np.array([value, float(np.isnan(value))]), found, _maximum())
+    return float("nan") if found[1] else float(found[0])
+
+
+def _maximum() -> Any:
+    from mpi4py import MPI
+
+    return MPI.MAX

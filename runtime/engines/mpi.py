@@ -1,0 +1,85 @@
+"""PETSc and MPI: found in the right order, and left together."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import time
+from functools import cache
+from types import TracebackType
+from typing import Any
+
+from softehl.runtime.statement.records import StudyError
+
+_TOGETHER = 1.0  # seconds within which an error of all processes is one
+
+
+@cache
+def petsc() -> Any:
+    """The module petsc4py.PETSc, with the options of the command line.
+
+    Raises StudyError where it is not installed.
+    """
+    try:
+        _bundled()
+        import petsc4py
+    except ImportError as error:
+        raise StudyError(
+            f'engine = "petsc": {error}; install the extra `mpi` on Python 3.12 or newer '
+            "(pip install 'softehl[mpi]'), or petsc4py and mpi4py of your cluster"
+        ) from None
+    petsc4py.init(sys.argv)
+    PETSc = importlib.import_module("petsc4py.PETSc")
+    PETSc.Sys.popErrorHandler()  # errors are exceptions, not pages of text from every process
+    PETSc.Sys.pushErrorHandler("python")
+    sys.excepthook = _leave
+    return PETSc
+
+
+def _bundled() -> None:
+    """Let the wheel that brings PETSc, MPI and mpiexec put its libraries in order, if it is one."""
+    try:
+        importlib.import_module("dolfinx_solver")
+    except ModuleNotFoundError as error:
+        if error.name != "dolfinx_solver":
+            raise
+
+
+@cache
+def world() -> Any:
+    """All processes that mpirun started, as a communicator of mpi4py."""
+    return petsc().COMM_WORLD.tompi4py()
+
+
+def _leave(
+    kind: type[BaseException], error: BaseException, traceback: TracebackType | None
+) -> None:
+    """End all processes on an error that nobody caught: one line if all have it, on process 0.
+
+    An error of some processes only, which the others cannot know of, ends them from here.
+    """
+    comm = world()
+    alone = comm.size > 1 and not _everywhere(comm)
+    if comm.size == 1 or alone or not issubclass(kind, ValueError | ArithmeticError | RuntimeError):
+        if comm.rank == 0 or alone:
+            sys.__excepthook__(kind, error, traceback)
+    elif comm.rank == 0:
+        print(f"softehl: {_line(error)}", file=sys.stderr, flush=True)
+    if alone:
+        words = f"softehl: process {comm.rank} of {comm.size} failed, all end: {_line(error)}"
+        print(words, file=sys.stderr, flush=True)
+        comm.Abort(1)
+
+
+def _everywhere(comm: Any) -> bool:
+    """Whether all processes are here within a moment."""
+    request, end = comm.Ibarrier(), time.monotonic() + _TOGETHER
+    while not request.Test():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

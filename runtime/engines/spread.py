@@ -1,0 +1,188 @@
+"""A problem that is spread over processes, as Newton's method sees it: all decide alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.engines.exchange import Exchange, total
+from softehl.runtime.engines.local import Part
+from softehl.runtime.engines.matrix import Solver, Tangent
+from softehl.runtime.engines.mpi import world
+from softehl.runtime.fem.checks import element_name, rows_not_finite, unknown_name
+from softehl.runtime.fem.problem import ROUNDING, Problem, ratio
+
+
+@dataclass(eq=False)
+class Team:
+    """What the processes share through a whole path: how vectors are exchanged, and the matrix.
+
+    tangent: of the latest set of prescribed unknowns. reach: see `Assembler.reach`, own unknowns.
+    """
+
+    part: Part
+    exchange: Exchange
+    interleaved: int
+    solver: Solver
+    tangent: Tangent | None = None
+    reach: Array = field(default_factory=lambda: np.empty(0))
+
+    def tangent_of(self, problem: Problem) -> Tangent:
+        """The matrix for the prescribed unknowns of a problem."""
+        known = self.tangent
+        same = known is not None and known.fixed == problem.fixed.tobytes()
+        if world().allreduce(int(not same)) or known is None:
+            if known is not None:
+                known.matrix.destroy()
+            self.tangent = known = Tangent.of(
+                problem.assembler, problem.fixed, self.exchange, self.interleaved
+            )
+            self.solver.reset()
+        return known
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """What Newton's method is given as a matrix, and asks for a solution."""
+
+    tangent: Tangent
+    solver: Solver
+
+    def solve(self, r: Array) -> Array:
+        """Local x, (m,), of own r, (k,)."""
+        return self.solver.solve(self.tangent, r)
+
+
+@dataclass(frozen=True)
+class Distributed:
+    """The linear solver of spread problems: PETSc's."""
+
+    name: str = "petsc"
+
+    def factorise(self, K: Any) -> Factors:
+        """What is given is what solves."""
+        assert isinstance(K, Factors)
+        return K
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """The local part of a problem with what the processes share.  Vectors x are local, (m,); r is
+    that of own unknowns, (k,).  Every method is called by all processes alike.
+    """
+
+    problem: Problem
+    team: Team
+
+    @property
+    def assembler(self) -> Any:
+        """Of the elements of this process."""
+        return self.problem.assembler
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """See `Problem`."""
+        return self.problem.parameters
+
+    def fields(self, name: str, x: Array) -> dict[str, Array]:
+        """Fields of a block at the points of this process's elements."""
+        return self.problem.fields(name, x)
+
+    def residual(self, x: Array) -> Array:
+        """See the class."""
+        r = self.team.exchange.added(self.problem.assembler.residual(x, self.parameters))
+        return self._prescribed(r, x - self._wanted(x))
+
+    def linearise(self, x: Array) -> tuple[Array, Factors]:
+        """Residual with the influence of prescribed unknowns moved into it, and the tangent."""
+        tangent = self.team.tangent_of(self.problem)
+        defect = x - self._wanted(x)
+        given = self.problem.assembler, x, self.parameters
+        r = tangent.fill(*given, defect, self.team.solver.times)
+        r = self._prescribed(self.team.exchange.added(r), defect)
+        return r, Factors(tangent, self.team.solver)
+
+    def norm(self, r: Array) -> float:
+        """Never asked: the problem measures its residuals itself."""
+        raise NotImplementedError
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """Problems of studies have no guards."""
+        return 1.0
+
+    def measure(self, x: Array, K: Factors | None) -> float:
+        """See `Problem.measure`: the same sums, over all processes."""
+        own, exchange, problem = self.team.part.owned, self.team.exchange, self.problem
+        sums = problem.assembler.residual_and_size(x, self.parameters)
+        r, size = exchange.added(sums[0]), exchange.added(sums[1])
+        if total(np.array([float(not np.isfinite(r).all())]))[0]:
+            return float("inf")
+        noise = np.zeros(len(own)) if K is None else self._noise(x, K)
+        wanted = self._wanted(x)
+        free = np.ones(len(x), dtype=bool)
+        free[problem.fixed] = False
+        defect = np.maximum(np.abs(r) - noise, 0.0) * free[own]
+        off, largest = (x - wanted)[own], np.maximum(np.abs(x), np.abs(wanted))[own]
+        squares = [v * v for v in (defect, size, off, largest)]
+        table = total(np.array([[v[p].sum() for v in squares] for p in self._fields()]))
+        roots = np.sqrt(table)
+        parts = [(ratio(d, s), ratio(o, w)) for d, s, o, w in roots]
+        return float(np.linalg.norm(parts))
+
+    def name_of(self, number: int) -> str:
+        """An unknown for messages, by PETSc's number."""
+        exchange, part = self.team.exchange, self.team.part
+        there = np.flatnonzero(exchange.numbers == number)
+        words = ""
+        if len(there):
+            layout = self.problem.layout
+            field_name = next(n for n in layout.names if there[0] < layout.part(n).stop)
+            whole, n = part.system.everywhere, int(part.unknowns[there[0]])
+            place = unknown_name(whole.assembler.blocks, n)
+            words = f"unknown {n} of field {field_name!r}{place}"
+        return _first(words)
+
+    def where_not_finite(self, x: Array) -> str:
+        """The first element of any process whose residual or tangent is not finite."""
+        part, words = self.team.part, ""
+        for block in self.problem.assembler.blocks:
+            results = block.tangent(x, self.parameters[block.name])
+            rows = rows_not_finite(*results)
+            if len(rows) and not words:
+                whole = part.system.everywhere.assembler.block(block.name)
+                words = element_name(whole, int(part.elements[block.name][rows[0]]))
+        return _first(words)
+
+    def _wanted(self, x: Array) -> Array:
+        """x with the prescribed values."""
+        wanted = x.copy()
+        wanted[self.problem.fixed] = self.problem.values
+        return wanted
+
+    def _prescribed(self, r: Array, defect: Array) -> Array:
+        own = self.team.part.owned
+        fixed = np.isin(own, self.problem.fixed)
+        r[fixed] = defect[own][fixed]
+        return r
+
+    def _noise(self, x: Array, K: Factors) -> Array:
+        team = self.team
+        if not len(team.reach):
+            team.reach = team.exchange.highest(self.problem.assembler.reach())
+        magnitudes = np.abs(x)[team.part.owned] + team.reach
+        return ROUNDING * K.tangent.times_magnitudes(magnitudes)
+
+    def _fields(self) -> list[Integers]:
+        """For each field the places of its unknowns among own ones."""
+        own, layout = self.team.part.owned, self.problem.layout
+        parts = [layout.part(name) for name in layout.names]
+        return [np.flatnonzero((own >= p.start) & (own < p.stop)) for p in parts]
+
+
+def _first(words: str) -> str:
+    """What the first process says that says anything."""
+    return next((w for w in world().allgather(words) if w), "")

@@ -1,0 +1,67 @@
+"""How the unknowns and elements of a study are spread over processes: here, not at all.
+
+Whoever spreads them (`runtime.engines`) has a subclass. The vectors that pass through a solution
+path are then those of one process, its own unknowns and copies of its neighbours'; whatever decides
+something is asked of `Share`, so that all processes decide alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.solution import Solution
+
+
+class Share:
+    """All unknowns and elements on one process; every method is called by all processes alike."""
+
+    first = True
+    """Whether this process writes what is one file for all, and speaks."""
+    pieces: tuple[int, int] = (0, 1)
+    """Number of this process, and of all."""
+
+    def posed(self, problem: Problem) -> Any:
+        """The problem as a solver sees it."""
+        return problem
+
+    def whole(self, x: Array) -> Array:
+        """Unknowns (..., n) of all processes, on each of them."""
+        return x
+
+    def own(self, x: Array) -> Array:
+        """Of unknowns (..., n) of all processes those of this one."""
+        return x
+
+    def whole_cells(self, block: str, values: Array) -> Array:
+        """Values (n, ...) of the elements of a block of all processes, on each of them."""
+        return values
+
+    def own_cells(self, block: str, values: Array) -> Array:
+        """Of values (n, ...) of the elements of a block those of this process."""
+        return values
+
+    def whole_forces(self, forces: Array) -> Array:
+        """Sums (n,) over all processes of what the elements of each add to every unknown."""
+        return forces
+
+    def largest(self, value: float) -> float:
+        """The largest of the numbers that the processes have."""
+        return value
+
+    def reached(self, name: str, parameter: float, solution: Solution) -> None:
+        """Told of every converged step: of what, and how far."""
+
+    def whole_state(self, state: Mapping[str, Array]) -> dict[str, Array]:
+        """Block -> point data of all processes."""
+        return {name: self.whole_cells(name, values) for name, values in state.items()}
+
+    def own_state(self, state: Mapping[str, Array]) -> dict[str, Array]:
+        """Block -> of the point data of all processes those of this one."""
+        return {name: self.own_cells(name, values) for name, values in state.items()}
+
+
+ALONE = Share()
+"""All on one process."""
