@@ -51,10 +51,11 @@ def _forces(
     """Forces to be solved for, and ties both sides of which are prescribed."""
     forces, implied = [], []
     for force in statement.forces:
-        _require(force.name, force.nodes, numbering, force.label, every=True)
+        for name in force.names:
+            _require(name, force.nodes, numbering, force.label, every=True)
         if isinstance(force.kernel, Tie):
             # where both sides are prescribed nothing is left for a multiplier to do
-            both = np.isin(force.nodes, statement.prescribed(force.name)).all(axis=1)
+            both = np.isin(force.nodes, statement.prescribed(force.names[0])).all(axis=1)
             implied.append(replace(force, nodes=force.nodes[both]))
             force = replace(force, nodes=force.nodes[~both])
         forces.append(force)
@@ -100,7 +101,8 @@ class _Writer:
         )
 
     def force(self, force: Force) -> ElementBlock:
-        dofs = self.numbering.nodal[force.name][force.nodes]
+        columns = [self.numbering.nodal[name][force.nodes] for name in force.names]
+        dofs = np.stack(columns, axis=2).reshape(len(force.nodes), -1)
         places = self.mesh.points[force.nodes].reshape(len(dofs), -1)
         if isinstance(force.kernel, Tie):
             places = self.mesh.points[force.nodes[:, 0]]

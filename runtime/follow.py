@@ -27,31 +27,41 @@ class LoadPath:
     limits: tuple[LimitPoint, ...]
 
 
-def follow(
-    system: System, step: float, until: Callable[[Result], bool], newton: Newton, most: int
-) -> LoadPath:
-    """What `Study.follow` says.  Raises NotConverged."""
-    state = [(system.at_rest(), system.histories())]  # after the last converged point
-    results: list[Result] = []
+@dataclass(frozen=True, eq=False)
+class ArcSteps:
+    """How a path is followed: longest step, at most so many points, each handed to `on_step`."""
 
-    def problem_at(t: float) -> Problem:
-        return system.problem(system.still(t, *state[0]))
+    step: float
+    newton: Newton
+    most: int
+    on_step: Callable[[Result], object]
 
-    def keep(point: Point) -> None:
-        problem, x = problem_at(point.parameter), point.solution.x
-        state[0] = x, system.committed(problem, x, state[0][1])
-        results.append(Result(system, problem, point, state[0][1]))
+    def run(self, system: System, until: Callable[[Result], bool]) -> LoadPath:
+        """What `Study.follow` says.  Raises NotConverged."""
+        state = [(system.at_rest(), system.histories())]  # after the last converged point
+        results: list[Result] = []
 
-    with np.errstate(all="ignore"):
-        first = newton.solve(problem_at(step), state[0][0])
-    if not first.converged:
-        raise NotConverged(first)
-    scale = float(np.sqrt(np.mean((first.x - state[0][0]) ** 2))) / step
-    rule = StepRule(step, 1e-6 * step, step)
-    path = Arclength(newton, rule, x_scale=scale or 1.0, max_points=most, name="load factor")
-    branch = path.follow(
-        problem_at, 0.0, state[0][0], until=lambda _: until(results[-1]), on_point=keep
-    )
-    if not branch.converged:
-        raise NotConverged(branch, results[-1] if results else None)
-    return LoadPath((*results,), branch.limit_points)
+        def problem_at(t: float) -> Problem:
+            return system.problem(system.still(t, *state[0]))
+
+        def keep(point: Point) -> None:
+            problem, x = problem_at(point.parameter), point.solution.x
+            state[0] = x, system.committed(problem, x, state[0][1])
+            results.append(Result(system, problem, point, state[0][1]))
+            self.on_step(results[-1])
+
+        with np.errstate(all="ignore"):
+            first = self.newton.solve(problem_at(self.step), state[0][0])
+        if not first.converged:
+            raise NotConverged(first)
+        scale = float(np.sqrt(np.mean((first.x - state[0][0]) ** 2))) / self.step
+        rule = StepRule(self.step, 1e-6 * self.step, self.step)
+        path = Arclength(
+            self.newton, rule, x_scale=scale or 1.0, max_points=self.most, name="load factor"
+        )
+        branch = path.follow(
+            problem_at, 0.0, state[0][0], until=lambda _: until(results[-1]), on_point=keep
+        )
+        if not branch.converged:
+            raise NotConverged(branch, results[-1] if results else None)
+        return LoadPath((*results,), branch.limit_points)

@@ -22,8 +22,8 @@ import numpy as np
 from softehl.runtime.arrays import Integers
 from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
 from softehl.runtime.equations import equations
-from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie
-from softehl.runtime.follow import LoadPath, follow
+from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.follow import ArcSteps, LoadPath
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.load import SMALLEST, LoadSteps
 from softehl.runtime.march import Clock, March, Method
@@ -45,6 +45,7 @@ from softehl.runtime.statement.records import (
     shown,
 )
 from softehl.runtime.system import System
+from softehl.runtime.watch import Series, Telling, Watch, watched
 
 Source: TypeAlias = "str | Path | Kernel | object"
 """A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition."""
@@ -104,16 +105,38 @@ class Study:
         for name, value in components.items():
             if isinstance(where, str) or callable(where):
                 for kind, faces in self.mesh.faces(where).items():
-                    self._add_force("load", where, DeadLoad(CELLS[kind], value), faces, name)
+                    self._add_force("load", where, DeadLoad(CELLS[kind], value), faces, (name,))
             else:
                 nodes = read.nodes_of(self.mesh, where)
-                self._add_force("load", where, NodalForce(value), nodes[:, None], name)
+                self._add_force("load", where, NodalForce(value), nodes[:, None], (name,))
+
+    def pressure(
+        self, where: str | Predicate, value: Amount, *, of: Sequence[str] | None = None
+    ) -> None:
+        """A pressure on a side, which follows the body: it acts on the deformed side, inwards.
+
+        value: force per deformed length or area; a number grows with the load factor (in `march`
+        it is constant), a function f(x (n, dim), t) gives the pressure at undeformed places.
+        of: unknowns that are the displacements along x, y, z; left out, u_x, u_y, u_z.
+        """
+        if not callable(value):
+            read.finite("pressure", value)
+        axes = "xyz"[: self.mesh.dimension]
+        names = tuple(f"u_{axis}" for axis in axes) if of is None else tuple(of)
+        if len(names) != self.mesh.dimension or len(names) == 1:
+            raise StudyError(
+                f"pressure({shown(where)}, of={list(names)}): a displacement for each of "
+                f"{self.mesh.dimension} coordinates is needed, in 2-D or 3-D"
+            )
+        for kind, faces in self.mesh.faces(where).items():
+            self._add_force("pressure", where, Pressure(CELLS[kind], value), faces, names)
 
     def spring(self, where: Where, **stiffness: float) -> None:
         """Springs to the ground at the nodes of a side, each of this stiffness."""
         for name, value in stiffness.items():
+            kernel = Spring(read.finite(name, value))
             nodes = read.nodes_of(self.mesh, where)
-            self._add_force("spring", where, Spring(read.finite(name, value)), nodes[:, None], name)
+            self._add_force("spring", where, kernel, nodes[:, None], (name,))
 
     def fix(self, where: Where, **values: Amount) -> None:
         """Prescribe unknowns: a number grows with the load factor (in `march` it is constant).
@@ -147,7 +170,7 @@ class Study:
         ]
         for name in names:
             pairs = np.stack([ours, partners], axis=1)
-            self._add_force("tie", where, Tie(offset), pairs, name)
+            self._add_force("tie", where, Tie(offset), pairs, (name,))
 
     def start(self, where: Where | None = None, **values: Datum) -> None:
         """Values of unknowns at the start, numbers or functions of places; zero if left out."""
@@ -168,20 +191,26 @@ class Study:
         newton: Newton | None = None,
         on_step: Callable[[Result], object] | None = None,
         engine: AnyEngine = None,
+        write: str | Path | Series | None = None,
+        progress: bool | None = None,
     ) -> Result:
         """The solution at load factor `until`, from 0 (or from `start`) in `steps` steps.
 
         Steps are cut where Newton's method fails and grow again; history is committed after each.
-        on_step is given the result of every converged step. engine: "serial", "petsc" (on all
-        processes that mpirun started) or an engine with settings. Raises StudyError; NotConverged
-        if the end is not reached: its `reached` is the last Result, or None.
+        on_step is given the result of every converged step, write: a .pvd file that names them
+        all. progress: tell of each step on stderr; None: in one line, on a terminal only. engine:
+        "serial", "petsc" (on all processes that mpirun started) or an engine with settings. Raises
+        StudyError; NotConverged if the end is not reached: its `reached` is the last Result, or
+        None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
         where = engine_of(engine)
         system = where.spread(self.system() if start is None else start.system)
-        path = LoadSteps(steps, where.newton(newton), on_step or _nothing)
-        return path.run(system, start, until)
+        begin = 0.0 if start is None else start.t
+        told = Telling(progress, system.share.first, "load factor", begin)
+        with Watch(told.until(until), write, on_step) as watch:
+            return LoadSteps(steps, where.newton(newton), watch).run(system, start, until)
 
     def march(
         self,
@@ -195,6 +224,8 @@ class Study:
         restart: str | Path | None = None,
         newton: Newton | None = None,
         engine: AnyEngine = None,
+        write: str | Path | None = None,
+        progress: bool | None = None,
     ) -> Iterator[Result]:
         """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
 
@@ -205,7 +236,8 @@ class Study:
         values of steps before (data u_old, `Model.rates`) are renewed after every converged step.
         checkpoint: file that is rewritten after each step; restart: such a file, from which the
         march goes on bitwise as if it had not stopped, with `engine` "petsc" on any number of
-        processes. Raises StudyError, NotConverged.
+        processes. write: a .pvd file that names the results of all steps (with start or restart, it
+        goes on). progress: as in `solve`. Raises StudyError, NotConverged.
         """
         if method not in ("euler", "bdf2"):
             raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
@@ -218,7 +250,10 @@ class Study:
         if restart is not None:
             clock = Clock.load(Path(restart), system)
         settings = March(method, tolerance, SMALLEST * dt, where.newton(newton))
-        return settings.run(system, clock, until, None if checkpoint is None else Path(checkpoint))
+        file = None if checkpoint is None else Path(checkpoint)
+        series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
+        told = Telling(progress, system.share.first, "t", clock.t)
+        return watched(settings.run(system, clock, until, file), Watch(told.until(until), series))
 
     def follow(
         self,
@@ -227,18 +262,22 @@ class Study:
         until: Callable[[Result], bool],
         newton: Newton | None = None,
         most: int = 1000,
+        write: str | Path | None = None,
+        progress: bool | None = None,
     ) -> LoadPath:
         """The path from load factor 0 on, by arc length: it passes limit points of the load.
 
         step: length of the first and longest step. A length counts the load factor, and the
         unknowns in units of what they change by per load factor in the beginning. until: is given
         each result; the path ends where it says True. most: points at most. History is committed
-        after each point. Raises StudyError; NotConverged if the end is not reached: its `reached`
-        is the last Result, or None.
+        after each point. write, progress: as in `solve`. Raises StudyError; NotConverged if the end
+        is not reached: its `reached` is the last Result, or None.
         """
         if not (np.isfinite(step) and step > 0.0):
             raise StudyError(f"step = {step}: must be positive")
-        return follow(self.system(), step, until, Serial().newton(newton), most)
+        with Watch(Telling(progress, True, "load factor", 0.0).until(None), write) as watch:
+            path = ArcSteps(step, Serial().newton(newton), most, watch)
+            return path.run(self.system(), until)
 
     def system(self) -> System:
         """What is written down, as equations.  Raises StudyError for what does not fit together."""
@@ -248,13 +287,13 @@ class Study:
         self,
         what: str,
         where: Where,
-        kernel: DeadLoad | NodalForce | Spring | Tie,
+        kernel: DeadLoad | NodalForce | Pressure | Spring | Tie,
         nodes: Integers,
-        name: str,
+        names: tuple[str, ...],
     ) -> None:
         forces = self._statement.forces
-        label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {name})"
-        forces.append(Force(label, kernel, nodes, name))
+        label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {', '.join(names)})"
+        forces.append(Force(label, kernel, nodes, names))
 
 
 def _load(source: Source, model: str | None) -> Kernel:
@@ -262,10 +301,6 @@ def _load(source: Source, model: str | None) -> Kernel:
     import softehl
 
     return softehl.load_kernel(source, model)  # type: ignore[arg-type]
-
-
-def _nothing(result: Result) -> None:
-    """Of a step that nobody watches."""
 
 
 __all__ = ["MeshError", "Study", "StudyError"]

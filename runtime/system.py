@@ -136,7 +136,7 @@ class System:
         assert isinstance(tie.kernel, Tie)
         places = self.mesh.points[tie.nodes[:, 0]]
         offsets = amount(tie.kernel.offset, places, step.t, step.factor)
-        numbers = self.numbering.nodal[tie.name][tie.nodes]
+        numbers = self.numbering.nodal[tie.names[0]][tie.nodes]
         for (a, b), offset, node in zip(numbers, offsets, tie.nodes[:, 0], strict=True):
             apart = values[int(a)] - values[int(b)] - float(offset)
             if abs(apart) > 1e-12 * max(abs(values[int(a)]), abs(values[int(b)])):

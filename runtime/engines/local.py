@@ -84,7 +84,7 @@ def _page(block: Block, rows: Integers) -> Block:
 
 
 def _implied(force: Force, numbering: Numbering) -> Force:
-    here = (numbering.nodal[force.name][force.nodes] >= 0).all(axis=1)
+    here = (numbering.nodal[force.names[0]][force.nodes] >= 0).all(axis=1)
     return replace(force, nodes=force.nodes[here])
 
 

@@ -1,4 +1,4 @@
-"""Loads, springs and ties as element kernels: what a problem has besides its pages."""
+"""Loads, pressures, springs and ties as element kernels: what a problem has besides its pages."""
 
 from __future__ import annotations
 
@@ -72,6 +72,69 @@ class DeadLoad(_Kernel):
         """Residual, and a tangent of zeros."""
         r = self.residual(coordinates, dofs, **given)
         return r, np.zeros((*r.shape, r.shape[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Pressure(_Kernel):
+    """A pressure on the deformed faces of a body, against their outward normal.
+
+    Its unknowns are the displacements, all components node by node. face: kind of the faces.
+    value: force per deformed length or area, a function of undeformed places.
+    """
+
+    face: Cell
+    value: Amount
+    name = "pressure"
+    parameters = _TIME
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Minus the virtual work of the pressure, (n, k)."""
+        return self._evaluate(coordinates, dofs, given)[0]
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        """Residual and its exact tangent, which is not symmetric."""
+        r, slopes, load, points = self._evaluate(coordinates, dofs, given)
+        shape, along = self.face.shape(points), self.face.gradient(points)
+        turn = _turned(slopes)  # (n, q, c, c, d): normal component by slope component and direction
+        K = np.einsum("nq,qk,nqced,qld->nkcle", load, shape, turn, along, optimize=True)
+        return r, np.ascontiguousarray(K.reshape(*r.shape, r.shape[1]))
+
+    def _evaluate(
+        self, coordinates: Array, dofs: Array, given: Any
+    ) -> tuple[Array, Array, Array, Array]:
+        """Residual (n, k c), slopes of the deformed face (n, q, c, d), load times weight (n, q)
+        and the points.
+        """
+        n, k = len(coordinates), len(self.face.nodes)
+        X, u = coordinates.reshape(n, k, -1), dofs.reshape(n, k, -1)
+        points, weights = self.face.rule(4)
+        shape, along = self.face.shape(points), self.face.gradient(points)
+        places = np.einsum("qk,nkc->nqc", shape, X)
+        load = amount(self.value, places.reshape(-1, X.shape[2]), *given["parameters"].tolist())
+        slopes = np.einsum("qkd,nkc->nqcd", along, X + u)
+        weighted = load.reshape(n, -1) * weights
+        r = np.einsum("nq,qk,nqc->nkc", weighted, shape, _normal(slopes))
+        return r.reshape(n, -1), slopes, weighted, points
+
+
+def _normal(slopes: Array) -> Array:
+    """Outward normals (n, q, c) times length or area per parent unit, from slopes (n, q, c, d)."""
+    if slopes.shape[2] == 2:
+        return np.stack([slopes[..., 1, 0], -slopes[..., 0, 0]], axis=-1)
+    return np.asarray(np.cross(slopes[..., 0], slopes[..., 1]))
+
+
+def _turned(slopes: Array) -> Array:
+    """Derivatives of the normal by the slopes, (n, q, c, c, d)."""
+    found = np.zeros((*slopes.shape[:2], slopes.shape[2], *slopes.shape[2:]))
+    if slopes.shape[2] == 2:
+        found[..., 0, 1, 0], found[..., 1, 0, 0] = 1.0, -1.0
+        return found
+    for c in range(3):  # normal = a x b, d/da_c = e_c x b, d/db_c = a x e_c
+        e = np.eye(3)[c]
+        found[..., :, c, 0] = np.cross(e, slopes[..., 1])
+        found[..., :, c, 1] = np.cross(slopes[..., 0], e)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,7 @@ _CUBE_EDGES = (
 _CUBE_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
 
 _TETRAHEDRON_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+_LINE_SIDES = ((0,), (1,))
 _TRIANGLE_SIDES = ((0, 1), (1, 2), (2, 0))
 _SQUARE_SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
 _TETRAHEDRON_SIDES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
@@ -166,8 +167,13 @@ def _cells() -> dict[str, Cell]:
     wedge = tuple((*a, b) for b in (0, 1) for a in _powers(2, 1, 1, 0))
     found = [
         Cell("point1", "vertex", np.zeros((1, 0)), ((),), 1),
-        Cell("line2", "line", _means(_ENDS, ()), _powers(1, 1, 1, 0), 2),
-        Cell("line3", "line3", _means(_ENDS, ((0, 1),)), _powers(1, 2, 2, 1), 2),
+        *_family(
+            *(_ENDS, _LINE_SIDES),
+            [
+                ("line2", "line", (), _powers(1, 1, 1, 0), ("point1",)),
+                ("line3", "line3", ((0, 1),), _powers(1, 2, 2, 1), ("point1",)),
+            ],
+        ),
         *_family(
             *(_TRIANGLE, _TRIANGLE_SIDES),
             [
@@ -203,7 +209,7 @@ def _cells() -> dict[str, Cell]:
     return {cell.name: cell for cell in found}
 
 
-_LINEAR = {(2, 1): "line2", (3, 2): "tri3", (4, 2): "quad4"}
+_LINEAR = {(1, 0): "point1", (2, 1): "line2", (3, 2): "tri3", (4, 2): "quad4"}
 CELLS = _cells()
 """Every kind of cell by its name."""
 

@@ -23,7 +23,7 @@ from softehl.runtime.names import meant
 
 Faces: TypeAlias = Mapping[str, Integers]
 """Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
-Shape = Literal["quad", "serendipity", "triangle", "hex", "tetrahedron"]
+Shape = Literal["quad", "serendipity", "triangle", "hex", "tetrahedron", "wedge"]
 Predicate = Callable[[Array], Flags]
 """Of places (n, dim): which of them are meant, (n,)."""
 
@@ -100,7 +100,8 @@ class Mesh:
     ) -> Mesh:
         """[0, a] x [0, b] x [0, c]; "left" "right" (x), "front" "back" (y), "bottom" "top" (z).
 
-        shape: "hex" (hex8, hex27), "serendipity" (hex20) or "tetrahedron" (tet4, tet10).
+        shape: "hex" (hex8, hex27), "serendipity" (hex20) "tetrahedron" (tet4, tet10)
+        or "wedge" (wedge6).
         """
         from softehl.runtime.mesh.structured import grid
 

@@ -19,6 +19,7 @@ KINDS = {
     (3, "hex"): ("hex8", "hex27"),
     (3, "serendipity"): ("", "hex20"),
     (3, "tetrahedron"): ("tet4", "tet10"),
+    (3, "wedge"): ("wedge6", ""),
 }
 """(dimension, shape) -> kinds of order 1 and 2."""
 
@@ -50,7 +51,7 @@ def _kind(dimension: int, order: int, shape: str) -> str:
         raise MeshError(f"shape = {shape!r}: allowed are {', '.join(allowed)}")
     kind = KINDS[dimension, shape][order - 1] if order in (1, 2) else ""
     if not kind:
-        orders = "2" if shape == "serendipity" else "1 or 2"
+        orders = {"serendipity": "2", "wedge": "1"}.get(shape, "1 or 2")
         raise MeshError(f"order = {order}: {shape} cells have order {orders}")
     return kind
 
@@ -62,6 +63,8 @@ def _numbers(kind: str, counts: Sequence[int], order: int) -> Integers:
     origins = sum(s.ravel(order="F") * stride for s, stride in zip(steps, strides, strict=True))
     if kind[:3] in ("tri", "tet"):
         parts = [_simplex(kind, corners) for corners in _simplices(len(counts))]
+    elif kind == "wedge6":
+        parts = [_wedge(corners) for corners in _simplices(2)]
     else:
         parts = [0.5 * (CELLS[kind].nodes + 1.0)]
     local = [np.rint(order * part).astype(np.int64) @ strides for part in parts]
@@ -81,6 +84,11 @@ def _simplices(dimension: int) -> list[Array]:
             corners[[-1, -2]] = corners[[-2, -1]]
         found.append(corners)
     return found
+
+
+def _wedge(triangle: Array) -> Array:
+    """Nodes of a prism over a triangle (3, 2) of the unit square."""
+    return np.vstack([np.column_stack([triangle, np.full(3, z)]) for z in (0.0, 1.0)])
 
 
 def _simplex(kind: str, corners: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Spring, Tie
+from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.fem.unknowns import Slot
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.mesh.mesh import Mesh, Predicate
@@ -69,12 +69,12 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Force:
-    """A load, a spring or a tie: elements of a kernel of ours on unknowns of one name."""
+    """A load, a pressure, a spring or a tie: elements of a kernel of ours on unknowns by name."""
 
     label: str
-    kernel: DeadLoad | NodalForce | Spring | Tie
+    kernel: DeadLoad | NodalForce | Pressure | Spring | Tie
     nodes: Integers
-    name: str
+    names: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)

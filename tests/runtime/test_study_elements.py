@@ -23,6 +23,7 @@ SHAPES: dict[str, dict[str, Any]] = {
     "quad9": {"shape": "quad", "order": 2},
     "tet4": {"shape": "tetrahedron"},
     "tet10": {"shape": "tetrahedron", "order": 2},
+    "wedge6": {"shape": "wedge"},
     "hex8": {"shape": "hex"},
     "hex20": {"shape": "serendipity", "order": 2},
     "hex27": {"shape": "hex", "order": 2},
