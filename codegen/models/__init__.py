@@ -7,7 +7,7 @@ from functools import partial
 
 from softehl.codegen.language import materials
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.models import boundary, contact, film, sheet, solid, support
+from softehl.codegen.models import boundary, contact, film, mixed_film, sheet, solid, support
 
 MATERIALS = {
     "yeoh": materials.YEOH,
@@ -36,6 +36,12 @@ ALL: dict[str, Callable[[], Definition]] = {
     "film": film.reynolds_segment,
     "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,
+    "film_conserving": mixed_film.conserving_segment,
+    "film_rough": mixed_film.rough_segment,
+    "film_upwind_rough": mixed_film.rough_bubble_load,
+    "film_void": mixed_film.void_fraction,
+    "film_squeeze": mixed_film.squeeze,
+    "film_squeeze_rough": mixed_film.rough_squeeze,
     "mean_rotation": support.mean_rotation,
     "mean_axial": support.mean_axial,
     "axial_spring": support.axial_spring,

@@ -8,6 +8,7 @@ The boundary conditions (15) prescribe the end unknowns in both: dp vanishes the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import sympy as sp
@@ -44,12 +45,12 @@ def reynolds_segment() -> Definition:
     x = [[a + b for a, b in zip(X[c], u[c], strict=True)] for c in (0, 1)]
     z_xi, r_xi = (m.define(f"{n}_xi", (c[1] - c[0]) / 2) for n, c in zip("zr", x, strict=True))
     ds = m.define("ds", sp.sqrt(z_xi**2 + r_xi**2))
-    nodal_h = _nodal_thickness(m, X, u, R_rod)
+    nodal_h = nodal_thickness(m, X, u, R_rod)
     h = m.define("h", shapes.interpolate(N, nodal_h), interface=True)
     r = m.define("r", R_rod + h)
     slope = m.define("slope", p_xi / z_xi)
-    eta = m.define("eta", _viscosity(eta_0, alpha, p))
-    q = m.define("q", _flux(U, h, _conductance(h, eta), slope))
+    eta = m.define("eta", viscosity(eta_0, alpha, p))
+    q = m.define("q", flux(U, h, conductance(h, eta), slope))
     couette = m.define("couette", eta * U / h)
     poiseuille = m.define("poiseuille", h / 2 * slope)
     tau = couette - poiseuille
@@ -77,22 +78,22 @@ def reynolds_segment() -> Definition:
     return m.finish()
 
 
-def _viscosity(eta_0: Any, alpha: Any, p: Any) -> Any:
+def viscosity(eta_0: Any, alpha: Any, p: Any) -> Any:
     """eta(p) of (13)."""
     return eta_0 * sp.exp(alpha * p)
 
 
-def _conductance(h: Any, eta: Any) -> Any:
+def conductance(h: Any, eta: Any) -> Any:
     """Flow through the gap for a unit pressure gradient, per width."""
     return h**3 / (12 * eta)
 
 
-def _flux(U: Any, h: Any, conductance: Any, slope: Any) -> Any:
+def flux(U: Any, h: Any, conductance: Any, slope: Any) -> Any:
     """Volume flux of (14): half of what the rod drags along less what the pressure drives back."""
     return U / 2 * h - conductance * slope
 
 
-def _nodal_thickness(m: Model, X: Vectors, u: Vectors, R_rod: sp.Symbol) -> list[sp.Symbol]:
+def nodal_thickness(m: Model, X: Vectors, u: Vectors, R_rod: sp.Symbol) -> list[sp.Symbol]:
     """h at the nodes; the radii of undeformed ring and rod come first: h is 1e-5 of either."""
     clearance = [m.define(f"clearance_{a}", R - R_rod) for a, R in enumerate(X[1])]
     return [m.define(f"h_{a}", c + v) for a, (c, v) in enumerate(zip(clearance, u[1], strict=True))]
@@ -110,6 +111,11 @@ def bubble_load() -> Definition:
     would turn the film back there.
     """
     m = Model("film_upwind", nodes=2, rule=quadrature.gauss(2, 1), doc=bubble_load.__doc__ or "")
+    return bubble_model(m, lambda h: h)
+
+
+def bubble_model(m: Model, effective: Callable[[Any], Any]) -> Definition:
+    """`bubble_load` in a model of two nodes; effective: thickness that counts, of h_m."""
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
     _, p_xi = m.interpolated("p")
@@ -123,10 +129,11 @@ def bubble_load() -> Definition:
     )
     (xi,) = m.point()
     z_xi = m.define("z_xi", (X[0][1] + u[0][1] - X[0][0] - u[0][0]) / 2)
-    h = _nodal_thickness(m, X, u, R_rod)
+    h = nodal_thickness(m, X, u, R_rod)
     h_m = m.define("h_m", (h[0] + h[1]) / 2)
-    peclet = m.define("peclet", U * z_xi**2 / (2 * sp.pi * G * _conductance(h_m, eta_0)))
-    widening = m.define("widening", (h[1] - h[0]) / (sp.Rational(1, 5) * h_m))
+    thickness = m.define("thickness", effective(h_m))
+    peclet = m.define("peclet", U * z_xi**2 / (2 * sp.pi * G * conductance(thickness, eta_0)))
+    widening = m.define("widening", (h[1] - h[0]) / (sp.Rational(1, 5) * thickness))
     weight = sp.Piecewise((1, U * widening <= 0), (1 / (1 + widening**2), True))
     delta = m.define("delta", weight * peclet**2 / (9 + peclet**2))
     # p_b vanishes at both ends: the integral of r p_b is that of -W p_b', with W' = r, and also
@@ -163,10 +170,10 @@ def reynolds_facet() -> Definition:
     mobilities, fluxes = [], []
     for k, (name, (p, p_xi)) in enumerate(zip(("minus", "plus"), sides, strict=True)):
         z_xi = m.define(f"z_xi_{name}", (z[k + 1] - z[k]) / 2)
-        eta = m.define(f"eta_{name}", _viscosity(eta_0, alpha, p))
+        eta = m.define(f"eta_{name}", viscosity(eta_0, alpha, p))
         # dq of (24) for a unit xi-derivative of dp
-        mobilities.append(m.define(f"mobility_{name}", -_conductance(h, eta) / z_xi))
-        fluxes.append(m.define(f"q_{name}", _flux(U, h, -mobilities[k], p_xi)))
+        mobilities.append(m.define(f"mobility_{name}", -conductance(h, eta) / z_xi))
+        fluxes.append(m.define(f"q_{name}", flux(U, h, -mobilities[k], p_xi)))
     (p_minus, p_minus_xi), (p_plus, p_plus_xi) = sides
     jump = m.define("jump", p_minus - p_plus)
     q = m.define("q", (fluxes[0] + fluxes[1]) / 2)

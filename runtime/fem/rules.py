@@ -12,6 +12,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.kernels import Rule
 
 Kind = Literal["gauss", "lobatto"]
+_SUBCELL = 2  # points of a subcell: h^3 times a slope is integrated exactly
 
 
 def _line(points: Array, weights: Array, basis: Array | None = None) -> Rule:
@@ -120,3 +121,69 @@ def trace_rule(m_p: int, kind: Kind = "gauss", points: int | None = None) -> Rul
     order = np.argsort(xi)
     weights = np.concatenate([rule.weights, np.zeros(len(missing))])
     return _line(xi[order], weights[order], lagrange(pressure_nodes(m_p), xi[order]))
+
+
+@cache
+def subcells(m_p: int) -> tuple[Rule, Array]:
+    """Gauss points on the m_p subcells between neighbouring pressure nodes, and their subcells.
+
+    The rule has no basis; subcells (points,): number of the subcell of each point, from 0.
+    """
+    if m_p < 1:
+        raise ValueError(f"subcells: pressure order {m_p} is not allowed, it is at least 1")
+    nodes, inner = pressure_nodes(m_p), gauss(_SUBCELL)
+    half, middle = 0.5 * np.diff(nodes), 0.5 * (nodes[1:] + nodes[:-1])
+    points = (middle[:, None] + half[:, None] * inner.points[:, 0]).ravel()
+    weights = (half[:, None] * inner.weights).ravel()
+    return _line(points, weights), np.repeat(np.arange(m_p), len(inner.weights))
+
+
+def _hats(m_p: int) -> Array:
+    """Piecewise linear shape functions at the points of `subcells`: (points, m_p + 1, 2)."""
+    rule, cell = subcells(m_p)
+    nodes, xi = pressure_nodes(m_p), rule.points[:, 0]
+    width, here = np.diff(nodes)[cell], np.arange(len(cell))
+    basis = np.zeros((len(cell), m_p + 1, 2))
+    basis[here, cell] = np.stack([(nodes[cell + 1] - xi) / width, -1.0 / width], axis=1)
+    basis[here, cell + 1] = np.stack([(xi - nodes[cell]) / width, 1.0 / width], axis=1)
+    return basis
+
+
+@cache
+def subcell_rule(m_p: int) -> Rule:
+    """Rule of a segment whose pressure is linear between its m_p + 1 nodes."""
+    rule, _ = subcells(m_p)
+    return Rule(rule.points, rule.weights, _hats(m_p))
+
+
+@cache
+def rupture_rule(m_p: int) -> Rule:
+    """`subcell_rule` with void fractions upwinded from the nodes: 2 (m_p + 1) modes.
+
+    Pressures come first, then void fractions; basis (points, modes, 6): value and d/dxi of p, of v
+    at the lower end of the subcell, and of v at its upper end.
+    """
+    rule, cell = subcells(m_p)
+    n, here = m_p + 1, np.arange(len(cell))
+    basis = np.zeros((len(cell), 2 * n, 6))
+    basis[:, :n, :2] = _hats(m_p)
+    basis[here, n + cell, 2] = 1.0
+    basis[here, n + cell + 1, 4] = 1.0
+    return Rule(rule.points, rule.weights, basis)
+
+
+@cache
+def content_rule(m_p: int) -> Rule:
+    """Rule with its points at the m_p + 1 pressure nodes, of the weight of half of their subcells.
+
+    Basis (points, 2 (m_p + 1), 4): value and d/dxi of p, then of v; slopes are left out.
+    """
+    nodes, n = pressure_nodes(m_p), m_p + 1
+    weights = np.zeros(n)
+    weights[:-1] += 0.5 * np.diff(nodes)
+    weights[1:] += 0.5 * np.diff(nodes)
+    basis = np.zeros((n, 2 * n, 4))
+    basis[np.arange(n), np.arange(n), 0] = 1.0
+    basis[np.arange(n), n + np.arange(n), 2] = 1.0
+    rule = _line(nodes, weights)
+    return Rule(rule.points, rule.weights, basis)

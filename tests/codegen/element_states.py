@@ -12,6 +12,8 @@ from softehl.codegen.graph.evaluate import State
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.rules import Kind, facet_rule, film_rule
 from softehl.runtime.kernels import Kernel, Rule, load_kernel
+from tests.reference.calling import rule_of
+from tests.reference.states import mixed_states, void_states
 from tests.shipped import RUBBERS
 
 MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))
@@ -28,6 +30,7 @@ class Case:
     data: Array
     parameters: Array
     rule: Rule | None = None
+    point_data: Array | None = None
 
     def arguments(self) -> tuple[tuple[Array, Array], dict[str, Any]]:
         """Positional and named arguments of the kernel's methods."""
@@ -35,6 +38,7 @@ class Case:
             "data": self.data[None],
             "parameters": self.parameters,
             "rule": self.rule,
+            "point_data": None if self.point_data is None else self.point_data[None],
         }
 
     def exact(self, kernel: Kernel | None = None) -> State:
@@ -49,6 +53,7 @@ class Case:
             self.parameters.tolist(),
             table.tolist(),
             basis,
+            () if self.point_data is None else self.point_data.tolist(),
         )
 
 
@@ -168,6 +173,15 @@ def facets(rng: np.random.Generator, m_p: int) -> Iterator[Case]:
         yield replace(plain, rule=facet_rule(m_p))
 
 
+def ruptured() -> Iterator[Case]:
+    """Films with void fractions, rough and moving ones: those of the other reference."""
+    for state in [*mixed_states((1, 3)), *void_states()]:
+        given = state.coordinates, state.dofs, state.parameters, state.data
+        plain = _case(state.family, state.label, *given)
+        data = np.array(state.point_data)[:, None] if state.point_data else None
+        yield replace(plain, rule=rule_of(state), point_data=data)
+
+
 def all_cases() -> list[Case]:
     """Every case of every family: the same in every run."""
     rng = np.random.default_rng(20251)
@@ -178,4 +192,5 @@ def all_cases() -> list[Case]:
         for kind in kinds:
             cases += films(rng, m_p, kind)
         cases += facets(rng, m_p)
+    cases += ruptured()
     return cases

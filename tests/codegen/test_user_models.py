@@ -456,3 +456,19 @@ def test_equal_definitions_have_one_fingerprint_and_different_ones_differ() -> N
     assert prints[0] == prints[1]
     assert len(set(prints)) == 3
     assert location.root().name == "cache"
+
+
+def test_a_page_with_several_interpolated_fields_is_checked() -> None:
+    text = """
+from softehl import Definition, Model, quadrature
+
+def void_film() -> Definition:
+    m = Model("void_film", nodes=2, rule=quadrature.gauss(2, 1), doc="Pressure and void.")
+    m.coordinates("X")
+    (p, p_xi), (v, _), (w, _) = m.interpolated_sides("p", "v", "w")
+    (k,) = m.parameters(k="conductance")
+    m.weak_form([(k * p_xi * (1 - v) + w, p_xi), (p * v, v)])
+    return m.finish()
+"""
+    model_file(text)
+    assert run("mine.py") == 0

@@ -11,11 +11,24 @@ from softehl.runtime.fem import rules
 from softehl.runtime.kernels import load_kernel
 from tests.reference.states import State
 
+RULES = {
+    "film_conserving": rules.rupture_rule,
+    "film_rough": rules.rupture_rule,
+    "film_squeeze": rules.content_rule,
+    "film_squeeze_rough": rules.content_rule,
+    "film_upwind_rough": rules.subcell_rule,
+}
+"""Rules of the films that may rupture, by the order of the pressure."""
+
 
 def rule_of(state: State) -> Any:
     """The double-precision rule that goes with a state (None: the kernel's own)."""
     if state.family == "film_facet":
         return rules.facet_rule((len(state.dofs) - 6) // 2 - 1)
+    if state.family in RULES:
+        pressures = len(state.dofs) - 4
+        both = state.family != "film_upwind_rough"
+        return RULES[state.family]((pressures // 2 if both else pressures) - 1)
     if state.family not in ("film", "film_upwind"):
         return None
     return rules.film_rule(len(state.dofs) - 5, state.kind, state.count)
@@ -28,6 +41,7 @@ def call(task: str, state: State) -> Any:
         np.array([state.coordinates]),
         np.array([state.dofs]),
         data=data,
+        point_data=np.array(state.point_data)[None, :, None] if state.point_data else None,
         parameters=np.array(state.parameters),
         rule=rule_of(state),
     )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.reference import boundary, facet, film, section, sheet, solids, upwind
+from tests.reference import boundary, facet, film, mixed, section, sheet, solids, upwind
 from tests.reference.differentiate import Matrix, Number, Vector, mpf, numbers
 from tests.reference.material import LAWS
 from tests.reference.states import State
@@ -46,6 +46,14 @@ def _contact(function: Callable[..., Any]) -> Callable[[State], Any]:
     return call
 
 
+def _mixed(function: Callable[..., Any]) -> Callable[[State], Any]:
+    def call(s: State) -> Any:
+        X, u, parameters = _exact(s)
+        return function(X, u, numbers(s.data or s.point_data), parameters)
+
+    return call
+
+
 def _exact(s: State) -> tuple[Vector, Vector, Vector]:
     return numbers(s.coordinates), numbers(s.dofs), numbers(s.parameters)
 
@@ -70,6 +78,7 @@ RESIDUALS: dict[str, Oracle] = {
     "mean_rotation": _plain(section.residual_rotation),
     "mean_axial": _plain(section.residual_axial),
     "axial_spring": _single(section.residual_spring),
+    **{family: _mixed(residual) for family, residual in mixed.RESIDUALS.items()},
 }
 TANGENTS: dict[str, Oracle] = {
     "solid_q4": _plain(solids.tangent_q4),
@@ -89,6 +98,7 @@ TANGENTS: dict[str, Oracle] = {
     "mean_rotation": _plain(section.tangent_rotation),
     "mean_axial": _plain(section.tangent_axial),
     "axial_spring": _single(section.tangent_spring),
+    **{family: _mixed(partial(mixed.tangent, family)) for family in mixed.RESIDUALS},
 }
 ENERGIES: dict[str, Oracle] = {
     "solid_q4": _plain(solids.energy_q4),
@@ -114,6 +124,7 @@ FIELDS: dict[str, Oracle] = {
     },
     "film": _film(film.fields_film),
     "film_facet": _plain(facet.fields_facet),
+    **{family: _mixed(fields) for family, fields in mixed.FIELDS.items()},
 }
 
 
@@ -144,10 +155,18 @@ def fields(state: State) -> Matrix:
     return exact
 
 
+PAIRS = ("film_conserving", "film_rough", "film_squeeze", "film_squeeze_rough")
+"""Families with pressures and void fractions."""
+
+
 def blocks(family: str, count: int) -> tuple[Block, ...]:
     """Groups of unknowns of one kind: displacements, and pressures or multipliers."""
     known = {"contact": 2, "film": 4, "film_upwind": 4, "film_facet": 6}
-    known |= {"mean_rotation": 8, "mean_axial": 8}
+    known |= {"mean_rotation": 8, "mean_axial": 8, "film_upwind_rough": 4}
+    if family in PAIRS:
+        middle = 4 + (count - 4) // 2
+        parts = ("u", slice(0, 4)), ("p", slice(4, middle)), ("v", slice(middle, count))
+        return parts
     split = known.get(family, count)
     rest = () if split == count else (("p", slice(split, count)),)
     return (("u", slice(0, split)), *rest)

@@ -25,6 +25,7 @@ class State:
     data: tuple[float, ...] = ()
     kind: str = ""
     count: int = 0
+    point_data: tuple[float, ...] = ()
 
     @property
     def id(self) -> str:
@@ -223,7 +224,58 @@ def thin_film_states() -> Iterator[State]:
         yield replace(state, label="thin-" + state.label, dofs=tuple(dofs))
 
 
+PLAIN = (25.0, 120.0, 6.59e-8, 0.02, 0.8, 0.9)
+"""Radius and speed of the rod, oil, weights of the forces of a film that may rupture."""
+
+THICKNESS = {"deep": (-0.4, 0.1), "bent": (0.2, 1.3), "mixed": (1.4, 2.9), "light": (3.3, 4.9)}
+THICKNESS |= {"apart": (5.2, 5.9), "far": (6.5, 30.0)}
+"""h over sigma at the nodes: each lies in other branches of the flow factors."""
+
+
+def mixed_states(orders: tuple[int, ...] = (1, 2, 4)) -> Iterator[State]:
+    """Both strokes, a surface that runs ahead of the rod, ruptured and full, every flow factor."""
+    rng, sigma, n = np.random.default_rng(1978), 4e-4, len(THICKNESS)
+    for order in orders:
+        for k, (label, H) in enumerate(THICKNESS.items()):
+            X = np.array([-0.1, 25.4, 0.02, 25.45])
+            gaps = sigma * np.array(H)
+            u = np.array([0.01, (25.0 - 25.4) + gaps[0], -0.02, (25.0 - 25.45) + gaps[1]])
+            p = 0.5 + rng.uniform(-0.5, 2, order + 1)
+            v = np.where(rng.uniform(size=order + 1) < 0.5, 0.0, rng.uniform(0, 0.9, order + 1))
+            dofs, data = _tuple(np.concatenate([u, p, v])), _tuple(rng.uniform(-30, 30, 2))
+            ahead = 5e4 if k == n - 1 else 0.0  # u_z times it is a speed above the rod's
+            plain = (*PLAIN[:1], (-1) ** k * PLAIN[1], *PLAIN[2:], ahead)
+            rough = (sigma, (-1.0, 0.3, 1.0)[k % 3], 14.6, 0.1, 3.0)
+            name, all_of_them = f"m{order}-{label}", (*plain, *rough)
+            state = State("film_rough", name, _tuple(X), dofs, all_of_them, data)
+            yield state
+            history = _tuple(rng.uniform(-1, 1, order + 1))
+            moved = replace(state, data=(), point_data=history)
+            yield replace(moved, family="film_squeeze_rough", parameters=(25.0, 310.0, sigma))
+            if order > 1:
+                upwind = (sigma, 25.0, plain[1], 6.59e-8, 3.66, (-1.0) ** k * 0.7, 0.8)
+                bubbles = replace(state, dofs=dofs[: 5 + order], data=())
+                yield replace(bubbles, family="film_upwind_rough", parameters=upwind)
+            if label in ("light", "far"):
+                yield replace(state, family="film_conserving", parameters=plain)
+                yield replace(moved, family="film_squeeze", parameters=(25.0, 310.0))
+
+
+def void_states() -> Iterator[State]:
+    """Full, ruptured, at the front, and on the wrong side of either condition."""
+    for label, p, v in (
+        ("full", 2.3, 4e-4),
+        ("nearly", 1.2, 2e-3),
+        ("ruptured", -0.05, 0.6),
+        ("front", -0.049, 2e-4),
+        ("below", -0.7, -0.1),
+        ("wrong", -0.2, 1e-5),
+    ):
+        yield State("film_void", label, (), (p, v), (-0.05, 1.0, 1e-3))
+
+
 def all_states() -> list[State]:
     """Every state of every family."""
     bodies = [*solid_states(), *rubber_states(), *boundary_states(), *section_states()]
-    return [*bodies, *film_states(), *upwind_states(), *facet_states()]
+    films = [*film_states(), *upwind_states(), *facet_states()]
+    return [*bodies, *films, *mixed_states(), *void_states()]

@@ -13,7 +13,7 @@ import pytest
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import build
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.rules import facet_rule, film_rule, gauss
+from softehl.runtime.fem.rules import content_rule, facet_rule, film_rule, gauss, rupture_rule
 from softehl.runtime.kernels import (
     ArgumentError,
     Kernel,
@@ -31,6 +31,16 @@ MATERIAL = np.array([3.04, 0.62, 500.0])
 Call = Callable[..., Any]
 
 
+RULES = {
+    None: None,
+    "p": film_rule(3),
+    "p_minus, p_plus": facet_rule(3),
+    "p, v_out, v_in": rupture_rule(3),
+    "p, v": content_rule(3),
+}
+"""A rule for every kind of interpolation."""
+
+
 def arguments(name: str, n: int, rng: np.random.Generator) -> tuple[tuple[Array, Array], Any]:
     """Random admissible arguments for n elements of a family."""
     kernel = load_kernel(name)
@@ -41,13 +51,18 @@ def arguments(name: str, n: int, rng: np.random.Generator) -> tuple[tuple[Array,
         1: [[0.1, 25.4]],
     }[kernel.nodes]
     X = np.array(corners)[None] + rng.uniform(-0.02, 0.02, (n, kernel.nodes, 2))
-    rule = {None: None, "p": film_rule(3), "p_minus, p_plus": facet_rule(3)}[kernel.interpolated]
+    if not kernel.coordinates:
+        X = np.empty((n, 0, 0))
+    rule = RULES[kernel.interpolated]
     modes = 0 if rule is None or rule.basis is None else rule.basis.shape[1]
     ndof = len(kernel.unknowns) + modes
     u = rng.uniform(-0.01, 0.01, (n, ndof))
     data = rng.uniform(0.5, 1.5, (n, len(kernel.data)))
     named = {"parameters": {p: VALUES[p] for p in kernel.parameters}, "data": data, "rule": rule}
-    return (X.reshape(n, 2 * kernel.nodes), u), named
+    points = len((rule or kernel.default_rule).weights)
+    if kernel.point_data:
+        named["point_data"] = rng.uniform(0.5, 1.5, (n, points, len(kernel.point_data)))
+    return (X.reshape(n, kernel.nodes * len(kernel.coordinates)), u), named
 
 
 def methods(kernel: Kernel) -> dict[str, Call]:
@@ -136,6 +151,8 @@ def test_a_batch_is_exactly_its_elements_one_by_one(name: str, rng: np.random.Ge
         together = call(X, u, **named)
         for e in range(n):
             one = {**named, "data": named["data"][e : e + 1]}
+            if kernel.point_data:
+                one["point_data"] = named["point_data"][e : e + 1]
             alone = call(X[e : e + 1], u[e : e + 1], **one)
             pairs = zip(together, alone, strict=True) if task == "tangent" else [(together, alone)]
             for many, single in pairs:

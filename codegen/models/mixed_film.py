@@ -1,0 +1,232 @@
+"""Films that rupture, move and touch: void fraction, squeeze, roughness (docs/film-physics.md).
+
+Unknowns of a segment are displacements, pressures, and void fractions v = 1 - theta where the
+pressures stand. Where the film may rupture both are those of subcells between neighbours, pressures
+linear and void fractions upwinded: a table of shape functions says so, `v_out` is the void
+fraction of the end from which oil comes at outstroke, `v_in` at instroke. The smooth pages are the
+limit of the rough ones without roughness.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.model import Model
+from softehl.codegen.models import roughness
+from softehl.codegen.models.film import (
+    bubble_model,
+    conductance,
+    flux,
+    nodal_thickness,
+    viscosity,
+)
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """What the surfaces make of a thickness h, by (14) and (17) with flow factors.
+
+    effective: thickness of flow and shear; content: mean gap; carried: thickness that a rod of
+    unit mean speed carries along; pressure_flow, couette, poiseuille: factors; asperities: their
+    pressure over the stiffness.
+    """
+
+    effective: Any
+    content: Any
+    carried: Any
+    pressure_flow: Any = 1
+    couette: Any = 1
+    poiseuille: Any = 1
+    asperities: Any = 0
+
+    @classmethod
+    def smooth(cls, h: Any) -> Surfaces:
+        """Without roughness."""
+        return cls(h, h, h)
+
+    @classmethod
+    def rough(cls, m: Model, h: Any, sigma: Any, c: Any) -> Surfaces:
+        """Heights of rms sigma; c = (rod^2 - seal^2) / sigma^2 says on which surface they are."""
+        H = m.define("H", h / sigma, interface=True)
+        He = m.define("H_effective", roughness.effective(H), interface=True)
+        gap = m.define("mean_gap", roughness.mean_gap(H))
+        return cls(
+            effective=m.define("h_effective", sigma * He),
+            content=m.define("h_T", sigma * gap),
+            carried=m.define("h_carried", sigma * (gap + c * roughness.shear_flow(He))),
+            pressure_flow=roughness.pressure_flow(He),
+            couette=roughness.shear_stress(He) + c * roughness.shear_difference(He),
+            poiseuille=roughness.pressure_stress(He),
+            asperities=roughness.asperities(H),
+        )
+
+
+def conserving_segment() -> Definition:
+    """Film segment that conserves mass where it ruptures, between smooth surfaces.
+
+    As the page film, but for the void fraction in what the rod carries along, for any basis of
+    pressure and void fraction, and for the axial speed w of the seal's surface: (14) with U - w.
+    """
+    return _segment("film_conserving", conserving_segment.__doc__ or "", rough=False)
+
+
+def rough_segment() -> Definition:
+    """Film segment between rough surfaces: flow factors, asperities, boundary friction.
+
+    Asperities carry K F_3/2(h / sigma) and resist sliding by mu_b times that, regularised at the
+    speed U_b. With the void fraction and the speed of the surface of conserving_segment.
+    """
+    return _segment("film_rough", rough_segment.__doc__ or "", rough=True)
+
+
+def _segment(name: str, doc: str, *, rough: bool) -> Definition:
+    m = Model(name, nodes=2, rule=quadrature.gauss(2, 1), doc=doc)
+    X = m.coordinates("Z", "R")
+    u = m.nodal_unknowns("u_z", "u_r")
+    (p, p_xi), (v_out, _), (v_in, _) = m.interpolated_sides("p", "v_out", "v_in")
+    R_rod, U, eta_0, alpha, force_weight, shear_weight = m.parameters(
+        rod_radius="radius of the rod [mm]",
+        rod_speed="rod speed U, positive towards the air side [mm/s]",
+        viscosity="viscosity at zero pressure [MPa s]",
+        pressure_viscosity="coefficient alpha of (13) [1/MPa]",
+        force_weight="factor on the nodal forces",
+        shear_weight="factor on the shear traction",
+    )
+    (xi,) = m.point()
+    N = shapes.line2(xi)
+    (w_nodes,) = m.rates("u_z")
+    w = m.define("w", shapes.interpolate(N, w_nodes))
+    z, nodal_h = [a + b for a, b in zip(X[0], u[0], strict=True)], nodal_thickness(m, X, u, R_rod)
+    z_xi = m.define("z_xi", (z[1] - z[0]) / 2)
+    r_xi = m.define("r_xi", (nodal_h[1] - nodal_h[0]) / 2)
+    ds = m.define("ds", sp.sqrt(z_xi**2 + r_xi**2))
+    h = m.define("h", shapes.interpolate(N, nodal_h), interface=True)
+    V = m.define("V", U - w)
+    surfaces, p_a, tau_a = _surfaces(m, h, V, rough)
+    slope = m.define("slope", p_xi / z_xi)
+    eta = m.define("eta", viscosity(eta_0, alpha, p))
+    filled = m.define("filled", sp.Max(V, 0) * (1 - v_out) + sp.Min(V, 0) * (1 - v_in))
+    pressed = surfaces.pressure_flow * conductance(surfaces.effective, eta)
+    q = m.define("q", flux(filled, surfaces.carried, pressed, slope))
+    couette = m.define("couette", eta * filled / surfaces.effective * surfaces.couette)
+    poiseuille = m.define("poiseuille", surfaces.poiseuille * surfaces.effective / 2 * slope)
+    tau = couette + tau_a - poiseuille
+    load = p + p_a
+
+    ring = m.define("ring", 2 * sp.pi * force_weight * (R_rod + h))
+    m.weak_form(
+        [
+            (q, p_xi),
+            (ring * (load * r_xi - shear_weight * tau * ds), shapes.interpolate(N, u[0])),
+            (-ring * load * z_xi, shapes.interpolate(N, u[1])),
+        ]
+    )
+    m.fields(
+        x=shapes.interpolate(N, z),
+        dx=m.weight * z_xi,
+        h=h,
+        p=p,
+        tau=tau,
+        flux=q,
+        tau_rod=couette + tau_a + poiseuille,
+        eta=eta,
+        h_T=surfaces.content,
+        p_a=p_a,
+        tau_a=tau_a,
+        v_out=v_out,
+        v_in=v_in,
+    )
+    return m.finish()
+
+
+def _surfaces(m: Model, h: Any, V: Any, rough: bool) -> tuple[Surfaces, Any, Any]:
+    """The surfaces, the pressure of their asperities, and its friction."""
+    if not rough:
+        return Surfaces.smooth(h), sp.Integer(0), sp.Integer(0)
+    sigma, c, K, mu_b, U_b = m.parameters(
+        roughness="rms height sigma of both surfaces together [mm]",
+        roughness_difference="(rod^2 - seal^2) / sigma^2 of the rms heights",
+        asperity_stiffness="pressure K of asperities where their F_3/2 is one [MPa]",
+        boundary_friction="friction coefficient of touching asperities",
+        boundary_speed="speed U_b at which their friction has 0.7 of its value [mm/s]",
+    )
+    surfaces = Surfaces.rough(m, h, sigma, c)
+    p_a = m.define("p_a", K * surfaces.asperities)
+    tau_a = m.define("tau_a", mu_b * p_a * V / sp.sqrt(V**2 + U_b**2))
+    return surfaces, p_a, tau_a
+
+
+def void_fraction() -> Definition:
+    """Either the film is full or it has the cavitation pressure: Fischer and Burmeister.
+
+    With a = (p - p_c) / p_ref and b = v / v_ref the row of v is a + b - sqrt(a^2 + b^2) = 0, which
+    holds where one is zero and the other is not negative.
+    """
+    rule = quadrature.point_rule()
+    m = Model("film_void", nodes=1, rule=rule, unroll=True, doc=void_fraction.__doc__ or "")
+    p, v = m.unknown("p"), m.unknown("v")
+    p_c, p_ref, v_ref = m.parameters(
+        cavitation_pressure="pressure p_c of the ruptured film [MPa]",
+        pressure_scale="pressure p_ref that counts as much as v_ref [MPa]",
+        void_scale="void fraction v_ref",
+    )
+    a, b = m.define("a", (p - p_c) / p_ref), m.define("b", v / v_ref)
+    tiny = sp.Rational(1, 10**30)
+    root = m.define("root", sp.sqrt(a**2 + b**2 + tiny))
+    # a + b - root loses all digits where a >> b > 0. `tiny` is left out in the other form of it:
+    # the optimiser would know the two for the same value and keep one.
+    large = 2 * a * b / (a + b + root)
+    row = m.define("row", sp.Piecewise((large, a + b > 0), (a + b - root, True)))
+    m.weak_form([(row, v)])
+    return m.finish()
+
+
+def squeeze() -> Definition:
+    """What the film holds between smooth surfaces changes with time.
+
+    d/dt [h (1 - v) dz], where the pressures stand (weights are lengths of halves of subcells): the
+    rate of the content is `rate` times it and `content_rate`, of the steps before.
+    """
+    return _squeeze("film_squeeze", squeeze.__doc__ or "", rough=False)
+
+
+def rough_squeeze() -> Definition:
+    """What the film holds between rough surfaces changes with time: squeeze, with h_T for h."""
+    return _squeeze("film_squeeze_rough", rough_squeeze.__doc__ or "", rough=True)
+
+
+def _squeeze(name: str, doc: str, *, rough: bool) -> Definition:
+    m = Model(name, nodes=2, rule=quadrature.gauss(2, 1), doc=doc)
+    X = m.coordinates("Z", "R")
+    u = m.nodal_unknowns("u_z", "u_r")
+    (p, _), (v, _) = m.interpolated_sides("p", "v")
+    R_rod, rate = m.parameters(
+        rod_radius="radius of the rod [mm]", rate="coefficient of the time derivative [1/s]"
+    )
+    (rest,) = m.point_data(content_rate="content of the steps before, times theirs [mm^2/s]")
+    (xi,) = m.point()
+    N = shapes.line2(xi)
+    z_xi = m.define("z_xi", (X[0][1] + u[0][1] - X[0][0] - u[0][0]) / 2)
+    h = m.define("h", shapes.interpolate(N, nodal_thickness(m, X, u, R_rod)), interface=True)
+    h_T = h
+    if rough:
+        (sigma,) = m.parameters(roughness="rms height sigma of both surfaces together [mm]")
+        H = m.define("H", h / sigma, interface=True)
+        h_T = m.define("h_T", sigma * roughness.mean_gap(H))
+    content = m.define("content", h_T * (1 - v) * z_xi)
+    m.weak_form([(-(rate * content + rest), p)])
+    m.fields(content=content, dx=m.weight * z_xi, v=v, h_T=h_T)
+    return m.finish()
+
+
+def rough_bubble_load() -> Definition:
+    """Upwinding of the load of the pressure bubbles by the effective thickness of a rough film."""
+    doc = rough_bubble_load.__doc__ or ""
+    m = Model("film_upwind_rough", nodes=2, rule=quadrature.gauss(2, 1), doc=doc)
+    (sigma,) = m.parameters(roughness="rms height sigma of both surfaces together [mm]")
+    return bubble_model(m, lambda h: sigma * roughness.effective(h / sigma))

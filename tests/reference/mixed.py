@@ -1,0 +1,292 @@
+"""Films with void fraction, moving surface, squeeze, flow factors and asperities (physics of
+docs/film-physics.md), written down once more with mpmath.
+
+Unknowns: u_z1 u_r1 u_z2 u_r2, pressures and then void fractions at the Gauss-Lobatto-Legendre
+points. F_3/2 is a parabolic cylinder function here, flow factors are the published formulas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.rules import gauss, lobatto
+
+
+def effective(H: Number) -> Number:
+    """h / sigma of flow and shear."""
+    return H if mpf(1) / 2 <= H else 1 / (4 - 4 * H)
+
+
+def mean_gap(H: Number) -> Number:
+    """E max(H + s, 0) of a normal variable s: H P(s > -H) + density(H)."""
+    return H * mp.ncdf(H) + mp.npdf(H)
+
+
+def asperities(H: Number, order: Number = 1.5) -> Number:
+    """Greenwood's F_n(H)."""
+    order = mpf(order)
+    cylinder = mp.pcfd(-order - 1, H)
+    return mp.gamma(order + 1) / mp.sqrt(2 * PI) * mp.exp(-(H**2) / 4) * cylinder
+
+
+def phi_p(H: Number) -> Number:
+    """Pressure flow."""
+    return 1 - mpf(9) / 10 * mp.exp(-mpf(56) / 100 * H)
+
+
+def phi_s(H: Number) -> Number:
+    """Shear flow, its far end joined to the fit at 5."""
+    if H > 5:
+        return phi_s(mpf(5)) * mp.exp(-(H - 5) / 4)
+    power = H ** (mpf(98) / 100)
+    return mpf(1899) / 1000 * power * mp.exp(-mpf(92) / 100 * H + H**2 * 5 / 100)
+
+
+def phi_f(H: Number) -> Number:
+    """Mean of h / (h + s) over heights of density 35/32 (1 - s^2)^3, cut at 3 sigma / 100."""
+    z = H / 3
+    cubic = (1 - z**2) ** 3
+    if z > 1:
+        rest = z / 15 * (66 + z**2 * (30 * z**2 - 80))
+        return 35 * z / 32 * (cubic * mp.log((z + 1) / (z - 1)) + rest)
+    terms = (-55, 132, 345, -160, -405, 60, 147)
+    rest = sum(c * z**k for k, c in enumerate(terms)) / 60
+    return 35 * z / 32 * (cubic * mp.log(300 * (z + 1)) + rest)
+
+
+def phi_fs(H: Number) -> Number:
+    """Shear stress by the difference of the surfaces, its far end joined to the fit at 5."""
+    if H > 5:
+        return phi_fs(mpf(5)) * mp.exp(-mpf(818) / 1000 * (H - 5))
+    power = H ** (mpf(231) / 100)
+    return mpf(111) / 10 * power * mp.exp(-mpf(238) / 100 * H + H**2 * 11 / 100)
+
+
+def phi_fp(H: Number) -> Number:
+    """Shear stress by the pressure gradient."""
+    return 1 - mpf(14) / 10 * mp.exp(-mpf(66) / 100 * H)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point of the segment: where it is, its subcell, and the film there."""
+
+    shapes: tuple[Number, Number]
+    cell: int
+    hats: tuple[Number, Number]
+    width: Number
+    dx: Number
+    weight: Number
+    x: Number
+    r: Number
+    h: Number
+    w: Number
+
+
+Words = dict[str, Number]
+
+
+def places(X: Vector, dofs: Vector, data: Vector, given: Words) -> Iterator[Place]:
+    """Two Gauss points on every subcell."""
+    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    nodes = lobatto(len(dofs[4:]) // 2)[0]
+    w = [given["rate"] * dofs[2 * a] + data[a] for a in (0, 1)]
+    for cell, (a, b) in enumerate(pairwise(nodes)):
+        for point, weight in zip(*gauss(2), strict=True):
+            xi = (a + b) / 2 + (b - a) / 2 * point
+            one, two = (1 - xi) / 2, (1 + xi) / 2
+            r, own = one * r1 + two * r2, weight * (b - a) / 2
+            yield Place(
+                *((one, two), cell, ((b - xi) / (b - a), (xi - a) / (b - a))),
+                *((b - a) * (z2 - z1) / 2, own * (z2 - z1) / 2, own),
+                *(one * z1 + two * z2, r, r - given["rod_radius"], one * w[0] + two * w[1]),
+            )
+
+
+@dataclass(frozen=True)
+class Film:
+    """What flows and rubs at a place."""
+
+    p: Number
+    slope: Number
+    flux: Number
+    tau: Number
+    tau_rod: Number
+    p_a: Number
+    tau_a: Number
+    h_T: Number
+    eta: Number
+    ends: tuple[Number, Number]
+
+
+def film_at(at: Place, dofs: Vector, given: Words, rough: bool) -> Film:
+    """Flux and stresses; void fractions come from where the oil comes from."""
+    half = len(dofs[4:]) // 2
+    p_ends = dofs[4 + at.cell : 6 + at.cell]
+    void = dofs[4 + half + at.cell], dofs[4 + half + at.cell + 1]
+    p, slope = mp.fdot(at.hats, p_ends), (p_ends[1] - p_ends[0]) / at.width
+    V = given["rod_speed"] - at.w
+    full = 1 - (void[0] if V > 0 else void[1])
+    eta = given["viscosity"] * mp.exp(given["pressure_viscosity"] * p)
+    if not rough:
+        q = V / 2 * full * at.h - at.h**3 / (12 * eta) * slope
+        drag, back = eta * V / at.h * full, at.h / 2 * slope
+        zero = mpf(0)
+        return Film(p, slope, q, drag - back, drag + back, zero, zero, at.h, eta, void)
+    sigma, c = given["roughness"], given["roughness_difference"]
+    H = at.h / sigma
+    E = effective(H)
+    h_T, h_e = sigma * mean_gap(H), sigma * E
+    q = V / 2 * full * (h_T + c * sigma * phi_s(E)) - phi_p(E) * h_e**3 / (12 * eta) * slope
+    p_a = given["asperity_stiffness"] * asperities(H)
+    tau_a = given["boundary_friction"] * p_a * V / mp.hypot(V, given["boundary_speed"])
+    drag = eta * V / h_e * (phi_f(E) + c * phi_fs(E)) * full
+    back = phi_fp(E) * h_e / 2 * slope
+    tau, tau_rod = drag - back + tau_a, drag + back + tau_a
+    return Film(p, slope, q, tau, tau_rod, p_a, tau_a, h_T, eta, void)
+
+
+SEGMENT = (
+    *("rod_radius", "rod_speed", "viscosity", "pressure_viscosity"),
+    *("force_weight", "shear_weight", "rate"),
+)
+ROUGH = (
+    *(*SEGMENT, "roughness", "roughness_difference"),
+    *("asperity_stiffness", "boundary_friction", "boundary_speed"),
+)
+
+
+def residual_film(
+    X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number], rough: bool
+) -> Vector:
+    """Forces on the nodes (N), then a row for every pressure; none for the void fractions."""
+    given = dict(zip(ROUGH if rough else SEGMENT, parameters, strict=True))
+    half = len(dofs[4:]) // 2
+    forces, rows = [mpf(0)] * 4, [mpf(0)] * (2 * half)
+    dz, dr = (X[2 + k] + dofs[2 + k] - X[k] - dofs[k] for k in (0, 1))
+    for at in places(X, dofs, data, given):
+        film = film_at(at, dofs, given, rough)
+        ring = 2 * PI * at.r * given["force_weight"] * at.weight / 2
+        load, drag = film.p + film.p_a, given["shear_weight"] * film.tau * mp.hypot(dz, dr)
+        for a in (0, 1):
+            forces[2 * a] += ring * at.shapes[a] * (load * dr - drag)
+            forces[2 * a + 1] -= ring * at.shapes[a] * load * dz
+        for end, sign in ((0, -1), (1, 1)):
+            rows[at.cell + end] += sign * film.flux * at.dx / at.width
+    return forces + rows
+
+
+def fields_film(
+    X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number], rough: bool
+) -> Matrix:
+    """x dx h p tau flux tau_rod eta h_T p_a tau_a v_out v_in at the points."""
+    given = dict(zip(ROUGH if rough else SEGMENT, parameters, strict=True))
+    found = []
+    for at in places(X, dofs, data, given):
+        f = film_at(at, dofs, given, rough)
+        known = [at.x, at.dx, at.h, f.p, f.tau, f.flux, f.tau_rod, f.eta, f.h_T, f.p_a, f.tau_a]
+        found.append([*known, *f.ends])
+    return found
+
+
+def residual_void(_: Vector, dofs: Vector, __: Vector, parameters: Sequence[Number]) -> Vector:
+    """Fischer and Burmeister, as it is printed; 1e-30 is less than the rounding of a kernel."""
+    p_c, p_ref, v_ref = parameters
+    a, b = (dofs[0] - p_c) / p_ref, dofs[1] / v_ref
+    return [mpf(0), a + b - mp.sqrt(a**2 + b**2)]
+
+
+def contents(
+    X: Vector, dofs: Vector, parameters: Sequence[Number], rough: bool
+) -> Iterator[tuple[Number, Number, Number, Number]]:
+    """At each pressure: half the lengths of its subcells, slope z', h_T and content h_T v z'."""
+    half = len(dofs[4:]) // 2
+    nodes = lobatto(half)[0]
+    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    for i, xi in enumerate(nodes):
+        h = (1 - xi) / 2 * r1 + (1 + xi) / 2 * r2 - parameters[0]
+        h_T = parameters[2] * mean_gap(h / parameters[2]) if rough else h
+        length = (nodes[min(i + 1, half - 1)] - nodes[max(i - 1, 0)]) / 2
+        slope = (z2 - z1) / 2
+        yield length, slope, h_T, h_T * (1 - dofs[4 + half + i]) * slope
+
+
+def residual_squeeze(
+    X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number], rough: bool
+) -> Vector:
+    """data: rate of the contents of the steps before, one for every pressure."""
+    rows = [
+        -length * (parameters[1] * content + rest)
+        for (length, _, _, content), rest in zip(
+            contents(X, dofs, parameters, rough), data, strict=True
+        )
+    ]
+    return [mpf(0)] * 4 + rows + [mpf(0)] * len(rows)
+
+
+def fields_squeeze(
+    X: Vector, dofs: Vector, _: Vector, parameters: Sequence[Number], rough: bool
+) -> Matrix:
+    """content dx v h_T at the pressures."""
+    n = len(dofs[4:]) // 2
+    found = contents(X, dofs, parameters, rough)
+    return [
+        [content, length * slope, dofs[4 + n + i], h_T]
+        for i, (length, slope, h_T, content) in enumerate(found)
+    ]
+
+
+def residual_upwind(X: Vector, dofs: Vector, _: Vector, parameters: Sequence[Number]) -> Vector:
+    """`tests.reference.upwind` with sigma Hp(h_m / sigma) for h_m, on the subcells."""
+    sigma, rod_radius, speed, viscosity, shear_modulus, strength, force_weight = parameters
+    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    h = sigma * effective(((r1 + r2) / 2 - rod_radius) / sigma)
+    peclet = 3 * viscosity * abs(speed) / 2 * (z2 - z1) ** 2 / (PI * shear_modulus * h**3)
+    widening = 5 * (r2 - r1) / h
+    weight = 1 / (1 + widening**2) if speed * widening > 0 else mpf(1)
+    delta = weight * peclet**2 / (9 + peclet**2)
+    moved = force_weight * strength * delta / 2 * _bubble(X, dofs, dofs[4:])
+    return [mpf(0), -moved, mpf(0), moved] + [mpf(0)] * (len(dofs) - 4)
+
+
+def _bubble(X: Vector, dofs: Vector, pressures: Vector) -> Number:
+    """Integral of 2 pi r p_b n_r ds with a pressure that is linear on the subcells."""
+    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
+    nodes, total = lobatto(len(pressures))[0], mpf(0)
+    for cell, (a, b) in enumerate(pairwise(nodes)):
+        for point, weight in zip(*gauss(2), strict=True):
+            xi = (a + b) / 2 + (b - a) / 2 * point
+            one, two = (1 - xi) / 2, (1 + xi) / 2
+            p = ((b - xi) * pressures[cell] + (xi - a) * pressures[cell + 1]) / (b - a)
+            p_b = p - one * pressures[0] - two * pressures[-1]
+            total -= 2 * PI * (one * r1 + two * r2) * p_b * weight * (b - a) / 2 * (z2 - z1) / 2
+    return total
+
+
+Residual = Callable[[Vector, Vector, Vector, Sequence[Number]], Vector]
+
+RESIDUALS: dict[str, Residual] = {
+    "film_conserving": partial(residual_film, rough=False),
+    "film_rough": partial(residual_film, rough=True),
+    "film_void": residual_void,
+    "film_squeeze": partial(residual_squeeze, rough=False),
+    "film_squeeze_rough": partial(residual_squeeze, rough=True),
+    "film_upwind_rough": residual_upwind,
+}
+FIELDS: dict[str, Callable[[Vector, Vector, Vector, Sequence[Number]], Matrix]] = {
+    "film_conserving": partial(fields_film, rough=False),
+    "film_rough": partial(fields_film, rough=True),
+    "film_squeeze": partial(fields_squeeze, rough=False),
+    "film_squeeze_rough": partial(fields_squeeze, rough=True),
+}
+
+
+def tangent(
+    family: str, X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number]
+) -> Matrix:
+    """Differences of the residual."""
+    return jacobian(lambda v: RESIDUALS[family](X, v, data, parameters), dofs)
