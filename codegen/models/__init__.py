@@ -33,6 +33,7 @@ ALL: dict[str, Callable[[], Definition]] = {
     **{(name := f"solid_taylor_mean_{m}"): _of(name, energy) for m, energy in MATERIALS.items()},
     "follower_pressure": boundary.follower_pressure,
     "contact": contact.augmented_lagrangian,
+    "contact_friction": contact.coulomb,
     "film": film.reynolds_segment,
     "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,

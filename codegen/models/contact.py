@@ -1,4 +1,4 @@
-"""Frictionless unilateral contact with rigid cylinders and planes, (9)-(10)."""
+"""Unilateral contact with rigid cylinders and planes, (9)-(10), without and with friction."""
 
 from __future__ import annotations
 
@@ -42,4 +42,50 @@ def augmented_lagrangian() -> Definition:
     force = m.define("force", sp.Piecewise((area * force_weight * trial, touching), (0, True)))
     slack = m.define("slack", sp.Piecewise((area * gap, touching), (-area * lam / rho, True)))
     m.weak_form([(force * n_z, u_z), (force * n_r, u_r), (slack, lam)])
+    return m.finish()
+
+
+def coulomb() -> Definition:
+    """Node against a rigid obstacle with Coulomb's friction, augmented Lagrangian.
+
+    As `contact`, with the pressure p = max(0, -(lambda + rho g)) and a multiplier tau of the
+    tangential stress (Alart and Curnier 1991): its trial value tau + rho (slip since the last step)
+    is cut off at +- friction p. Sticking nodes do not move at all; the slip of a step is counted
+    from the place in the step before, `u_z_old` and `u_r_old`.
+    """
+    m = Model(
+        "contact_friction",
+        nodes=1,
+        rule=quadrature.point_rule(),
+        unroll=True,
+        doc=coulomb.__doc__ or "",
+    )
+    (z,), (r,) = m.coordinates("Z", "R")
+    (u_z,), (u_r,) = m.nodal_unknowns("u_z", "u_r")
+    lam, tau = m.unknown("lambda"), m.unknown("tau")
+    n_z, n_r, c, area, rho = m.data(
+        n_z="normal of the obstacle, axial part",
+        n_r="normal of the obstacle, radial part",
+        c="position of the obstacle along its normal [mm]",
+        area="reference tributary area of the node [mm^2]",
+        rho="augmentation parameter [MPa/mm]",
+    )
+    (z_old,), (r_old,) = m.nodal_data("u_z_old", "u_r_old", meaning="in the step before [mm]")
+    offset, friction = m.parameters(
+        offset="distance by which the obstacle is moved along its normal [mm]",
+        friction="coefficient of friction",
+    )
+    gap = m.define("gap", n_z * (z + u_z) + n_r * (r + u_r) - c - offset)
+    slip = m.define("slip", n_r * (u_z - z_old) - n_z * (u_r - r_old))
+    pressure = m.define("pressure", sp.Max(-(lam + rho * gap), 0))
+    limit = m.define("limit", friction * pressure)
+    stress = m.define("stress", sp.Max(-limit, sp.Min(tau + rho * slip, limit)))
+    force = [-pressure * n_z + stress * n_r, -pressure * n_r - stress * n_z]
+    m.weak_form(
+        [
+            *((area * f, v) for f, v in zip(force, (u_z, u_r), strict=True)),
+            (-area * (pressure + lam) / rho, lam),
+            (area * (stress - tau) / rho, tau),
+        ]
+    )
     return m.finish()

@@ -233,6 +233,31 @@ def cahn_hilliard(figure: Figure, space: dict[str, Any]) -> None:
     right.set(xlabel="time", ylabel="energy", ylim=(0, 0.26), xlim=(0, 0.2))
 
 
+def friction(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2)
+    path, mu, stresses = space["fine"][1], space["mu"], space["stresses"]
+    x, _, p, _ = stresses(path[0])
+    left.plot(x, mu * p, color=GREY, label="friction times pressure")
+    for result, colour in zip(path[1::2], ("#9ecae1", BLUE, "#08306b"), strict=True):
+        x, _, _, tau = stresses(result)
+        left.plot(
+            x, tau, "o-", color=colour, ms=2.5, label=f"pushed {0.12 * (result.t - 1):.3f} mm"
+        )
+    left.set(xlabel="place [mm]", ylabel="stress [MPa]", xlim=(-1.6, 1.6), ylim=(0, None))
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, 1.25), ncols=2, fontsize=6.5)
+    parts = np.linspace(0, 1, 200)
+    right.plot(parts, np.sqrt(1 - parts), color=GREY, label="Cattaneo, Mindlin")
+    for name, colour, marker in (("coarse", "#6baed6", "s"), ("fine", ORANGE, "o")):
+        found = [stresses(result) for result in space[name][1]]
+        part = [(tau @ w) / (mu * (p @ w)) for _, w, p, tau in found]
+        sticks = [w[(p > 0) & (tau < mu * p * (1 - 1e-9))].sum() for _, w, p, tau in found]
+        half = [s / (2 * space["a"]) for s in sticks]
+        label = f"{len(found[0][0]) // 2} cells a side"
+        right.plot(part, half, marker, color=colour, label=label)
+    right.set(xlabel="Q / (friction P)", ylabel="what sticks / contact", xlim=(0, 1), ylim=(0, 1.1))
+    right.legend(loc="lower left")
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
@@ -240,6 +265,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "heat": heat,
     "fbar": fbar,
     "cahn-hilliard": cahn_hilliard,
+    "friction": friction,
 }
 
 if __name__ == "__main__":

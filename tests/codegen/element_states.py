@@ -105,7 +105,7 @@ def rubbers(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def boundaries(rng: np.random.Generator) -> Iterator[Case]:
-    """Follower pressure of both signs and none; contact closed and open."""
+    """Follower pressure of both signs and none; contact closed and open, sticking and slipping."""
     for label, pressure in (("pressed", 2.5), ("pulled", -0.8), ("no pressure", 0.0)):
         X = np.array([[-0.05, 25.1], [0.06, 25.0]]) + rng.uniform(-0.02, 0.02, (2, 2))
         u = rng.uniform(-0.1, 0.1, (2, 2))
@@ -123,6 +123,20 @@ def boundaries(rng: np.random.Generator) -> Iterator[Case]:
         c = n @ (X + u) - offset - gap
         data = [*n, c, rng.uniform(1, 20), 200.0]
         yield _case("contact", label, X, [*u, multiplier], [offset, rng.uniform(0.2, 1)], data)
+    for label, gap, slip in (
+        ("open", 0.1, 0.02),
+        ("sticking", -0.02, 1e-4),
+        ("slipping", -0.02, 0.05),
+        ("slipping back", -0.02, -0.05),
+    ):
+        # along an axis where it sticks: the sum of n n and t t has zeros that rounding would fill
+        angle = 0.0 if label == "sticking" else rng.uniform(0, 2 * np.pi)
+        radius = rng.uniform(20, 30)
+        n, u = np.array([np.cos(angle), np.sin(angle)]), rng.uniform(-0.1, 0.1, 2)
+        X, offset = np.array([0.3, radius]), rng.uniform(0, 0.02)
+        old = u - slip * np.array([n[1], -n[0]]) + 0.03 * n
+        data = [*n, n @ (X + u) - offset - gap, rng.uniform(1, 20), 200.0, *old]
+        yield _case("contact_friction", label, X, [*u, -1.5, 0.3], [offset, 0.3], data)
 
 
 def supports(rng: np.random.Generator) -> Iterator[Case]:

@@ -321,5 +321,9 @@ def test_states_cover_every_branch() -> None:
     assert signs == {(True, False, True), (False, True, True), (False, False, False)}
     gaps = {oracles.residual(s)[0] == 0 for s in STATES if s.family == "contact"}
     assert gaps == {True, False}
+    rubbing = [s for s in STATES if s.family == "contact_friction"]
+    closed = [s for s in rubbing if oracles.residual(s)[0] != 0]
+    sticking = [s for s in closed if oracles.tangent(s)[3][3] == 0]
+    assert len(rubbing) > len(closed) > len(sticking) > 0
     assert {s.family for s in STATES} == set(oracles.RESIDUALS)
     assert set(SOLIDS) < {s.family for s in STATES}

@@ -51,3 +51,32 @@ def tangent_contact(
 ) -> Matrix:
     """Differences of the residual (the state must not sit on the switch)."""
     return jacobian(lambda v: residual_contact(X, v, data, parameters), dofs)
+
+
+def residual_friction(
+    X: Sequence[Number],
+    dofs: Sequence[Number],
+    data: Sequence[Number],
+    parameters: Sequence[Number],
+) -> Vector:
+    """(u_z, u_r, lambda, tau): open, sticking where |tau + rho s| <= mu p, else slipping."""
+    n_z, n_r, c, area, rho, z_old, r_old = data
+    offset, friction = parameters
+    normal = dofs[2] + rho * (n_z * (X[0] + dofs[0]) + n_r * (X[1] + dofs[1]) - c - offset)
+    if normal > 0:
+        return [mpf(0), mpf(0), -area * dofs[2] / rho, -area * dofs[3] / rho]
+    slip = n_r * (dofs[0] - z_old) - n_z * (dofs[1] - r_old)
+    along, most = dofs[3] + rho * slip, -friction * normal
+    equation = area * slip
+    if abs(along) > most:
+        along = most if along > 0 else -most
+        equation = area * (along - dofs[3]) / rho
+    forces = [area * (normal * n_z + along * n_r), area * (normal * n_r - along * n_z)]
+    return [*forces, area * (normal - dofs[2]) / rho, equation]
+
+
+def tangent_friction(
+    X: Sequence[Number], dofs: Vector, data: Sequence[Number], parameters: Sequence[Number]
+) -> Matrix:
+    """Differences of the residual (the state must not sit on a switch)."""
+    return jacobian(lambda v: residual_friction(X, v, data, parameters), dofs)

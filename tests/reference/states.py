@@ -122,6 +122,16 @@ def rubber_states() -> Iterator[State]:
                 yield State(f"sheet_{name}", label, (0.1, 25.4), e, tuple(own))
 
 
+FRICTION = (
+    ("open", 0.4, 0.11, 1.5),
+    ("sticking", -0.3, 0.1, 0.5),
+    ("sticking-by-multiplier", -0.3, 0.11, -4.0),
+    ("slipping-forth", -0.3, 0.4, 3.0),
+    ("slipping-back", -0.3, -0.2, 1.0),
+)
+"""Label, u_r, u_z and tau of the frictional contact."""
+
+
 def boundary_states() -> Iterator[State]:
     """Follower pressure, and contact in both branches with full and partial force weight."""
     rng = np.random.default_rng(1991)
@@ -144,6 +154,9 @@ def boundary_states() -> Iterator[State]:
             (0.0125, weight),
             (0.28, 0.96, 24.25, 18.7, 130.0),
         )
+    for label, u_r, u_z, tau in FRICTION:
+        dofs, data = (u_z, u_r, -4.0, tau), (0.28, 0.96, 24.25, 18.7, 130.0, 0.1, -0.31)
+        yield State("contact_friction", label, (0.2, 25.2), dofs, (0.0125, 0.4), data)
 
 
 def section_states() -> Iterator[State]:
