@@ -288,7 +288,7 @@ def test_resume_and_jobs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("assignment", "words"),
     [
-        ("profile=wegde", '"wedge", "parabola", "cosine" or "exponential"'),
+        ("profile=wegde", '"wedge", "parabola", "cosine", "exponential" or "pocket"'),
         ("h0=0", "h0 = 0"),
         ("start=2", "start = 2 must be less than end = 0.75"),
         ("speeds=[0]", "a number is 0; allowed: speeds U"),
