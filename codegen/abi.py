@@ -24,21 +24,29 @@ not overlap.  Units are those of the model's page (mm, MPa, N, s in the shipped 
 |               |                      | point                                                    |
 | `parameters`  | nparameters          | constants of the call, in the manifest's order           |
 | `direction`   | n, ndof              | vector that task `product` multiplies by the tangent     |
+|               | n, ncoordinates +    | variation of an element that the tasks `pseudo_load` and |
+|               | ndata + nparameters  | `fields_rate` follow: of its coordinates, its data (not  |
+|               | (+ ndof)             | those of points), the parameters and, in the second, its |
+|               |                      | dofs                                                     |
 | `rule`        | points, dimension + 1| parent coordinates of each point, then its weight        |
 | `basis`       | points, modes,       | value and xi-derivative of the interpolating shapes, one |
 |               | components           | pair for each interpolated field (2 components a field)  |
 | `values`      | see task             | written, never accumulated                               |
 | `tangent`     | n, ndof, ndof        | written by task `tangent` only, row-major dR_i/du_j      |
 
-| task       | `values`                                            |
-|------------|-----------------------------------------------------|
-| `energy`   | n: the potential (only where the residual has one)  |
-| `residual` | n, ndof: internal minus external virtual work       |
-| `tangent`  | n, ndof: the same residual                          |
-| `product`  | n, ndof: tangent times `direction`                  |
-| `d_NAME`   | n, ndof: derivative of the residual with respect to |
-|            | the parameter, datum or coordinate NAME             |
-| `fields`   | n, points, nfields: values at the quadrature points |
+| task          | `values`                                                   |
+|---------------|------------------------------------------------------------|
+| `energy`      | n: the potential (only where the residual has one)         |
+| `residual`    | n, ndof: internal minus external virtual work              |
+| `tangent`     | n, ndof: the same residual                                 |
+| `product`     | n, ndof: tangent times `direction`                         |
+| `d_NAME`      | n, ndof: derivative of the residual with respect to the    |
+|               | parameter, datum or coordinate NAME                        |
+| `pseudo_load` | n, ndof: derivative of the residual along a variation of   |
+|               | coordinates, data and parameters, its unknowns held        |
+| `fields`      | n, points, nfields: values at the quadrature points        |
+| `fields_rate` | n, points, nfields: derivative of the fields along a       |
+|               | variation of all that they depend on                       |
 
 Pointers that a family does not use (no data, no basis, no parameters, no tangent) may be NULL.
 A kernel keeps no state, allocates nothing, reports nothing: a value outside the model's domain
@@ -91,6 +99,16 @@ class Task(StrEnum):
     TANGENT = "tangent"
     FIELDS = "fields"
     PRODUCT = "product"
+    PSEUDO_LOAD = "pseudo_load"
+    FIELDS_RATE = "fields_rate"
+
+
+AT_POINTS = (Task.FIELDS, Task.FIELDS_RATE)
+"""Tasks whose values are those of the quadrature points."""
+DESIGN = (Task.PSEUDO_LOAD, Task.FIELDS_RATE)
+"""Tasks of sensitivities, which stand in a file of their own."""
+ROLLED = (*AT_POINTS, Task.PSEUDO_LOAD)
+"""Tasks whose loop over the points is never written out: they are called once a state."""
 
 
 class Target(StrEnum):

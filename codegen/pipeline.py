@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from types import ModuleType
 
-from softehl.codegen.abi import Target, Task
+from softehl.codegen.abi import AT_POINTS, DESIGN, ROLLED, Target
 from softehl.codegen.derive import structure, variants
 from softehl.codegen.derive.outputs import Entry, placed
 from softehl.codegen.derive.structure import Structure
@@ -70,11 +70,15 @@ class Function:
 
 @dataclass(frozen=True)
 class KernelSource:
-    """A kernel family: its model, its C file and its functions by task."""
+    """A kernel family: its model, its C file and its functions by task.
+
+    design: a second C file with the tasks of sensitivities, empty where none is offered.
+    """
 
     definition: Definition
     text: str
     functions: Mapping[str, Function]
+    design: str = ""
 
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
@@ -83,12 +87,21 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     if target is Target.UFCX:
         tasks = emit_ufcx.tasks(definition, tasks)
     functions = {t: compile_task(definition, t, target) for t in tasks}
-    texts = [f.text for f in functions.values()]
     if target is Target.UFCX:
+        texts = [f.text for f in functions.values()]
         return KernelSource(definition, emit_ufcx.source(definition, texts), functions)
-    called = dict.fromkeys(r for f in functions.values() for r in f.routines)
+    design = [f for t, f in functions.items() if t in DESIGN]
+    others = [f for t, f in functions.items() if t not in DESIGN]
+    text, more = _file(definition, others), _file(definition, design) if design else ""
+    return KernelSource(definition, text, functions, more)
+
+
+def _file(definition: Definition, functions: Sequence[Function]) -> str:
+    """The C file of some functions, with what they call."""
+    texts = [f.text for f in functions]
+    called = dict.fromkeys(r for f in functions for r in f.routines)
     before = emit_routines.texts(definition, called) + emit_simd.wrappers("".join(texts))
-    return KernelSource(definition, emit_source.source(definition, texts, before), functions)
+    return emit_source.source(definition, texts, before)
 
 
 def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Function:
@@ -111,8 +124,8 @@ def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Func
 
 
 def _passes(d: Definition, task: str) -> Sequence[passes.Pass]:
-    """The loop over the points is written out where the model says so, never for fields."""
-    if not d.unroll or task == Task.FIELDS:
+    """The loop over the points is written out where the model says so and the task allows it."""
+    if not d.unroll or task in ROLLED:
         return passes.STANDARD
     return passes.straight_line(_points(d), (len(d.data), len(d.point_data)))
 
@@ -132,7 +145,7 @@ def _printer(target: Target, task: str, plan: Schedule) -> ModuleType:
     """Several elements at once where wanted and fit; fields are stored point by point."""
     if target is Target.UFCX:
         return emit_ufcx
-    at_once = target is Target.SIMD and task != Task.FIELDS and emit_simd.suits(plan)
+    at_once = target is Target.SIMD and task not in AT_POINTS and emit_simd.suits(plan)
     return emit_simd if at_once else emit_c
 
 

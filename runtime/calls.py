@@ -114,7 +114,7 @@ class Call:
             *self._constants(given),
             _NOTHING
             if given.direction is None
-            else self._array("direction", given.direction, (self.n, self.ndof)),
+            else self._array("direction", given.direction, (self.n, self._along(task, width))),
             *self._tables(),
         )
 
@@ -122,6 +122,13 @@ class Call:
         """Call the C function; `values` and `tangent` are written in place."""
         self.function((self.n, len(self.rule.weights), self.modes), self.read, values, tangent)
         return values
+
+    def _along(self, task: str, width: int) -> int:
+        """Values of `direction` for an element: of its coordinates, data, parameters and dofs."""
+        if task == "product":
+            return self.ndof
+        design = width + len(self.kernel.data) + len(self.kernel.parameters)
+        return design + (self.ndof if task == "fields_rate" else 0)
 
     def _rule(self, given: Rule | None) -> Rule:
         if given is None:

@@ -72,6 +72,22 @@ class Kernel(Family):
         call = Call(self, f"d_{name}", coordinates, dofs, Given(**given))
         return call.run(np.empty((call.n, call.ndof)))
 
+    def pseudo_load(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+        """Derivative of the residual along a variation of the elements, unknowns held: (n, ndof).
+
+        direction: (n, coordinates + data + parameters), how each of these moves, in this order.
+        """
+        call = Call(self, "pseudo_load", coordinates, dofs, Given(direction=direction, **given))
+        return call.run(np.empty((call.n, call.ndof)))
+
+    def fields_rate(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+        """Derivative of `fields_at` along a variation: (n, points, len(fields)).
+
+        direction: (n, coordinates + data + parameters + ndof), how each of these moves.
+        """
+        call = Call(self, "fields_rate", coordinates, dofs, Given(direction=direction, **given))
+        return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
+
     def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Post-processing values at the quadrature points, (n, points, len(fields))."""
         call = Call(self, "fields", coordinates, dofs, Given(**given))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from softehl.codegen.abi import Task, derivative_task
+from softehl.codegen.abi import AT_POINTS, Task, derivative_task
 from softehl.codegen.derive import modal
 from softehl.codegen.derive.linearise import Linearisation
 from softehl.codegen.derive.outputs import Entry, Slot
@@ -30,6 +30,8 @@ def tasks(d: Definition) -> list[str]:
         offered.append(Task.PRODUCT)
     if d.tasks is not None:
         offered = [t for t in offered if t in d.tasks]
+    asked = {Task.PSEUDO_LOAD: d.pseudo_load, Task.FIELDS_RATE: d.fields_rate}
+    offered += [task for task, wanted in asked.items() if wanted]
     return offered + [derivative_task(name) for name, _ in d.derivatives]
 
 
@@ -47,13 +49,16 @@ def outputs(d: Definition, task: str) -> list[Entry]:
 
 
 def differentiated(task: str) -> bool:
-    """False for what the page writes down itself."""
-    return task not in (Task.ENERGY, Task.FIELDS)
+    """False for what the page writes down itself, and for the rates of it."""
+    return task not in (Task.ENERGY, *AT_POINTS)
 
 
 def variants(d: Definition, task: str, found: Structure | None) -> Iterator[Variant]:
     """The outputs of a task by different chain rules: passes will tell which is the cheapest."""
-    if not differentiated(task):
+    if task == Task.FIELDS_RATE:
+        values = [Entry(Slot(False, k), None, n) for k, (_, n) in enumerate(d.fields)]
+        yield Variant("along a variation", _rates(d, task, values))
+    elif not differentiated(task):
         nodes = [d.potential] if task == Task.ENERGY else [n for _, n in d.fields]
         yield Variant(
             "none, the page writes it down",
@@ -61,6 +66,9 @@ def variants(d: Definition, task: str, found: Structure | None) -> Iterator[Vari
         )
     elif task in (Task.RESIDUAL, Task.TANGENT):
         yield from _rules(d, task, found)
+    elif task == Task.PSEUDO_LOAD:
+        for rule in _rules(d, Task.RESIDUAL, found):
+            yield Variant(f"along a variation, {rule.rule}", _rates(d, task, rule.entries))
     else:
         residual = next(_rules(d, Task.RESIDUAL, found))
         yield Variant(f"along one direction, {residual.rule}", _rates(d, task, residual.entries))
@@ -90,17 +98,40 @@ def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
     """The derivative of the residual `rows` along `direction` or with respect to one argument."""
     g = d.graph
     if task == Task.PRODUCT:
-        array = {"dofs": "direction", "interpolated": "interpolated direction"}
-        seeds = {
-            u: g.input(array[u.payload.array], u.payload.index, varying=u.varying)
-            for u in d.directions
-            if isinstance(u.payload, Input)
-        }
+        seeds = _moved_unknowns(d, 0)
+    elif task == Task.PSEUDO_LOAD:
+        seeds = _moved_arguments(d)
+    elif task == Task.FIELDS_RATE:
+        first = d.coordinate_width + len(d.data) + len(d.parameters)
+        seeds = {**_moved_arguments(d), **_moved_unknowns(d, first)}
     else:
         by_task = {derivative_task(name): node for name, node in d.derivatives}
         seeds = {by_task[task]: g.one}
     rates = directional(g, [x.node for x in rows], seeds, d.given)
     return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
+
+
+def _moved_unknowns(d: Definition, first: int) -> dict[Node, Node]:
+    """Unknowns that move along `direction`, where theirs begin at the entry `first`."""
+    array = {"dofs": ("direction", first), "interpolated": ("interpolated direction", 0)}
+    seeds = {}
+    for u in d.directions:
+        assert isinstance(u.payload, Input)
+        name, offset = array[u.payload.array]
+        seeds[u] = d.graph.input(name, offset + u.payload.index, varying=u.varying)
+    return seeds
+
+
+def _moved_arguments(d: Definition) -> dict[Node, Node]:
+    """Coordinates, data and parameters that move along `direction`, in this order."""
+    widths = {
+        "coordinates": d.coordinate_width,
+        "data": len(d.data),
+        "parameters": len(d.parameters),
+    }
+    places = ((array, k) for array, width in widths.items() for k in range(width))
+    g = d.graph
+    return {g.input(*place): g.input("direction", n) for n, place in enumerate(places)}
 
 
 def _slots(d: Definition) -> list[Slot]:

@@ -10,13 +10,16 @@ from softehl.codegen.emit.printer import Printer, dofs_expression
 from softehl.codegen.language.definition import Definition
 
 
-def gather(p: Printer, value: str, array: str) -> None:
-    """Values and xi-derivatives of the interpolated fields at the point."""
+def gather(p: Printer, value: str, array: str, before: int = 0) -> None:
+    """Values and xi-derivatives of the interpolated fields at the point.
+
+    before: entries of the array that stand before those of the dofs.
+    """
     names = [f"{value}{k}" for k in range(p.d.components)]
     p.line(3, f"double {', '.join(f'{name} = 0.0' for name in names)};")
     p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
     for name, shape in zip(names, _shapes(p.d, "i"), strict=True):
-        p.line(4, f"{name} += {shape} * {array}[{len(p.d.unknowns)} + i];")
+        p.line(4, f"{name} += {shape} * {array}[{before + len(p.d.unknowns)} + i];")
     p.line(3, "}")
     p.line(3, f"{', '.join(f'(void){name}' for name in names)};")
 

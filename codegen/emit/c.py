@@ -7,7 +7,13 @@ from collections.abc import Sequence
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
 from softehl.codegen.emit import basis
-from softehl.codegen.emit.printer import Printer, data_expression, dofs_expression
+from softehl.codegen.emit.printer import (
+    Printer,
+    data_expression,
+    design_width,
+    direction_expression,
+    dofs_expression,
+)
 from softehl.codegen.emit.schedule import Loop, Schedule
 from softehl.codegen.graph.graph import Op
 from softehl.codegen.graph.traverse import reachable
@@ -25,7 +31,7 @@ def function(
     if fallible:
         p.line(2, "int failed = 0;")
     scattered = [x for x in entries if _in_loop(x)]
-    if scattered and task != abi.Task.FIELDS:
+    if scattered and task not in abi.AT_POINTS:
         _clear(p, task)
     for stage in plan.stages:
         p.block(2, stage.before)
@@ -51,16 +57,17 @@ def _pointers(p: Printer, task: str) -> None:
     p.line(2, f"const double *restrict d = dofs + {dofs_expression(d)} * e;")
     if d.data or d.point_data:
         p.line(2, f"const double *restrict a = data + {data_expression(d)} * e;")
-    if task == abi.Task.PRODUCT:
-        p.line(2, f"const double *restrict t = direction + {dofs_expression(d)} * e;")
-    if task not in (abi.Task.ENERGY, abi.Task.FIELDS):
+    along = direction_expression(d, task)
+    if along:
+        p.line(2, f"const double *restrict t = direction + {along} * e;")
+    if task not in (abi.Task.ENERGY, *abi.AT_POINTS):
         p.line(2, f"double *restrict R = values + {dofs_expression(d)} * e;")
     if task == abi.Task.TANGENT:
         p.line(
             2, f"double *restrict K = tangent + {dofs_expression(d)} * {dofs_expression(d)} * e;"
         )
     used = [*(["X"] if d.coordinates else []), "d", *(["a"] if d.data or d.point_data else [])]
-    used += ["t"] if task == abi.Task.PRODUCT else []
+    used += ["t"] if along else []
     p.line(2, " ".join(f"(void){name};" for name in used))
 
 
@@ -74,11 +81,10 @@ def _clear(p: Printer, task: str) -> None:
 def _mark(p: Printer, task: str) -> None:
     """A routine without a result spoils its whole element, whatever was computed from it."""
     size = dofs_expression(p.d)
+    fields = f"{len(p.d.fields)} * points"
     sizes = {
         abi.Task.ENERGY: {"values + e": "1"},
-        abi.Task.FIELDS: {
-            f"values + {len(p.d.fields)} * points * e": f"{len(p.d.fields)} * points"
-        },
+        **{key: {f"values + {fields} * e": fields} for key in abi.AT_POINTS},
         abi.Task.TANGENT: {"R": size, "K": f"{size} * {size}"},
     }.get(abi.Task(task) if task in set(abi.Task) else abi.Task.RESIDUAL, {"R": size})
     p.line(2, "if (failed) {")
@@ -89,7 +95,7 @@ def _mark(p: Printer, task: str) -> None:
 
 def _store_after(p: Printer, task: str, entries: Sequence[Entry]) -> None:
     """Outputs that are complete when all loops are done."""
-    if task != abi.Task.FIELDS:
+    if task not in abi.AT_POINTS:
         for x in entries:
             if not _in_loop(x):
                 p.line(2, f"{_target(p.d, task, x)} = {p.ref(x.node)};")
@@ -116,11 +122,13 @@ def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
         basis.gather(p, "p", "d")
         if task == abi.Task.PRODUCT:
             basis.gather(p, "t", "t")
+        if task == abi.Task.FIELDS_RATE:
+            basis.gather(p, "t", "t", design_width(p.d))
     p.block(3, loop.body)
     for s in loop.sums:
         p.line(3, f"{p.ref(s)} += {p.ref(s.args[0])};")
     here = [x for x in entries if x.node in loop.outputs]
-    if here and task == abi.Task.FIELDS:
+    if here and task in abi.AT_POINTS:
         _store_fields(p, here)
     elif here:
         basis.scatter(p, task, here)

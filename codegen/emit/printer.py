@@ -121,6 +121,20 @@ def dofs_expression(d: Definition) -> str:
     return f"({direct} + modes)" if d.interpolated else str(direct)
 
 
+def design_width(d: Definition) -> int:
+    """Length of a variation of an element: its coordinates, its data, the parameters."""
+    return d.coordinate_width + len(d.data) + len(d.parameters)
+
+
+def direction_expression(d: Definition, task: str) -> str:
+    """Values of `direction` for each element, in a task that follows one; else nothing."""
+    if task == abi.Task.PSEUDO_LOAD:
+        return str(design_width(d))
+    if task == abi.Task.FIELDS_RATE:
+        return f"({design_width(d)} + {dofs_expression(d)})"
+    return dofs_expression(d) if task == abi.Task.PRODUCT else ""
+
+
 def data_expression(d: Definition) -> str:
     """Data of one element, those of its points included."""
     if not d.point_data:

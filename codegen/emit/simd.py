@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
-from softehl.codegen.emit.printer import Printer, number
+from softehl.codegen.emit.printer import Printer, direction_expression, number
 from softehl.codegen.emit.schedule import If, Schedule, Statement
 from softehl.codegen.graph.graph import ELEMENTARY, FREE, Input, Node, Op
 from softehl.codegen.graph.traverse import reachable
@@ -120,7 +120,7 @@ _GROUP_UNUSED = "    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void
 def _widths(d: Definition, task: str) -> dict[str, int]:
     """Values per element of each array that a task reads."""
     size = len(d.unknowns)
-    along = size if task == abi.Task.PRODUCT else 0
+    along = int(direction_expression(d, task) or 0)
     coordinates = d.coordinate_width
     data = len(d.data) + len(d.point_data) * len(d.rule.weights)
     return {"coordinates": coordinates, "dofs": size, "data": data, "direction": along}

@@ -41,7 +41,7 @@ def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
             f"Lagrange elements of as many nodes as {known}: choose one of them, or use simd or "
             "scalar"
         )
-    return [t for t in offered if t not in (abi.Task.FIELDS, abi.Task.PRODUCT)]
+    return [t for t in offered if t not in (*abi.ROLLED, abi.Task.PRODUCT)]
 
 
 def chosen(entries: Sequence[Entry], task: str) -> list[Entry]:

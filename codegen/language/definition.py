@@ -50,6 +50,8 @@ class Definition:
     interface: tuple[Node, ...]
     fields: tuple[tuple[str, Node], ...]
     product: bool = False
+    pseudo_load: bool = False
+    fields_rate: bool = False
     derivatives: tuple[tuple[str, Node], ...] = ()
     example: tuple[tuple[str, float], ...] = ()
     tasks: tuple[str, ...] | None = None

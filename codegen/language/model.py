@@ -83,6 +83,7 @@ class Model:
         self._potential: Node | None = None
         self._product = False
         self._norms = 0
+        self._design = (False, False)
         self._derivatives: list[tuple[str, Node]] = []
         self._example: dict[str, float] = {}
         self._conditions: list[Condition] = []
@@ -395,15 +396,20 @@ class Model:
         *,
         tasks: Sequence[str] | None = None,
         product: bool = False,
+        pseudo_load: bool = False,
+        fields_rate: bool = False,
         derivatives: Sequence[Any] = (),
     ) -> None:
         """What is generated: tasks by name, derivatives of the residual by argument.
 
         `tasks` are chosen among energy, residual, tangent (residual and tangent together), fields
         and product; left out, all but the product.  `product` adds the tangent times a vector.
-        `derivatives` lists symbols of parameters, data or coordinates.
+        `pseudo_load` adds the derivative of the residual along a variation of coordinates, data
+        and parameters, `fields_rate` that of the fields: for sensitivities of what a study
+        computes.  `derivatives` lists symbols of parameters, data or coordinates.
         """
-        known = [str(t) for t in Task]
+        known = [str(t) for t in Task if t not in (Task.PSEUDO_LOAD, Task.FIELDS_RATE)]
+        self._design = pseudo_load, fields_rate
         for t in tasks or ():
             if t not in known:
                 raise ModelError(f"no task {t!r}; there are {', '.join(known)}")
@@ -452,6 +458,8 @@ class Model:
             interface=tuple(self._interface),
             fields=(*self._fields, *((f"new_{name}", n) for name, n in self._history)),
             product=self._product,
+            pseudo_load=self._design[0],
+            fields_rate=self._design[1],
             derivatives=tuple(self._derivatives),
             example=tuple(self._example.items()),
             tasks=self._tasks,
@@ -465,6 +473,12 @@ class Model:
         chosen = definition.tasks or ()
         if Task.ENERGY in chosen and not definition.conservative:
             raise ModelError(f"no energy for {self.name}: its residual is not the gradient of one")
+        if any(self._design) and definition.given:
+            raise ModelError(
+                f"no pseudo_load or fields_rate for {self.name}: it gives derivatives of its own"
+            )
+        if definition.fields_rate and not definition.fields:
+            raise ModelError(f"no fields_rate for {self.name}: it declares no fields")
         if Task.FIELDS in chosen and not definition.fields:
             raise ModelError(f"no task fields for {self.name}: it declares none")
         return definition

@@ -32,4 +32,5 @@ def follower_pressure() -> Definition:
             (-ring * z_xi, shapes.interpolate(N, u[1])),
         ]
     )
+    m.offer(pseudo_load=True)
     return m.finish()

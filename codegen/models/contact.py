@@ -42,6 +42,7 @@ def augmented_lagrangian() -> Definition:
     force = m.define("force", sp.Piecewise((area * force_weight * trial, touching), (0, True)))
     slack = m.define("slack", sp.Piecewise((area * gap, touching), (-area * lam / rho, True)))
     m.weak_form([(force * n_z, u_z), (force * n_r, u_r), (slack, lam)])
+    m.offer(pseudo_load=True)
     return m.finish()
 
 

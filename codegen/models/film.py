@@ -75,6 +75,7 @@ def reynolds_segment() -> Definition:
         tau_rod=couette + poiseuille,
         eta=eta,
     )
+    m.offer(pseudo_load=True, fields_rate=True)
     return m.finish()
 
 
@@ -141,6 +142,7 @@ def bubble_model(m: Model, effective: Callable[[Any], Any]) -> Definition:
     W = m.define("W", (R_rod + h_m) * xi + (h[1] - h[0]) / 2 * (xi**2 / 2 - sp.Rational(1, 6)))
     moved = m.define("moved", sp.pi * force_weight * c * delta * z_xi)
     m.weak_form([(moved * W * p_xi, u[1][1] - u[1][0])])
+    m.offer(pseudo_load=True)
     return m.finish()
 
 
@@ -186,4 +188,5 @@ def reynolds_facet() -> Definition:
         ]
     )
     m.fields(x=z[1], h=h, jump=jump, flux=q, flux_jump=fluxes[0] - fluxes[1])
+    m.offer(pseudo_load=True, fields_rate=True)
     return m.finish()

@@ -25,6 +25,7 @@ def _element(name: str, doc: str, terms: Terms, unroll: bool = True) -> tuple[Mo
     m = Model(name, nodes=4, rule=quadrature.gauss(2, 2), unroll=unroll, doc=doc)
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
+    m.offer(pseudo_load=True)
     return m, X, u, [term.declared(m) for term in terms]
 
 

@@ -37,6 +37,7 @@ def mean_rotation() -> Definition:
     spin = z * shapes.interpolate(e.N, u[1]) - r * shapes.interpolate(e.N, u[0])
     density = moment / inertia * e.detJ * (spin - angle * (z**2 + r**2))
     m.potential(m.integral("constraint", density))
+    m.offer(pseudo_load=True)
     return m.finish()
 
 
@@ -64,6 +65,7 @@ def mean_axial() -> Definition:
     e = kin.quad4(m, "", X, xi, eta)
     density = force / area * e.detJ * (shapes.interpolate(e.N, u[0]) - place)
     m.potential(m.integral("constraint", density))
+    m.offer(pseudo_load=True)
     return m.finish()
 
 

@@ -72,6 +72,24 @@ class Oracle:
             unit = [mpmath.mpf(k == index) for k in range(size)]
             return self._rate(state, array, unit, along)
 
+    def pseudo_load(self, state: State, direction: Sequence[Number], along: Rows = None) -> Vector:
+        """Derivative of the residual along a variation of coordinates, data and parameters."""
+        with mpmath.workdps(self.digits):
+            h = mpmath.mpf(10) ** -self.step
+            moved = (_varied(state, s * h, direction) for s in (1, -1))
+            plus, minus = (self._residual(at, exact(at.dofs), along) for at in moved)
+            return [(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)]
+
+    def fields_rate(self, state: State, direction: Sequence[Number]) -> list[Vector]:
+        """Derivative of the fields, [point][field], along a variation that ends with the dofs."""
+        h = mpmath.mpf(10) ** -self.step
+        with mpmath.workdps(self.digits):
+            plus, minus = (self.fields(_varied(state, s * h, direction)) for s in (1, -1))
+            return [
+                [(a - b) / (2 * h) for a, b in zip(*rows, strict=True)]
+                for rows in zip(plus, minus, strict=True)
+            ]
+
     def _rate(self, state: State, array: str, direction: Vector, along: Rows) -> Vector:
         h = mpmath.mpf(10) ** -self.step
         base = exact(getattr(state, array))
@@ -98,6 +116,16 @@ class Oracle:
         return {
             (n, q): walk.at(n, q) for n in self.definition.constant for q in range(len(state.rule))
         }
+
+
+def _varied(state: State, step: Number, direction: Sequence[Number]) -> State:
+    """A state whose coordinates, data, parameters and (if there are more) dofs have moved."""
+    moved, rest = {}, list(direction)
+    for array in ("coordinates", "data", "parameters", "dofs"):
+        values = exact(getattr(state, array))
+        along = (rest[: len(values)] + [0] * len(values))[: len(values)]
+        moved[array], rest = _along(values, step, along), rest[len(values) :]
+    return replace(state, **moved)
 
 
 def _along(values: Vector, step: Number, direction: Sequence[Number]) -> Vector:

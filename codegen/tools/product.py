@@ -18,6 +18,7 @@ def files(kernels: Iterable[KernelSource]) -> dict[str, str]:
     kernels = list(kernels)
     declarations = [abi.declaration(k.definition.name, t) for k in kernels for t in k.functions]
     out = {f"{k.definition.name}.c": k.text for k in kernels}
+    out |= {f"{k.definition.name}_design.c": k.design for k in kernels if k.design}
     out[source.HEADER] = source.header(declarations)
     out["signature.c"] = SIGNATURE_C
     manifest = {k.definition.name: _manifest(k) for k in kernels}
@@ -65,7 +66,8 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "rule": {"points": points, "weights": [float(w.evalf(30)) for w in d.rule.weights]},
         "tasks": {t: _cost(f, len(points)) for t, f in kernel.functions.items()},
         "bytes": len(kernel.text.encode()),
-        "signature": hashlib.sha256(kernel.text.encode()).hexdigest()[:16],
+        "design_bytes": len(kernel.design.encode()),
+        "signature": hashlib.sha256((kernel.text + kernel.design).encode()).hexdigest()[:16],
     }
 
 

@@ -100,15 +100,17 @@ class _Batch:
             _doubles(v for s in states for v in s.dofs),
             _doubles(v for s in states for row in (s.data, *s.point_data) for v in row),
             _doubles(first.parameters),
-            _doubles(v for w in along for v in w),
+            _doubles(()),
             _doubles(v for row in first.rule for v in row),
             _doubles(flat),
         ]
+        self.along = along
         self.modes = len(first.basis[0]) if first.basis else 0
 
     def call(self, task: str) -> tuple[list[Vector], list[Vector]]:
         """Values and, of the task `tangent`, tangents of every state, flat."""
-        width = {abi.Task.ENERGY: 1, abi.Task.FIELDS: self.points * len(self.d.fields)}
+        fields = self.points * len(self.d.fields)
+        width = {abi.Task.ENERGY: 1, **dict.fromkeys(abi.AT_POINTS, fields)}
         wide = width.get(abi.Task(task), self.ndof) if task in set(abi.Task) else self.ndof
         square = self.ndof**2 if task == abi.Task.TANGENT else 0
         n = len(self.states)
@@ -116,8 +118,20 @@ class _Batch:
         function = getattr(self.library, abi.function_name(self.d.name, task))
         function.restype = None
         sizes = (ctypes.c_ssize_t(v) for v in (n, self.points, self.modes))
+        self.arrays[4] = _doubles(v for e in range(n) for v in self.direction(task, e))
         function(*sizes, *self.arrays, values, tangent)
         return _split(values, wide, n), _split(tangent, square, n)
+
+    def direction(self, task: str, e: int) -> Vector:
+        """What a task follows in one element: its unknowns, or a random variation of all else."""
+        if task not in (abi.Task.PSEUDO_LOAD, abi.Task.FIELDS_RATE):
+            return self.along[e]
+        state = self.states[e]
+        rng = random.Random(f"{self.d.name} variation {e}")
+        sizes = [len(state.coordinates), len(state.data), len(state.parameters)]
+        values = [*state.coordinates, *state.data, *state.parameters]
+        varied = [rng.uniform(-1, 1) * abs(float(v)) for v in values[: sum(sizes)]]
+        return varied + (self.along[e] if task == abi.Task.FIELDS_RATE else [])
 
     def silent(self, task: str) -> bool:
         """Whether a model with routines is not-a-number in a whole element: its way to say no."""
@@ -188,12 +202,12 @@ class _Compared:
                 work = max(abs(float(r)) for r in self.residuals[e])
                 size = max(abs(float(exact)), work * max(map(abs, self.states[e].dofs)))
                 yield from self._by_row(values[e], [exact], [size or 1.0])
-            elif task == abi.Task.FIELDS:
-                rows = self.oracle.fields(self.states[e])
+            elif task in abi.AT_POINTS:
+                rows = self._at_points(task, e)
                 sizes = [max(FLOOR, *(abs(float(v)) for v in c)) for c in zip(*rows, strict=True)]
                 expected = [v for row in rows for v in row]
                 yield from self._by_row(values[e], expected, sizes * len(rows))
-            elif task.startswith("d_"):
+            elif task.startswith("d_") or task == abi.Task.PSEUDO_LOAD:
                 expected = self._derivative(task, e)
                 size = max(abs(float(v)) for v in expected) or 1.0
                 yield from self._by_row(self._led(values[e]), expected, [size] * len(expected))
@@ -205,7 +219,16 @@ class _Compared:
                     product = [math.fsum(row) for row in self._rows(e)]
                     yield from self._by_row(self._led(product), self.products[e], self.scales[e])
 
+    def _at_points(self, task: str, e: int) -> list[Vector]:
+        """Fields, or their rates, [point][field]."""
+        if task == abi.Task.FIELDS:
+            return self.oracle.fields(self.states[e])
+        return self.oracle.fields_rate(self.states[e], self.called.direction(task, e))
+
     def _derivative(self, task: str, e: int) -> list[Any]:
+        if task == abi.Task.PSEUDO_LOAD:
+            variation = self.called.direction(task, e)
+            return self.oracle.pseudo_load(self.states[e], variation, self.left)
         node = dict(self.d.derivatives)[task.removeprefix("d_")]
         assert isinstance(node.payload, Input)
         source = node.payload

@@ -27,6 +27,7 @@ def costs(kernels: Mapping[str, Any]) -> Budget:
     out: Budget = {}
     for name, entry in kernels.items():
         out[f"{name} bytes"] = entry["bytes"]
+        out[f"{name} design_bytes"] = entry["design_bytes"]
         for task, cost in entry["tasks"].items():
             out.update({f"{name} {task} {c}": cost[c] for c in COSTS})
     return out

@@ -29,6 +29,7 @@ def test_no_c_file_is_too_large() -> None:
     sizes = {p.name: p.stat().st_size for p in build.GENERATED.glob("*.[ch]")}
     assert {name: size for name, size in sizes.items() if size > LARGEST_FILE} == {}
     assert all(sizes[f"{name}.c"] == shipped()[f"{name} bytes"] for name in ALL)
+    assert all(sizes.get(f"{n}_design.c", 0) == shipped()[f"{n} design_bytes"] for n in ALL)
 
 
 @pytest.mark.parametrize("cost", ["operations", "temporaries", "peak_live"])

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from softehl.codegen.abi import Task, function_name
+from softehl.codegen.abi import AT_POINTS, Task, function_name
 from softehl.codegen.tools import build
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.library import manifest
@@ -105,10 +105,16 @@ def call(case: Case, task: str) -> str:
     rule = case.rule or kernel.default_rule
     table = np.column_stack([rule.points.reshape(len(rule.weights), -1), rule.weights])
     basis = np.empty(0) if rule.basis is None else rule.basis
-    along = case.dofs[::-1] if task == Task.PRODUCT else np.empty(0)
+    variation = np.concatenate([case.coordinates, case.data, case.parameters, case.dofs]) / 7
+    along = {
+        Task.PRODUCT: case.dofs[::-1],
+        Task.PSEUDO_LOAD: variation[: variation.size - case.dofs.size],
+        Task.FIELDS_RATE: variation,
+    }.get(Task(task), np.empty(0))
     inputs = [case.coordinates, case.dofs, case.data, case.parameters, along, table, basis]
     ndof, points = len(case.dofs), len(rule.weights)
-    out = {Task.ENERGY: 1, Task.FIELDS: points * len(kernel.fields)}.get(Task(task), ndof)
+    at_points = dict.fromkeys(AT_POINTS, points * len(kernel.fields))
+    out = {Task.ENERGY: 1, **at_points}.get(Task(task), ndof)
     sizes = [*(a.size for a in inputs), out, ndof * ndof if task == Task.TANGENT else 0]
     modes = basis.shape[1] if basis.size else 0
     name = function_name(case.family, task)
@@ -163,7 +169,11 @@ def test_all_kernels_are_clean_on_every_batch(program: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "array", ["coordinates", "dofs", "data", "parameters", "rule", "basis", "values", "tangent"]
+    "array",
+    [
+        *("coordinates", "dofs", "data", "parameters", "direction"),
+        *("rule", "basis", "values", "tangent"),
+    ],
 )
 def test_one_double_too_few_is_caught(array: str, program: Path) -> None:
     done = run(program, array)

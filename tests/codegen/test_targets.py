@@ -96,7 +96,7 @@ def test_generate_writes_a_complete_folder_of_scalar_c(
     monkeypatch.setattr(cli, "ALL", {"contact": ALL["contact"]})
     assert cli.generate(target="scalar", out=tmp_path) == 0
     build.build(tmp_path, extra=("-O0",))
-    assert load_kernel("contact", tmp_path).tasks == ("residual", "tangent")
+    assert load_kernel("contact", tmp_path).tasks == ("residual", "tangent", "pseudo_load")
 
 
 def test_another_target_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:

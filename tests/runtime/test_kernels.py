@@ -67,8 +67,17 @@ def arguments(name: str, n: int, rng: np.random.Generator) -> tuple[tuple[Array,
 
 def methods(kernel: Kernel) -> dict[str, Call]:
     by = {t: partial(kernel.derivative, t[2:]) for t in kernel.tasks if t.startswith("d_")}
+    by |= {t: partial(varied, kernel, t) for t in ("pseudo_load", "fields_rate")}
     own = {"fields": "fields_at"}
     return {t: by.get(t) or getattr(kernel, own.get(t, t)) for t in kernel.tasks}
+
+
+def varied(kernel: Kernel, task: str, X: Array, u: Array, **given: Any) -> Array:
+    """A task along the variation in which everything grows alike."""
+    width = kernel.nodes * len(kernel.coordinates) + len(kernel.data) + len(kernel.parameters)
+    width += np.shape(u)[1] if task == "fields_rate" else 0
+    result: Array = getattr(kernel, task)(X, u, np.full((len(u), width), 1e-3), **given)
+    return result
 
 
 def solid(n: int, rng: np.random.Generator) -> tuple[Kernel, Array, Array]:
@@ -134,6 +143,7 @@ def test_shapes_and_kinds_of_results(name: str, rng: np.random.Generator) -> Non
         "residual": [(n, ndof)],
         "tangent": [(n, ndof), (n, ndof, ndof)],
         "fields": [(n, points, len(kernel.fields))],
+        "fields_rate": [(n, points, len(kernel.fields))],
     }
     for task, call in methods(kernel).items():
         result = call(*positional, **named)
@@ -306,7 +316,7 @@ def test_missing_arguments_are_named(rng: np.random.Generator) -> None:
 
 def test_a_task_that_is_not_offered_is_named(rng: np.random.Generator) -> None:
     positional, named = arguments("solid_fbar", 1, rng)
-    message = "solid_fbar offers residual, tangent, fields, not energy"
+    message = "solid_fbar offers residual, tangent, fields, pseudo_load, not energy"
     with pytest.raises(ArgumentError, match=message):
         load_kernel("solid_fbar").energy(*positional, **named)
     positional, named = arguments("contact", 1, rng)
