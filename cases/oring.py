@@ -24,8 +24,8 @@ class ORingCase(Case[ORing, FilmRow]):
     selection = ("speeds", "stroke", "solver", "linear", "tolerance")
     ways = ("solver", "linear")
     files = (
-        *("leakage.csv", "contact_*.csv", "contact_*.vtu"),
-        *(f"{name}.{kind}" for name in PICTURES for kind in ("png", "svg")),
+        *("leakage.csv", "fit.csv", "contact_*.csv", "contact_*.vtu"),
+        *(f"{name}.{kind}" for name in (*PICTURES, "fit") for kind in ("png", "svg")),
     )
     shared = "contacts"
 

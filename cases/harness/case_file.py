@@ -17,14 +17,16 @@ from pydantic import ValidationError
 
 from softehl.cases.harness.case import AnyCase, Run, load_case
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.parameters import Parameters
+from softehl.cases.harness.parameters import Parameters, files_of
 from softehl.cases.harness.units import is_quantity
+from softehl.runtime.library import KernelError
 from softehl.runtime.names import meant
 
 Shipped = Mapping[str, str]
 """Name of a case that ships -> its module, which is imported when the case is needed."""
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+_FILE = re.compile(r"(\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./-]*\.[A-Za-z]{1,5}")
 _PHRASE = re.compile(r"[A-Za-z][A-Za-z0-9]*( [A-Za-z0-9][A-Za-z0-9.,]*)+")
 _SHOWN = 60
 _LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end
@@ -53,7 +55,11 @@ def read_case(
 def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:
     """The case `given` (a shipped name or a TOML file), and what the file sets.  BadInput."""
     name, table = (given, {}) if given in shipped else _read_file(given, shipped)
-    return load_case(shipped[name]), table
+    case = load_case(shipped[name])
+    for key in files_of(case.parameters):
+        if given not in shipped and isinstance(table.get(key), str):
+            table[key] = str(Path(given).parent / table[key])
+    return case, table
 
 
 def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
@@ -67,7 +73,8 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
         table = {}
     if list(table) == ["value"]:
         return key, table["value"]
-    if _BARE_WORD.fullmatch(value) or is_quantity(value) or _PHRASE.fullmatch(value):
+    plain = (_BARE_WORD, _PHRASE, _FILE)
+    if is_quantity(value) or any(form.fullmatch(value) for form in plain):
         return key, value
     raise BadInput(
         f"{origin} {key}: {_shorten(value)!r} is not a TOML value; "
@@ -119,6 +126,8 @@ def _validate(
         return kind(**values)
     except ValidationError as error:
         raise BadInput(_one_line(kind, values, origins, error)) from None
+    except KernelError as error:
+        raise BadInput(str(error)) from None
 
 
 def _one_line(

@@ -91,15 +91,24 @@ class Key:
     meaning: str
 
 
-def key(default: Any, meaning: str, *, unit: str = "", bounds: str = "", **limits: Any) -> Any:
+def key(
+    default: Any,
+    meaning: str,
+    *,
+    unit: str = "",
+    bounds: str = "",
+    file: bool = False,
+    **limits: Any,
+) -> Any:
     """Declare a field of a parameter set.
 
     unit: empty for a number without.  bounds: what is allowed, in words; from limits and type if
-    left out.  limits: gt, ge, lt, le and whatever else `pydantic.Field` takes.
+    left out.  file: whether it is the path of a file, which a case file gives relative to itself.
+    limits: gt, ge, lt, le and whatever else `pydantic.Field` takes.
     """
     given = [text.format(limits[name]) for name, text in _BOUNDS.items() if name in limits]
     bounds = bounds or " and ".join(given)
-    extra: dict[str, Any] = {"unit": unit, "bounds": bounds, "meaning": meaning}
+    extra: dict[str, Any] = {"unit": unit, "bounds": bounds, "meaning": meaning, "file": file}
     return Field(default=default, json_schema_extra=extra, **limits)
 
 
@@ -113,6 +122,12 @@ def _values(kind: Any) -> str:
         return ""
     *others, last = map(json.dumps, get_args(kind))
     return f"{', '.join(others)} or {last}"
+
+
+def files_of(kind: type[Parameters]) -> tuple[str, ...]:
+    """The keys that are paths of files."""
+    extras = {name: field.json_schema_extra for name, field in kind.model_fields.items()}
+    return tuple(n for n, extra in extras.items() if isinstance(extra, dict) and extra["file"])
 
 
 def keys_of(kind: type[Parameters]) -> Iterator[Key]:

@@ -26,6 +26,8 @@ _KINDS = {
     "1/MPa": {"1/MPa": 1.0, "1/GPa": 1e-3, "1/Pa": 1e6, "1/bar": 10.0},
     "degrees": {"degrees": 1.0, "degree": 1.0, "deg": 1.0, "°": 1.0},
     "%": {"%": 1.0, "percent": 1.0},
+    "degC": {"degC": 1.0, "°C": 1.0, "C": 1.0},
+    "kg/m3": {"kg/m3": 1.0, "kg/m^3": 1.0, "kg/m³": 1.0, "g/cm3": 1e3, "g/ml": 1e3, "kg/l": 1e3},
 }
 
 _KINEMATIC = ("cSt", "St", "mm2/s", "mm^2/s", "mm²/s", "m2/s")

@@ -31,6 +31,7 @@ WITHOUT_INFLUENCE = (
     *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
     *("viscosity", "pressure_viscosity", "shear_traction", "cavitation_penalty"),
     *("ring", "rod", "squeeze", "gland", "backup", "extrusion_gap"),  # diameters follow from them
+    *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
     *("rotation", "solver", "linear", "upwinding", "error_estimate", "tolerance"),
 )
 """Parameters that the contact stage does not know."""

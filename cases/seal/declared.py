@@ -49,7 +49,7 @@ class Field:
 class Block:
     """Elements of one kernel.
 
-    kernel: its name; {solid} stands for the case's solid element. elements: a set of
+    kernel: its name; {solid} stands for the case's solid. elements: a set of
     `SealSection.elements`. fields: whose unknowns its dof map holds, in this order. group: which
     values its parameters are taken from. layer: whether it belongs to the film in the modified
     Newton iteration, which then treats it exactly. needed: whether a case has it. rule: its
@@ -69,7 +69,7 @@ class Block:
 
     def kernel_of(self, p: ORing) -> str:
         """Name of the kernel in a case."""
-        return self.kernel.format(solid=p.solid)
+        return self.kernel.format(solid=p.solid_kernel)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal import materials
 from softehl.cases.seal.fitting import fitted
+from softehl.cases.seal.oils import with_oil
+from softehl.cases.seal.rubber import require_stable, with_rubber
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
@@ -18,6 +21,12 @@ _LOWEST_ESTIMATED = 3
 
 # strict again on the item: the list itself is lax so that a TOML array becomes a tuple
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
+
+
+Terms = Annotated[
+    tuple[Annotated[float, Field(strict=True, allow_inf_nan=False)], ...],
+    Field(min_length=1, max_length=3, strict=False),
+]
 
 
 class ORing(Parameters):
@@ -124,8 +133,39 @@ class ORing(Parameters):
     section_diameter: float = key(3.53, "diameter of the section D_seal", unit="mm", gt=0)
     rod_diameter: float = key(50.0, "rod diameter D_rod", unit="mm", gt=0)
     housing_diameter: float = key(56.30, "inner diameter of the housing D_housing", unit="mm", gt=0)
-    mu_1: float = key(3.04, "Mooney-Rivlin parameter mu_1 of (3)", unit="MPa", gt=0, le=1000)
-    mu_2: float = key(0.62, "Mooney-Rivlin parameter mu_2 of (3)", unit="MPa", ge=0, le=1000)
+    material: materials.Name = key("mooney-rivlin", "rubber")
+    mu_1: float | None = key(3.04, "Mooney-Rivlin parameter mu_1 of (3)", unit="MPa", gt=0, le=1000)
+    mu_2: float | None = key(0.62, "Mooney-Rivlin parameter mu_2 of (3)", unit="MPa", ge=0, le=1000)
+    mu: float | None = key(
+        None, "modulus mu of neo-hooke, arruda-boyce and gent", unit="MPa", gt=0, le=1000
+    )
+    c_10: float | None = key(None, "Yeoh coefficient of I1bar - 3", unit="MPa", gt=0, le=1000)
+    c_20: float | None = key(None, "Yeoh coefficient of (I1bar - 3)^2", unit="MPa", ge=-1e3, le=1e3)
+    c_30: float | None = key(None, "Yeoh coefficient of (I1bar - 3)^3", unit="MPa", ge=-1e3, le=1e3)
+    ogden_mu: Terms | None = key(
+        None, "Ogden moduli mu_p", unit="MPa", bounds="a list of 1 to 3 numbers"
+    )
+    ogden_alpha: Terms | None = key(
+        None, "Ogden exponents alpha_p", bounds="a list of 1 to 3 numbers, none 0"
+    )
+    lambda_m: float | None = key(
+        None, "Arruda-Boyce stretch at which the chains lock", gt=1, le=1000
+    )
+    J_m: float | None = key(None, "Gent limit of I1bar - 3", gt=0, le=1e6)
+    shore_A: float | None = key(
+        None,
+        "hardness Shore A, for mu by Gent's rule; +- 5 Shore are about +- 25 % of it",
+        bounds="20 to 90",
+        ge=20,
+        le=90,
+    )
+    fit: str | None = key(
+        None,
+        "tests of the rubber, for the parameters of its material",
+        bounds="a CSV file with the columns test, stretch, stress_MPa",
+        file=True,
+    )
+    ogden_terms: int = key(3, "terms of an Ogden fit", bounds="1, 2 or 3", ge=1, le=3)
     bulk_modulus: float = key(500.0, "bulk modulus kappa of (6)", unit="MPa", gt=0, le=1e5)
     viscosity: float = key(
         6.59e-8,
@@ -134,6 +174,29 @@ class ORing(Parameters):
         bounds='1e-12 to 1e-3; 1e-9 MPa s is 1 mPa s, and "46 mPa s" may be written too',
         ge=1e-12,
         le=1e-3,
+    )
+    oil: str | None = key(
+        None,
+        "an oil by its grade or two viscosities, for viscosity and pressure_viscosity",
+        bounds='"ISO VG 46", "46 cSt at 40 degC, 6.8 cSt at 100 degC"',
+    )
+    temperature: float | None = key(
+        None, "temperature of oil and rubber, where they depend on it", unit="degC", ge=-60, le=200
+    )
+    oil_density: float | None = key(
+        None,
+        "density of the oil at 15 degC",
+        unit="kg/m3",
+        bounds="500 to 2000, left out = 870",
+        ge=500,
+        le=2000,
+    )
+    roelands: float | None = key(
+        None,
+        "Roelands' pressure-viscosity index z, for pressure_viscosity",
+        bounds="0 to 2",
+        ge=0,
+        le=2,
     )
     cavitation_penalty: float = key(
         1.0e4, "cavitation penalty epsilon of (25)", unit="mm/(MPa s)", gt=0
@@ -165,8 +228,8 @@ class ORing(Parameters):
 
     @classmethod
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
-        """Diameters and width from ring, rod, squeeze and gland.  ValueError."""
-        return fitted(given)
+        """Diameters and width from ring, rod, squeeze and gland; rubber and oil.  ValueError."""
+        return with_oil(with_rubber(fitted(given)))
 
     @property
     def given_arc(self) -> tuple[float, float] | None:
@@ -177,7 +240,23 @@ class ORing(Parameters):
     @property
     def shear_modulus(self) -> float:
         """Shear modulus in the initial configuration, mu of (3) [MPa]."""
-        return self.mu_1 + self.mu_2
+        return materials.shear_modulus(materials.MATERIALS[self.material], self._rubber)
+
+    @property
+    def rubber_values(self) -> dict[str, float]:
+        """Parameters of the solid's kernel."""
+        own = materials.MATERIALS[self.material].kernel_values(self._rubber)
+        return {**own, "kappa": self.bulk_modulus}
+
+    @property
+    def solid_kernel(self) -> str:
+        """Name of the solid's kernel: element, and energy where it is not the paper's."""
+        energy = materials.MATERIALS[self.material].energy
+        return f"solid_{self.solid}" + ("" if energy == "mooney_rivlin" else f"_{energy}")
+
+    @property
+    def _rubber(self) -> dict[str, Any]:
+        return {key: getattr(self, key) for key in materials.KEYS}
 
     @field_validator("density", mode="before")
     @classmethod
@@ -193,6 +272,17 @@ class ORing(Parameters):
         if len(set(speeds)) < len(speeds):
             raise ValueError("a speed is given twice")
         return speeds
+
+    @model_validator(mode="after")
+    def _rubber_is_sound(self) -> Self:
+        energy = materials.MATERIALS[self.material].energy
+        if self.solid != "taylor_mean" and energy != "mooney_rivlin":
+            raise ValueError(
+                f'material = "{self.material}" and solid = "{self.solid}": other elements than '
+                '"taylor_mean" have "mooney-rivlin" and "neo-hooke" alone; leave solid out'
+            )
+        require_stable(self.material, self._rubber)
+        return self
 
     @model_validator(mode="after")
     def _rule_is_rich_enough(self) -> Self:

@@ -51,7 +51,7 @@ FIELDS = (
 )
 
 BLOCKS = (
-    Block(SOLID, "solid_{solid}", "cells", (DISPLACEMENT,), "solid"),
+    Block(SOLID, "{solid}", "cells", (DISPLACEMENT,), "solid"),
     Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
     Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
     Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
@@ -89,7 +89,7 @@ def obstacles_of(p: ORing) -> dict[str, Obstacle]:
 def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | None:
     """What a block of the unloaded contact problem may ask for; None where it is switched off."""
     if block.group == "solid":
-        return {"mu_1": p.mu_1, "mu_2": p.mu_2, "kappa": p.bulk_modulus}
+        return p.rubber_values
     if block.group == "load":
         return {"pressure": 0.0}
     if block.group == "contact":

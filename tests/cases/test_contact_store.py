@@ -46,8 +46,30 @@ OTHER = {
 }
 """Another value of every parameter that the contact stage does not know."""
 
-OTHER_WORDS = {"ring", "rod", "squeeze", "gland", "backup", "extrusion_gap"}
-"""Other words for the diameters and the width, which are what matters."""
+OTHER_WORDS = {
+    *("ring", "rod", "squeeze", "gland", "backup", "extrusion_gap"),
+    *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
+}
+"""Other words for the diameters and the width, for rubber and oil, which are what matters."""
+
+YEOH = {"material": "yeoh", "c_10": 1.83, "c_20": 0.0, "c_30": 0.0, "solid": "taylor_mean"}
+OGDEN = {"material": "ogden", "ogden_mu": (3.66,), "ogden_alpha": (2.0,), "solid": "taylor_mean"}
+RUBBERS: dict[str, list[dict[str, Any]]] = {
+    "material": [{"material": "neo-hooke", "mu": 3.04}],
+    "mu": [{"material": "neo-hooke", "mu": mu} for mu in (3.0, 3.1)],
+    **{k: [{**YEOH, k: value} for value in (1.9, 2.0)] for k in ("c_10", "c_20", "c_30")},
+    "ogden_mu": [{**OGDEN, "ogden_mu": (mu,)} for mu in (3.0, 3.1)],
+    "ogden_alpha": [{**OGDEN, "ogden_alpha": (alpha,)} for alpha in (2.1, 2.2)],
+    "lambda_m": [
+        {"material": "arruda-boyce", "mu": 3.0, "lambda_m": value, "solid": "taylor_mean"}
+        for value in (4.0, 5.0)
+    ],
+    "J_m": [
+        {"material": "gent", "mu": 3.0, "J_m": value, "solid": "taylor_mean"}
+        for value in (40.0, 50.0)
+    ],
+}
+"""For every key of a rubber beside the paper's, cases that differ from each other by it."""
 
 CHANGED = {
     "mesh": "graded",
@@ -100,13 +122,14 @@ def test_every_parameter_either_matters_or_does_not() -> None:
     assert set(OTHER) | OTHER_WORDS | {"tolerance"} == set(WITHOUT_INFLUENCE)
     assert contact_key(case(rod=50.5)) == contact_key(case(rod_diameter=50.5))
     assert contact_key(case(rod=50.5)) != contact_key(case())
-    assert set(CHANGED) == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
+    assert set(CHANGED) | set(RUBBERS) == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
     key = contact_key(case())
     assert contact_key(case(**OTHER)) == key
     graded = case(mesh="graded"), case(mesh="graded", tolerance=0.7)
     assert contact_key(graded[0]) == contact_key(graded[1])
     keys = {contact_key(case(**{name: value})) for name, value in CHANGED.items()}
-    assert len(keys | {key}) == len(CHANGED) + 1
+    rubbers = [contact_key(case(**given)) for cases in RUBBERS.values() for given in cases]
+    assert len({key, *keys, *rubbers}) == 1 + len(CHANGED) + len(rubbers)
 
 
 def test_a_second_curve_has_no_contact_path(solved: tuple[Path, Outcome], contacts: Path) -> None:

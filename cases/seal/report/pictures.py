@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure
+from softehl.cases.seal.report.fit import fit_figure, fit_of, write_residuals
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.state import FilmRow
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from softehl.cases.seal.parameters import ORing
 
 PICTURES = ("curve", "profiles", "section")
-"""Names of the files, each .png and .svg."""
+"""Names of the files, each .png and .svg; `fit` too where the rubber was fitted to tests."""
 
 
 def write_plots(
@@ -36,6 +37,9 @@ def write_plots(
     with matplotlib.rc_context(style.STYLE):
         style.save(curve_figure(p, rows, rejected), folder / "curve")
         style.save(profiles_figure(p, results), folder / "profiles")
+        if found := fit_of(p):
+            write_residuals(found, folder / "fit.csv")
+            style.save(fit_figure([found]), folder / "fit")
         if views:
             style.save(section_figure(p, views), folder / "section")
 

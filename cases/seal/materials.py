@@ -1,0 +1,151 @@
+"""Rubbers: what a material asks for, its kernels, its shear modulus and where it is stable.
+
+The energies are in `codegen/language/materials.py`. Each has a kernel of the solid, and one of a
+sheet (`codegen/models/sheet.py`), an incompressible unit volume at principal logarithmic strains:
+that is where stresses of tests, moduli and stability come from, and nothing is written twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import log
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Flags
+from softehl.runtime.kernels import Kernel, load_kernel
+
+Name = Literal["mooney-rivlin", "neo-hooke", "yeoh", "ogden", "arruda-boyce", "gent"]
+Values = Mapping[str, float]
+
+TERMS = 3
+"""Terms of the Ogden kernel."""
+
+RANGE = (0.6, 1.6)
+"""Stretches between which a rubber of a seal must be stable."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """A material: its keys in a case, and the energy of its kernels.
+
+    moduli: those of its keys that are stresses. shore: whether one modulus and the other keys make
+    it, so that a hardness may stand for the modulus.
+    """
+
+    energy: str
+    keys: tuple[str, ...]
+    moduli: tuple[str, ...]
+    shore: bool = False
+
+    @property
+    def sheet(self) -> Kernel:
+        """Its kernel of a sheet."""
+        return load_kernel(f"sheet_{self.energy}")
+
+    def kernel_values(self, given: Mapping[str, Any]) -> dict[str, float]:
+        """Parameters of its kernels (without the bulk modulus) from the keys of a case."""
+        values = {key: given[key] for key in self.keys}
+        if "ogden_mu" in values:
+            return _ogden(values["ogden_mu"], values["ogden_alpha"])
+        if self.energy == "mooney_rivlin":
+            return {"mu_1": values.get("mu_1", values.get("mu")), "mu_2": values.get("mu_2", 0.0)}
+        names = {"c_10": "c_1", "c_20": "c_2", "c_30": "c_3"}
+        return {names.get(key, key): value for key, value in values.items()}
+
+
+def _ogden(mu: Sequence[float], alpha: Sequence[float]) -> dict[str, float]:
+    """Terms that are not there have no modulus."""
+    rest = TERMS - len(mu)
+    pairs = zip([*mu, *[0.0] * rest], [*alpha, *[2.0] * rest], strict=True)
+    return {
+        name: value
+        for k, (m, a) in enumerate(pairs, 1)
+        for name, value in ((f"mu_{k}", m), (f"alpha_{k}", a))
+    }
+
+
+MATERIALS: dict[str, Material] = {
+    "mooney-rivlin": Material("mooney_rivlin", ("mu_1", "mu_2"), ("mu_1", "mu_2")),
+    "neo-hooke": Material("mooney_rivlin", ("mu",), ("mu",), shore=True),
+    "yeoh": Material("yeoh", ("c_10", "c_20", "c_30"), ("c_10", "c_20", "c_30")),
+    "ogden": Material("ogden", ("ogden_mu", "ogden_alpha"), ("ogden_mu",)),
+    "arruda-boyce": Material("arruda_boyce", ("mu", "lambda_m"), ("mu",), shore=True),
+    "gent": Material("gent", ("mu", "J_m"), ("mu",), shore=True),
+}
+"""Materials by the names that a case gives them."""
+
+KEYS = tuple(dict.fromkeys(key for m in MATERIALS.values() for key in m.keys))
+"""Every key of a material."""
+
+
+def shear_modulus(material: Material, given: Mapping[str, Any]) -> float:
+    """Shear modulus without deformation, MPa."""
+    values = material.kernel_values(given)
+    if material.energy == "mooney_rivlin":
+        return values["mu_1"] + values["mu_2"]
+    return _modulus(material.energy, tuple(values.items()))
+
+
+@cache
+def _modulus(energy: str, values: tuple[tuple[str, float], ...]) -> float:
+    # the energy of small strains is mu (e_1^2 + e_2^2 + e_3^2) with e_3 = -e_1 - e_2
+    kernel = load_kernel(f"sheet_{energy}")
+    _, K = kernel.tangent(np.ones((1, 2)), np.zeros((1, 2)), parameters=dict(values))
+    return float(K[0, 0, 0]) / 4.0
+
+
+# --- tests of a rubber ------------------------------------------------------------------------
+
+SECOND = {"uniaxial": -0.5, "biaxial": 1.0, "shear": 0.0}
+"""Test -> logarithmic strain across over that along; `shear` is planar tension, pure shear."""
+
+
+def strains(test: str, stretch: Array) -> Array:
+    """Principal logarithmic strains (n, 2) of a test at its stretches (n,)."""
+    along = np.log(stretch)
+    return np.stack([along, SECOND[test] * along], axis=1)
+
+
+def nominal_stress(material: Material, values: Values, e: Array, stretch: Array) -> Array:
+    """Nominal stress (n,) of an incompressible rubber along the first strain of e (n, 2), MPa."""
+    R = material.sheet.residual(np.ones((len(e), 2)), e, parameters=dict(values))
+    return np.asarray(R[:, 0] / stretch)
+
+
+def stress_by(material: Material, name: str, values: Values, e: Array, stretch: Array) -> Array:
+    """Derivative (n,) of the nominal stress by a parameter of the kernel."""
+    places = np.ones((len(e), 2))
+    R = material.sheet.derivative(name, places, e, parameters=dict(values))
+    return np.asarray(R[:, 0] / stretch)
+
+
+def unstable_at(
+    material: Material,
+    values: Values,
+    limits: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> tuple[str, float] | None:
+    """The test and the stretch nearest to 1 at which Drucker's criterion fails, if one does.
+
+    Asked is that the true stresses grow with the logarithmic strains in every direction, in every
+    test within RANGE or the wider limits given for it.
+    """
+    found = []
+    for test in SECOND:
+        low, high = limits.get(test, RANGE)
+        steps = np.linspace(log(min(low, RANGE[0])), log(max(high, RANGE[1])), 241)
+        e = strains(test, np.exp(steps))
+        _, K = material.sheet.tangent(np.ones((len(e), 2)), e, parameters=dict(values))
+        wrong = steps[np.logical_not(_positive(K))]
+        found += [(abs(s), test, float(np.exp(s))) for s in wrong]
+    return min(found)[1:] if found else None
+
+
+def _positive(K: Array) -> Flags:
+    """Which of the matrices (n, 2, 2) are positive definite; one that is no number is not."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((K[:, 0, 0] > 0.0) & (K[:, 0, 0] * K[:, 1, 1] > K[:, 0, 1] * K[:, 1, 0]))

@@ -1,0 +1,181 @@
+"""From what a user knows of a rubber to the keys of its material: a hardness, tests, or numbers.
+
+Whatever is given twice must agree; what belongs to another material is an error that names both
+keys.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isclose
+from pathlib import Path
+from typing import Any, TypeGuard
+
+from softehl.cases.seal.materials import KEYS, MATERIALS, Material, shear_modulus, unstable_at
+from softehl.cases.seal.rubber_data import fit, read_data
+
+SHORE = (20.0, 90.0)
+"""Hardness Shore A between which Gent's rule is taken."""
+
+_PAPER = {"mu_1": 3.04, "mu_2": 0.62}
+_SAME = 1e-6
+
+
+def youngs_modulus(shore_A: float) -> float:
+    """Young's modulus by Gent's rule from a hardness Shore A, MPa.
+
+    A. N. Gent, Rubber Chem. Technol. 31 (1958) 896: the durometer's pin as a punch on a half-space
+    of linear elasticity, E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)).
+    """
+    return 0.0981 * (56.0 + 7.62336 * shore_A) / (0.137505 * (254.0 - 2.54 * shore_A))
+
+
+def shore_band(shore_A: float, tolerance: float = 5.0) -> tuple[float, float]:
+    """How far the modulus is off at most, in per cent, below and above, by +- 5 Shore A.
+
+    That is how rubbers are sold; the rule itself is no better.
+    """
+    low, middle, high = (youngs_modulus(shore_A + d) for d in (-tolerance, 0.0, tolerance))
+    return 100.0 * (low / middle - 1.0), 100.0 * (high / middle - 1.0)
+
+
+def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a case with those of its material filled in.
+
+    Raises ValueError where something is missing or contradicts; values of wrong types pass, to be
+    refused with their keys.
+    """
+    values = dict(given)
+    shore, table = values.get("shore_A"), values.get("fit")
+    if shore is not None and table is not None:
+        raise ValueError(f"shore_A = {shore} and fit = {table!r} contradict: leave one of them out")
+    if values.get("material") is None:
+        values["material"] = "mooney-rivlin" if shore is None else "neo-hooke"
+    material = MATERIALS.get(values["material"]) if isinstance(values["material"], str) else None
+    if material is None:
+        return values
+    source = _source(values, material)
+    _require_own(values, material, source)
+    if _number(shore) and SHORE[0] <= shore <= SHORE[1]:
+        _with_shore(values, material)
+    if isinstance(table, str):
+        _with_fit(values, material, Path(table))
+    if values["material"] == "mooney-rivlin":
+        values.update({k: v for k, v in _PAPER.items() if values.get(k) is None})
+    _require_complete(values, material)
+    return values
+
+
+def _source(values: Mapping[str, Any], material: Material) -> str:
+    """What says which material it is."""
+    if values.get("shore_A") is not None:
+        if not material.shore:
+            names = ", ".join(f'"{n}"' for n, m in MATERIALS.items() if m.shore)
+            raise ValueError(
+                f'shore_A = {values["shore_A"]} and material = "{values["material"]}" contradict: '
+                f"a hardness gives one modulus; allowed are {names}"
+            )
+        return f'shore_A = {values["shore_A"]} (material = "{values["material"]}")'
+    return f'material = "{values["material"]}"'
+
+
+def _require_own(values: dict[str, Any], material: Material, source: str) -> None:
+    """No key of another material; those that have a default elsewhere are emptied."""
+    for key in KEYS:
+        if key in material.keys:
+            continue
+        if values.get(key) is not None:
+            own = " and ".join(material.keys)
+            raise ValueError(
+                f"{key} = {_shown(values[key])} and {source} contradict: it has {own}; "
+                "leave one of them out"
+            )
+        values[key] = None
+
+
+def _with_shore(values: dict[str, Any], material: Material) -> None:
+    mu = youngs_modulus(float(values["shore_A"])) / 3.0
+    others = [key for key in material.keys if key != "mu"]
+    if any(not _number(values.get(key)) for key in others):
+        return
+    unit = shear_modulus(material, {**values, "mu": 1.0})
+    _put(values, "mu", mu / unit, f"shore_A = {values['shore_A']:g}")
+
+
+def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
+    name, terms, heat = values["material"], values.get("ogden_terms"), values.get("temperature")
+    terms = terms if isinstance(terms, int) and 1 <= terms <= 3 else 3
+    found = fit(name, read_data(path), terms, float(heat) if _number(heat) else None)
+    if found.unstable:
+        test, stretch = found.unstable
+        raise ValueError(
+            f'fit = "{path}": material = "{name}" fitted to these tests is not stable in {test} '
+            f"tension at a stretch of {stretch:.3g}; take another material or more tests"
+        )
+    for key, value in found.values.items():
+        _put(values, key, value, f'fit = "{path}"')
+
+
+def _put(values: dict[str, Any], key: str, value: Any, source: str) -> None:
+    """Set a key, or see that it agrees."""
+    before = values.get(key)
+    if before is not None and not _agree(before, value):
+        raise ValueError(
+            f"{key} = {_shown(before)} and {source} contradict: the latter gives "
+            f"{_shown(value)}; leave one of them out"
+        )
+    values[key] = before if before is not None else value
+
+
+def _agree(a: Any, b: Any) -> bool:
+    first, second = (list(x) if isinstance(x, list | tuple) else [x] for x in (a, b))
+    return len(first) == len(second) and all(
+        _number(x) and isclose(x, y, rel_tol=_SAME, abs_tol=1e-12)
+        for x, y in zip(first, second, strict=True)
+    )
+
+
+def _require_complete(values: dict[str, Any], material: Material) -> None:
+    missing = [key for key in material.keys if values.get(key) is None]
+    refused = values.get("shore_A") is not None and missing == ["mu"]  # a hardness out of range
+    if missing and not refused:
+        other = ", or shore_A" if material.shore and missing == ["mu"] else ""
+        raise ValueError(
+            f'material = "{values["material"]}" needs {" and ".join(missing)}{other}, '
+            'or fit = "tests.csv"'
+        )
+
+
+def require_stable(name: str, given: Mapping[str, Any]) -> None:
+    """Raise ValueError where a rubber with these keys is not stable where a seal needs it."""
+    material = MATERIALS[name]
+    if material.energy == "mooney_rivlin":
+        return  # with moduli that are not negative it always is
+    if name == "ogden":
+        _require_pairs(given["ogden_mu"], given["ogden_alpha"])
+    keys = ", ".join(f"{key} = {_shown(given[key])}" for key in material.keys)
+    found = unstable_at(material, material.kernel_values(given))
+    if found:
+        raise ValueError(
+            f'material = "{name}" ({keys}) is not stable in {found[0]} tension at a stretch of '
+            f"{found[1]:.3g} (its stress falls there, or it locks); a seal needs 0.6 to 1.6"
+        )
+
+
+def _require_pairs(mu: tuple[float, ...], alpha: tuple[float, ...]) -> None:
+    if len(mu) != len(alpha):
+        raise ValueError(
+            f"ogden_mu has {len(mu)} and ogden_alpha {len(alpha)} values: a term is a pair of them"
+        )
+    if 0.0 in alpha:
+        raise ValueError("ogden_alpha has a 0: an exponent of 0 is no term; leave it out")
+
+
+def _number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_shown, value))}]"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
