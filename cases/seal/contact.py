@@ -28,9 +28,27 @@ WEDGED = 2
 def held_place(p: ORing) -> float | None:
     """Mean axial displacement (mm) at which contact and film hold a section, None if it is free.
 
-    With the arc of the paper's scheme it is free: the walls of a narrow groove hold it.
+    With the arc of the paper's scheme it is free: the walls of a narrow groove hold it. So it is
+    with friction at housing and walls.
     """
-    return 0.0 if p.sealed_pressure == 0.0 and p.given_arc is None else None
+    free = p.sealed_pressure > 0.0 or p.given_arc is not None or p.rubs
+    return None if free else 0.0
+
+
+def held_moment(p: ORing) -> float | None:
+    """Moment (N mm) on the section in contact and film, None where its mean rotation is held."""
+    return 0.0 if p.rubs else None
+
+
+def assembly(p: ORing) -> str:
+    """The way on which contact is found, in words: with friction the result depends on it."""
+    words = "squeezed with its mean place and rotation held"
+    if p.sealed_pressure > 0.0:
+        words += ", moved to the wall of the air side and pushed into it, unless both walls hold it"
+    words += ", rotation let go by a fading moment" if p.rubs else ""
+    if p.sealed_pressure > 0.0:
+        return words + ", loaded by the pressure from 0 while the push fades"
+    return words + (", place by a fading force" if p.rubs else "")
 
 
 def squeeze_problem(
@@ -57,12 +75,13 @@ def _ways(p: ORing) -> tuple[float, float]:
 def contact_problem(
     system: SealSystem, settings: PathSettings, sealed_pressure: float, force: float = 0.0
 ) -> Problem:
-    """Frictionless contact under a sealed pressure, the rod where the contact stage holds it.
+    """Contact under a sealed pressure, the rod where the contact stage holds it.
 
     force: that pushes the section to the air side, N, where it is not held.
     """
     place = held_place(system.parameters)
-    loads = ContactLoads(sealed_pressure, {ROD: settings.offset}, place, force)
+    moment = held_moment(system.parameters)
+    loads = ContactLoads(sealed_pressure, {ROD: settings.offset}, place, force, moment)
     return system.contact_problem(loads)
 
 
@@ -113,6 +132,31 @@ def lean_stage(system: SealSystem, settings: PathSettings, place: float) -> Stag
         start=0.0,
         stop=1.0,
         steps=StepRule(0.25, 0.005),
+        sealed_pressure=0.0,
+        stroke="both",
+    )
+
+
+def let_go_stage(system: SealSystem, settings: PathSettings, x: Array) -> Stage:
+    """First stage, with friction: what holds the section x fades, and friction takes its place.
+
+    The force of the hold stays where a pressure will replace it.
+    """
+    p, moment, force = system.parameters, system.moment(x), system.axial_force(x)
+    rest = 1.0 if p.sealed_pressure > 0.0 else 0.0
+
+    def at(gone: float) -> Problem:
+        left = force * (rest + (1.0 - rest) * (1.0 - gone))
+        offsets = {ROD: settings.offset}
+        loads = ContactLoads(0.0, offsets, None, left, (1.0 - gone) * moment)
+        return system.contact_problem(loads)
+
+    return Stage(
+        name="let go",
+        problem_at=at,
+        start=0.0,
+        stop=1.0,
+        steps=settings.release_steps,
         sealed_pressure=0.0,
         stroke="both",
     )

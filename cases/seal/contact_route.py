@@ -15,6 +15,7 @@ from softehl.cases.seal.contact import (
     against_wall,
     held_place,
     lean_stage,
+    let_go_stage,
     load_stage,
     squeeze_stage,
     wedged,
@@ -99,6 +100,11 @@ class ContactRoute:
             if isinstance(leaning, StageFailed):
                 return leaning
             x, force = leaning, system.axial_force(leaning)
+        if system.parameters.rubs:
+            free = self.follow(let_go_stage(system, self.settings, x), x)
+            if isinstance(free, StageFailed):
+                return free
+            x = free
         return self.follow(load_stage(system, self.settings, p_s, force), x)
 
     def _graded(self, p: ORing) -> State | StageFailed:

@@ -37,12 +37,14 @@ class Field:
     coefficients of a polynomial), each node of the arc, of the other boundary or of what may touch
     a wall, or the section.
     scale: reference size of its residuals. order: of a film field, None for the case's m_p.
+    needed: whether a case has it.
     """
 
     name: str
     on: Place
     scale: Callable[[ORing], float]
     order: int | None = None
+    needed: Callable[[ORing], bool] = lambda _: True
 
 
 @dataclass(frozen=True)
@@ -117,8 +119,9 @@ class Numbering:
 
     @classmethod
     def of(cls, fields: tuple[Field, ...], p: ORing, section: SealSection) -> Numbering:
-        """Fields one after another."""
-        unknowns = {field.name: number_unknowns(field, p, section) for field in fields}
+        """Fields that the case has, one after another."""
+        present = [field for field in fields if field.needed(p)]
+        unknowns = {field.name: number_unknowns(field, p, section) for field in present}
         layout = DofLayout.of(**{name: u.count for name, u in unknowns.items()})
         return cls(section, unknowns, layout)
 

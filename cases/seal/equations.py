@@ -16,11 +16,14 @@ from softehl.cases.seal.section import SealSection, disc_section
 from softehl.cases.seal.system import (
     AXIAL,
     BLOCKS,
+    BORE,
     DISPLACEMENT,
     FIELDS,
+    FRICTION,
     PRESSURE,
     ROD,
     ROTATION,
+    SHEAR,
     WALLS,
     Values,
     contact_values,
@@ -69,9 +72,7 @@ class SealSystem:
         numbering = Numbering.of(fields, p, section)
         present, obstacles = tuple(b for b in blocks if b.needed(p)), obstacles_of(p)
         constants = {
-            b.name: contact_data(
-                obstacles[b.name], section.mesh.points, *section.chains[b.elements], p.shear_modulus
-            )
+            b.name: _contact_constants(b, obstacles[b.name], p, section)
             for b in present
             if b.group == "contact"
         }
@@ -81,7 +82,7 @@ class SealSystem:
             assembler=Assembler.build(numbering.layout.total, elements),
             layout=numbering.layout,
             parameters={},
-            scales={field.name: field.scale(p) for field in fields},
+            scales={name: u.field.scale(p) for name, u in numbering.unknowns.items()},
             absolute=True,
             guards=(KeepsOrientation(*cells),),
         )
@@ -174,6 +175,14 @@ class SealSystem:
         areas = tributary_areas(self.mesh.points, segments, nodes)
         return float(self.pressing(name, x) @ areas)
 
+    def housing_friction(self, x: Array) -> float:
+        """Axial force of friction of the housing on the section, to the air side, N."""
+        if not self.parameters.rubs:
+            return 0.0
+        nodes, segments = self.section.chains[WALLS[BORE]]
+        areas = tributary_areas(self.mesh.points, segments, nodes)
+        return float(x[self.layout.part(SHEAR[BORE])] @ areas)
+
     def axial_force(self, x: Array) -> float:
         """Force that the hold exerts on the section, to the air side, N."""
         return -float(x[self.layout.part(AXIAL)][0])
@@ -196,6 +205,8 @@ class SealSystem:
     def contact_problem(self, loads: ContactLoads) -> Problem:
         """Frictionless contact (9)-(10) under a sealed pressure (8)."""
         problem = self.problem.with_parameters(**contact_values(loads))
+        if loads.moment is not None:
+            problem = problem.also_fixed(self.layout.dofs(ROTATION), loads.moment)
         if loads.place is not None:
             return problem
         return problem.also_fixed(self.layout.dofs(AXIAL), -loads.axial_force)
@@ -323,6 +334,13 @@ class SealSystem:
 
     def _ends(self, field: str) -> Integers:
         return self.layout.dofs(field)[[0, -1]]
+
+
+def _contact_constants(block: Block, obstacle: Obstacle, p: ORing, section: SealSection) -> Array:
+    """Constants (n, k) of the contact elements of a block; slip is counted from the start."""
+    chain = section.chains[block.elements]
+    constants = contact_data(obstacle, section.mesh.points, *chain, p.shear_modulus)
+    return np.pad(constants, ((0, 0), (0, 2 if block.kernel == FRICTION else 0)))
 
 
 def build_system(p: ORing, disc: Disc | None = None, density: Fraction | None = None) -> SealSystem:

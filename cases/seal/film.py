@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from softehl.cases.seal.contact import held_place
+from softehl.cases.seal.contact import held_moment, held_place
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.path import PathSettings, Stage
@@ -48,6 +48,7 @@ def first_film(system: SealSystem, settings: PathSettings, stroke: Stroke, x: Ar
         shear=1.0 if p.shear_traction else 0.0,
         rod_offset=settings.offset,
         place=held_place(p),
+        moment=held_moment(p),
     )
 
 

@@ -17,13 +17,15 @@ class ContactLoads:
 
     sealed_pressure: p_s, MPa. offsets: obstacle -> distance (mm) that it keeps from the section,
     0 where none is given. place: mean axial displacement at which the section is held, mm, None
-    where it is free; then axial_force pushes it to the air side, N.
+    where it is free; then axial_force pushes it to the air side, N. moment: that turns it where
+    its mean rotation is not held, N mm, None where it is.
     """
 
     sealed_pressure: float = 0.0
     offsets: Mapping[str, float] = field(default_factory=dict)
     place: float | None = None
     axial_force: float = 0.0
+    moment: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 
-from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.contact import assembly, contact_problem
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
 from softehl.cases.seal.equations import SealSystem, build_system
@@ -86,7 +86,8 @@ class FilmPath:
         """All film stages by modified Newton iterations; whether they reached the slowest speed."""
         system, settings, p = self.system, self.settings, self.system.parameters
         linear = self.driver.newton.linear
-        if p.solver != "auto" or p.rotation != "fixed" or not isinstance(linear, Condenser):
+        held = p.rotation == "fixed" and not p.rubs
+        if p.solver != "auto" or not held or not isinstance(linear, Condenser):
             return False
         fast = FastFilm.of(system, linear)
         stages = [fast.weight(weight_stage(system, settings, film))]
@@ -99,7 +100,7 @@ class FilmPath:
         """By Newton's method from the contact state x to the film at its first speed."""
         system, settings, p = self.system, self.settings, self.system.parameters
         y = self.driver.follow(weight_stage(system, settings, film), x)
-        if p.rotation == "free" and not isinstance(y, StageFailed):
+        if film.moment is None and p.rotation == "free" and not isinstance(y, StageFailed):
             y = self.driver.follow(release_stage(system, settings, film, y), y)
             film = replace(film, moment=0.0)
         if p.shear_traction and not isinstance(y, StageFailed):
@@ -186,7 +187,7 @@ class SealRun:
     def _from_higher_order(self, film: FilmLoads, progress: StrokeState, on_speed: OnSpeed) -> None:
         """The speeds that a low pressure order did not reach by itself, as far as possible."""
         low, driver = self.system, self.path.driver
-        if low.parameters.pressure_order >= REFERENCE_ORDER:
+        if low.parameters.pressure_order >= REFERENCE_ORDER or low.parameters.rubs:
             return
         pair, missing = OrderPair.of(low), tuple(sorted(progress.missing, reverse=True))
         high = FilmPath(pair.high, self.path.settings, driver.named(f"order {REFERENCE_ORDER}: "))
@@ -282,6 +283,9 @@ def _outcome(
         unknowns=system.counts,
         kernel_signatures={b.kernel.name: b.kernel.signature for b in blocks},
         stages=tuple(driver.records),
-        solvers={"solver": system.parameters.solver, "linear": driver.newton.linear.name},
+        solvers={
+            **{"solver": system.parameters.solver, "linear": driver.newton.linear.name},
+            "assembly": assembly(system.parameters),
+        },
         numbers=numbers or {},
     )

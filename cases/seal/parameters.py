@@ -86,6 +86,13 @@ class ORing(Parameters):
     rotation: Literal["fixed", "free"] = key(
         "fixed", "mean rotation of the section", bounds='"fixed" (held at zero) or "free"'
     )
+    housing_friction: float = key(
+        0.0,
+        "coefficient of Coulomb friction at the housing and the walls of the groove",
+        bounds="0 to 1; 0 = frictionless, the section is held",
+        ge=0,
+        le=1,
+    )
     solver: Literal["auto", "monolithic"] = key(
         "auto",
         "way to the solution",
@@ -236,6 +243,11 @@ class ORing(Parameters):
         """Ends of the lubricated arc where they are given; else the contact decides."""
         start, end = self.arc_start, self.arc_end
         return None if start is None or end is None else (start, end)
+
+    @property
+    def rubs(self) -> bool:
+        """Whether housing and walls have friction, which then holds the section by itself."""
+        return self.housing_friction > 0.0
 
     @property
     def shear_modulus(self) -> float:

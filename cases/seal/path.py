@@ -15,6 +15,7 @@ from typing import TypeAlias
 from softehl.cases.seal.state import Observer, StageRecord, place
 from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
+from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.predictor import Predictor
@@ -147,13 +148,20 @@ class PathDriver:
         return replace(self, prefix=prefix)
 
     def follow(self, stage: Stage, x0: Array) -> Followed:
-        """Solve at the start of a stage from x0 (n,), then follow it to its end."""
+        """Solve at the start of a stage from x0 (n,), then follow it to its end.
+
+        What slips on a wall slips from where it was after the step before, first of all in x0.
+        """
         stage = replace(stage, name=self.prefix + stage.name)
         begin = time.perf_counter()
         self.observer.stage(
             stage.name, sealed_pressure=stage.sealed_pressure, stroke=stage.stroke, steps=None
         )
-        points: list[Point] = []
+        points, before = list[Point](), [x0]
+
+        def problem_at(parameter: float) -> NonlinearProblem:
+            problem = stage.problem_at(parameter)
+            return problem.since(before[0]) if isinstance(problem, Problem) else problem
 
         def report(point: Point) -> None:
             points.append(replace(point, solution=point.solution.forget()))
@@ -164,10 +172,11 @@ class PathDriver:
                 residuals=point.solution.residual_norms,
                 fraction=stage.fraction(point.parameter),
             )
+            before[0] = point.solution.x
             stage.on_point(point)
 
         branch = self._continuation(stage).follow(
-            stage.problem_at,
+            problem_at,
             stage.start,
             stage.stop,
             x0,

@@ -100,15 +100,16 @@ def carried_contact(
     """
     carry, p = _carrier(old, new), new.parameters
     pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), SOLID, x)
+    y = _unknowns(old, new, carry, x)
     problem = LaggedPressure.of(
-        contact_problem(new, settings, p.sealed_pressure),
+        contact_problem(new, settings, p.sealed_pressure).since(y),
         SOLID,
         load_kernel("follower_pressure"),
         carry.elements(pressures),
         p.bulk_modulus,
     )
     stage = contact_stage(new, problem, method=f"newton, {carry.words}", name=name)
-    return stage, _unknowns(old, new, carry, x)
+    return stage, y
 
 
 def _unknowns(old: SealSystem, new: SealSystem, carry: _Carrier, x: Array) -> Array:

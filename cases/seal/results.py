@@ -163,6 +163,7 @@ def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
         "air_wall_N": -system.reaction(AIR_WALL, x),
         "sealed_wall_N": system.reaction(SEALED_WALL, x),
         "hold_N": system.axial_force(x),
+        "housing_friction_N": system.housing_friction(x),
         "sealed_pressure_N": p.sealed_pressure * pi * float(crown**2 - bottom**2),
     }
     return {
@@ -171,6 +172,19 @@ def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
         "fill_percent": fill(ring, p.rod_diameter, p.housing_diameter, p.groove_width),
         **forces,
         "axial_sum_N": sum(forces.values()),
+        **mean_motion(system, x),
+    }
+
+
+def mean_motion(system: SealSystem, x: Array) -> dict[str, float]:
+    """Mean rotation of the section, from z towards r, and mean axial displacement."""
+    residuals = {}
+    for name in ("rotation", "hold"):
+        block, given = system.problem.assembler.block(name), system.problem.parameters[name]
+        residuals[name] = float(block.residual(x, given)[:, -1].sum())
+    return {
+        "mean_rotation_degrees": float(np.degrees(residuals["rotation"])),
+        "mean_place_mm": residuals["hold"],
     }
 
 

@@ -41,11 +41,25 @@ BORE, SEALED_WALL, AIR_WALL = "housing", "sealed_wall", "air_wall"
 WALLS: dict[str, Place] = {BORE: "outer_nodes", SEALED_WALL: "wall_nodes", AIR_WALL: "wall_nodes"}
 """The other obstacles, and what may touch them; each has a field of multipliers of its own."""
 
+FRICTION = "contact_friction"
+SHEAR = {name: f"{name}_shear" for name in WALLS}
+"""Tangential stresses of the obstacles that have friction."""
+
+
+def _slides(p: ORing) -> bool:
+    return not p.rubs
+
+
+def _rubs(p: ORing) -> bool:
+    return p.rubs
+
+
 FIELDS = (
     Field(DISPLACEMENT, "nodes", scales.force),
     Field(PRESSURE, "film", scales.largest_flux),
     Field(ROD, "arc_nodes", scales.gap),
     *(Field(name, nodes, scales.gap) for name, nodes in WALLS.items()),
+    *(Field(SHEAR[name], nodes, scales.gap, needed=_rubs) for name, nodes in WALLS.items()),
     Field(ROTATION, "section", scales.rotation),
     Field(AXIAL, "section", scales.place),
 )
@@ -55,7 +69,14 @@ BLOCKS = (
     Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
     Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
     Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
-    *(Block(name, "contact", on, (DISPLACEMENT, name), "contact") for name, on in WALLS.items()),
+    *(
+        Block(name, "contact", on, (DISPLACEMENT, name), "contact", needed=_slides)
+        for name, on in WALLS.items()
+    ),
+    *(
+        Block(name, FRICTION, on, (DISPLACEMENT, name, SHEAR[name]), "contact", needed=_rubs)
+        for name, on in WALLS.items()
+    ),
     Block(FILM, "film", "arc", (DISPLACEMENT, PRESSURE), "film", layer=True, rule=_segment_rule),
     Block(
         *("upwind", "film_upwind", "arc", (DISPLACEMENT, PRESSURE), "film"),
@@ -93,7 +114,7 @@ def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | Non
     if block.group == "load":
         return {"pressure": 0.0}
     if block.group == "contact":
-        return {"offset": 0.0, "force_weight": 1.0}
+        return {"offset": 0.0, "force_weight": 1.0, "friction": p.housing_friction}
     if block.name == "rotation":
         centre = {"centre_z": 0.0, "centre_r": section.disc.centre_r}
         return {**centre, "polar_moment": section.polar_moment, "angle": 0.0}
@@ -143,5 +164,5 @@ def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
 
 def contact_kernels(p: ORing) -> tuple[str, ...]:
     """Names of the kernels that the contact problem of a case depends on, each once."""
-    kernels = [b.kernel_of(p) for b in BLOCKS if b.group != "film"]
+    kernels = [b.kernel_of(p) for b in BLOCKS if b.group != "film" and b.needed(p)]
     return tuple(dict.fromkeys(kernels))

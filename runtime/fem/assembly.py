@@ -129,6 +129,17 @@ class ElementBlock:
             piece = replace(self, coordinates=coordinates, dofs=dofs, data=data, point_data=history)
             yield piece, scatter[width * first : width * (first + step)]
 
+    def since(self, x: Array) -> ElementBlock:
+        """The block in the step after x: data u_old1, ... of unknowns u1, ... are those of x."""
+        unknowns, names = (tuple(getattr(self.kernel, n, ())) for n in ("unknowns", "data"))
+        places = {f"{u[:-1]}_old{u[-1]}": k for k, u in enumerate(unknowns)}
+        columns = [k for k, name in enumerate(names) if name in places]
+        if not columns or self.data is None:
+            return self
+        data = self.data.copy()
+        data[:, columns] = x[self.dofs[:, [places[names[k]] for k in columns]]]
+        return replace(self, data=data)
+
     def _given(self, parameters: Array) -> dict[str, Any]:
         given = {"data": self.data, "parameters": parameters, "rule": self.rule}
         return given if self.point_data is None else {**given, "point_data": self.point_data}
@@ -211,6 +222,12 @@ class Assembler:
         changed = replace(self.block(name), data=data, point_data=point_data)
         blocks = tuple(changed if b.name == name else b for b in self.blocks)
         return replace(self, blocks=blocks, memo=self.memo.without(name))
+
+    def since(self, x: Array) -> Assembler:
+        """The assembler in the step after x; see `ElementBlock.since`."""
+        blocks = tuple(block.since(x) for block in self.blocks)
+        changed = any(new is not old for new, old in zip(blocks, self.blocks, strict=True))
+        return replace(self, blocks=blocks) if changed else self
 
     def residual(self, x: Array, parameters: Mapping[str, Array]) -> Array:
         """Sum of the element residuals, (size,)."""

@@ -233,6 +233,11 @@ class Problem:
         """The problem with these unknowns prescribed too."""
         return self.with_fixed([self.fixed, fixed], [self.values, value])
 
+    def since(self, x: Array) -> Problem:
+        """The problem of the step after x, for kernels that ask for unknowns of the step before."""
+        assembler = self.assembler.since(x)
+        return self if assembler is self.assembler else replace(self, assembler=assembler)
+
     def fields(self, name: str, x: Array) -> dict[str, Array]:
         """Fields of a block that is switched on, at its points: name -> (n, points)."""
         return self.assembler.block(name).fields(x, self.parameters[name])

@@ -11,6 +11,7 @@ def oring(**changes: Any) -> ORing:
     values: dict[str, Any] = {
         "mesh": "uniform",
         "upwinding": 0.0,
+        "solid": "taylor",
         "groove_width": 3.74,
         "arc_start": -34.0,
         "arc_end": 43.0,

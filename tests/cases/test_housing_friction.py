@@ -1,0 +1,80 @@
+"""Friction at housing and walls: the section is found instead of held, forces are in balance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.method import run
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.state import Outcome, Silent
+from softehl.cases.seal.system import FRICTION, SHEAR, WALLS
+
+
+def solved(**changes: Any) -> Outcome:
+    given = {"density": 1, "speeds": (800.0,), "stroke": "out", "error_estimate": False}
+    return run(ORing(**{**given, **changes}), Silent())
+
+
+@pytest.mark.slow
+def test_friction_carries_a_part_of_the_pressure_and_holds_the_section() -> None:
+    """Forces are in balance without a hold, and h* is that of density 2, about."""
+    outcome = solved(housing_friction=0.3)
+    assert outcome.converged, outcome.message
+    (state,) = outcome.states
+    assert state.verdict == OK
+    assert state.h_star_um == pytest.approx(2.080, rel=2e-2)  # of density 2
+    assert state.moment_N_mm == 0.0
+    numbers = outcome.numbers
+    assert abs(numbers["axial_sum_N"]) < 1e-9 * numbers["sealed_pressure_N"]
+    assert -0.25 < numbers["housing_friction_N"] / numbers["sealed_pressure_N"] < -0.15
+    assert numbers["hold_N"] == 0.0
+    assert 1.0 < numbers["mean_rotation_degrees"] < 5.0
+    assert "let go" in outcome.solvers["assembly"]
+
+
+@pytest.mark.slow
+def test_strokes_without_pressure_are_mirror_images_with_friction() -> None:
+    outcome = solved(housing_friction=0.2, sealed_pressure=0.0, stroke="both")
+    out, back = outcome.states
+    assert out.h_star_um == pytest.approx(back.h_star_um, rel=1e-10)
+    assert outcome.numbers["mean_rotation_degrees"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_stresses_of_the_walls_stay_within_coulombs_cone() -> None:
+    """In contact: nowhere above the limit, somewhere at it; a smaller coefficient is exceeded."""
+    driver = PathDriver(Silent())
+    route = ContactRoute(PathSettings(), driver.follow)
+    p = ORing(density=1, mesh="uniform", arc_start=-60.0, arc_end=60.0, housing_friction=0.2)
+    found = route.contact(p)
+    assert not isinstance(found, StageFailed)
+    system, x = found
+    shares = []
+    for name in WALLS:
+        shear, normal = x[system.layout.part(SHEAR[name])], system.pressing(name, x)
+        assert np.all(abs(shear[normal == 0.0]) == 0.0)
+        shares += list(abs(shear[normal > 0.0]) / normal[normal > 0.0])
+    assert max(shares) == pytest.approx(0.2, rel=1e-9)
+    assert max(shares) > 0.19
+    assert contact_problem(system, PathSettings(), 1.0).since(x).residual(x) == pytest.approx(
+        0.0, abs=1e-6
+    )
+
+
+def test_without_friction_nothing_of_it_is_in_the_system() -> None:
+    p = ORing(density=1)
+    kernels = [b.kernel.name for b in _system(p).problem.assembler.blocks]
+    assert FRICTION not in kernels
+    assert not set(SHEAR.values()) & set(_system(p).layout.names)
+
+
+def _system(p: ORing) -> Any:
+    from softehl.cases.seal.equations import build_system
+
+    return build_system(p)
