@@ -75,6 +75,7 @@ CHANGED = {
     "mesh": "graded",
     "density": 2,
     "solid": "fbar",
+    "housing_friction": 0.1,
     "sealed_pressure": 0.25,
     "inner_diameter": 50.4,
     "section_diameter": 3.54,
