@@ -10,19 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.io import replacing
-from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.names import meant
+from softehl.runtime.output import Picture, piece_names
 from softehl.runtime.solve.solution import Point
 
 if TYPE_CHECKING:
     from softehl.runtime.mesh.mesh import Predicate
     from softehl.runtime.system import System
-
-
-_AXES = ("x", "y", "z", "r")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +107,14 @@ class Result:
         if block not in blocks:
             known = ", ".join(blocks)
             raise KeyError(f"no block {block!r}{meant(block, blocks)}; there are {known}")
-        found = self.problem.fields(block, self.point.solution.x)
         share = self.system.share
-        new = [f"new_{name}" for name in blocks[block].kernel.history]
-        return {n: share.whole_cells(block, v) for n, v in found.items() if n not in new}
+        return {n: share.whole_cells(block, v) for n, v in self._own_fields(block).items()}
+
+    def _own_fields(self, block: str) -> dict[str, Array]:
+        """Fields at the points of this process's elements."""
+        found = self.problem.fields(block, self.point.solution.x)
+        new = [f"new_{name}" for name in self.system.blocks[block].kernel.history]
+        return {name: values for name, values in found.items() if name not in new}
 
     def at_nodes(self, block: str) -> dict[str, Array]:
         """Fields of a block averaged to nodes: name -> (points,), nan away from the block.
@@ -158,53 +158,44 @@ class Result:
         return np.asarray(self.system.mesh.points + moved)
 
     def write(self, path: str | Path) -> None:
-        """Write the mesh with unknowns at nodes and fields in cells (means), as .vtu, atomically.
+        """Write the mesh with unknowns at nodes and fields in cells (means), atomically.
 
-        Unknowns u_x, u_y, u_z are written as one vector u as well.
+        .vtu: one file. .pvtu: one for each process beside it, written by all at once; no process
+        then needs to have the whole. Unknowns u_x, u_y, u_z are written as one vector u as well.
         """
-        import meshio  # late: it is slow to import
+        target, share = Path(path), self.system.share
+        if target.suffix == ".pvtu":
+            pieces = piece_names(target, share.pieces[1])
+            piece = self._picture(self.system, self._own_cells(), self.point.solution.x).compact()
+            piece.write(target.with_name(pieces[share.pieces[0]]))
+            share.together()
+            if share.first:
+                piece.write_index(target, pieces)
+        elif target.suffix == ".vtu":
+            picture = self._picture(self._whole, self.system.mesh.cells, self.x)
+            if share.first:
+                picture.write(target)
+        else:
+            raise ValueError(f"write({str(path)!r}): results are written as .vtu or .pvtu")
+        share.together()
 
-        mesh, target = self.system.mesh, Path(path)
-        if target.suffix != ".vtu":
-            raise ValueError(f"write({str(path)!r}): results are written as .vtu")
-        nodal = {name: self.values(name) for name in self._whole.numbering.nodal}
-        points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dimension)))
-        found = meshio.Mesh(
-            points,
-            [(CELLS[kind].meshio, nodes) for kind, nodes in mesh.cells.items()],
-            point_data={**nodal, **_vectors(nodal)},
-            cell_data=self._cell_data(),
-        )
-        with replacing(target) as temporary:
-            meshio.write(temporary, found, file_format="vtu")
+    def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> Picture:
+        """Of all unknowns x, or of those of this process with its own fields."""
+        nodal = {
+            name: np.where(numbers >= 0, x[numbers], np.nan)
+            for name, numbers in system.numbering.nodal.items()
+        }
+        fields = self.fields if system is self._whole else self._own_fields
+        return Picture.of(system.mesh.points, cells, nodal, system.blocks, fields)
 
-    def _cell_data(self) -> dict[str, list[Array]]:
-        """Means of fields: block.field -> for each kind of cell (m,), nan outside the block."""
-        mesh = self.system.mesh
-        found: dict[str, list[Array]] = {}
-        for name, block in self._whole.blocks.items():
-            if block.kind not in mesh.cells or not block.kernel.fields:
-                continue
-            rows = {tuple(row): k for k, row in enumerate(mesh.cells[block.kind].tolist())}
-            chosen = [rows[tuple(row)] for row in block.nodes.tolist()]
-            for label, values in self.fields(name).items():
-                data = {kind: np.full(len(nodes), np.nan) for kind, nodes in mesh.cells.items()}
-                data[block.kind][chosen] = values.mean(axis=1)
-                found[f"{name}.{label}"] = list(data.values())
+    def _own_cells(self) -> dict[str, Integers]:
+        """Cells of the elements of this process; on process 0 also those that have no elements."""
+        mesh, whole = self.system.mesh, self._whole.blocks.values()
+        found = {}
+        for kind, cells in mesh.cells.items():
+            own = [b.nodes for b in self.system.blocks.values() if b.kind == kind]
+            if self.system.share.first:
+                there = {tuple(row) for b in whole if b.kind == kind for row in b.nodes.tolist()}
+                own.append(cells[[tuple(row) not in there for row in cells.tolist()]])
+            found[kind] = np.unique(np.concatenate([cells[:0], *own]), axis=0)
         return found
-
-
-def _vectors(nodal: Mapping[str, Array]) -> dict[str, Array]:
-    """u_x, u_y, ... as vectors u of three components, (points, 3)."""
-    stems: dict[str, list[str]] = {}
-    for name in nodal:
-        stem, _, axis = name.rpartition("_")
-        if stem and axis in _AXES:
-            stems.setdefault(stem, []).append(name)
-    vectors = {}
-    for stem, names in stems.items():
-        if len(names) > 1 and stem not in nodal:
-            columns = [np.nan_to_num(nodal[name]) for name in names[:3]]
-            columns += [np.zeros_like(columns[0])] * (3 - len(columns))
-            vectors[stem] = np.stack(columns, axis=1)
-    return vectors

@@ -54,6 +54,9 @@ class Share:
     def reached(self, name: str, parameter: float, solution: Solution) -> None:
         """Told of every converged step: of what, and how far."""
 
+    def together(self) -> None:
+        """Wait for the other processes."""
+
     def whole_state(self, state: Mapping[str, Array]) -> dict[str, Array]:
         """Block -> point data of all processes."""
         return {name: self.whole_cells(name, values) for name, values in state.items()}

@@ -27,7 +27,7 @@ ORDER = {
     ),
     "runtime": (
         *("arrays names", "tuning", "library", "io", "calls", "kernels", "mesh", "fem", "solve"),
-        *("share", "statement", "system", "equations result", "watch engines"),
+        *("share", "statement", "system", "equations output", "result", "watch engines"),
         *("follow load march", "study"),
     ),
     "cases": ("harness", "seal", "oring slider", "paper", "shipped", "cli document"),

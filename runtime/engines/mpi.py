@@ -14,6 +14,10 @@ from softehl.runtime.statement.records import StudyError
 _TOGETHER = 1.0  # seconds within which an error of all processes is one
 
 
+_EXPLAINED = (ValueError, ArithmeticError, RuntimeError, OSError)
+"""Errors that say in their text what is wrong; others are of the script."""
+
+
 @cache
 def petsc() -> Any:
     """The module petsc4py.PETSc, with the options of the command line.
@@ -54,21 +58,20 @@ def world() -> Any:
 def _leave(
     kind: type[BaseException], error: BaseException, traceback: TracebackType | None
 ) -> None:
-    """End all processes on an error that nobody caught: one line if all have it, on process 0.
-
-    An error of some processes only, which the others cannot know of, ends them from here.
+    """End all processes on an error that nobody caught, with one line of text: of process 0 where
+    all have the error; else of the one that has it, for the others do not know. Errors in the
+    script itself, and those of a process alone in the world, have their traceback.
     """
     comm = world()
-    alone = comm.size > 1 and not _everywhere(comm)
-    if comm.size == 1 or alone or not issubclass(kind, ValueError | ArithmeticError | RuntimeError):
-        if comm.rank == 0 or alone:
-            sys.__excepthook__(kind, error, traceback)
-    elif comm.rank == 0:
-        print(f"softehl: {_line(error)}", file=sys.stderr, flush=True)
-    if alone:
-        words = f"softehl: process {comm.rank} of {comm.size} failed, all end: {_line(error)}"
-        print(words, file=sys.stderr, flush=True)
+    together = _everywhere(comm)
+    if comm.size == 1 or not (issubclass(kind, _EXPLAINED) or (together and comm.rank)):
+        sys.__excepthook__(kind, error, traceback)
+    if comm.size > 1 and not together:
+        who = f"process {comm.rank} of {comm.size} failed, all end: "
+        print(f"softehl: {who}{_line(error)}", file=sys.stderr, flush=True)
         comm.Abort(1)
+    elif comm.size > 1 and comm.rank == 0 and issubclass(kind, _EXPLAINED):
+        print(f"softehl: {_line(error)}", file=sys.stderr, flush=True)
 
 
 def _everywhere(comm: Any) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,34 +39,59 @@ def main_blocks(system: System) -> list[str]:
     return [name for name, d in dimension.items() if d == highest]
 
 
-def neighbours(system: System, part: slice) -> csr_array[np.float64]:
-    """Which elements of the main blocks have a face in common with the elements `part` of them:
-    (part, elements). A face has as many nodes as there are dimensions, at least.
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """What is cut into parts: the cells of the main blocks, each once.
+
+    nodes: for each kind (n, k). rows: block -> number of the cell of each element.
     """
-    pages = [system.blocks[name] for name in main_blocks(system)]
-    incidence = _incidence([page.nodes for page in pages], len(system.mesh.points))
-    shared = csr_array(incidence[part] @ incidence.T)
-    shared.data[shared.data < max(CELLS[page.kind].dimension for page in pages)] = 0.0
-    shared.eliminate_zeros()
-    return shared
+
+    nodes: tuple[Integers, ...]
+    rows: dict[str, Integers]
+
+    @classmethod
+    def of(cls, system: System) -> Cells:
+        """Elements of several blocks on one cell stay together."""
+        nodes: list[Integers] = []
+        rows: dict[str, Integers] = {}
+        first = 0
+        main = [system.blocks[name] for name in main_blocks(system)]
+        for kind in dict.fromkeys(block.kind for block in main):
+            there = [block for block in main if block.kind == kind]
+            found, place = there[0].nodes, np.arange(len(there[0].nodes))
+            if len(there) > 1:
+                every = np.concatenate([block.nodes for block in there])
+                found, place = np.unique(every, axis=0, return_inverse=True)
+            ends = np.cumsum([len(block.nodes) for block in there])[:-1]
+            parts = np.split(place.ravel() + first, ends)
+            rows |= {block.name: part for block, part in zip(there, parts, strict=True)}
+            nodes.append(found)
+            first += len(found)
+        return cls((*nodes,), rows)
+
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return sum(len(nodes) for nodes in self.nodes)
+
+    def neighbours(self, part: slice, dimension: int) -> csr_array[np.float64]:
+        """Which cells have a face in common with the cells `part`: (part, cells).
+
+        A face has as many nodes as there are dimensions, at least.
+        """
+        counts = np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in self.nodes])
+        ends = np.concatenate([[0], np.cumsum(counts)])
+        columns = np.concatenate([nodes.ravel() for nodes in self.nodes])
+        incidence = csr_array((np.ones(len(columns)), columns, ends))
+        shared = csr_array(incidence[part] @ incidence.T)
+        shared.data[shared.data < dimension] = 0.0
+        shared.eliminate_zeros()
+        return shared
 
 
-def _incidence(cells: Sequence[Integers], points: int) -> csr_array[np.float64]:
-    counts = np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in cells])
-    ends = np.concatenate([[0], np.cumsum(counts)])
-    columns = np.concatenate([nodes.ravel() for nodes in cells])
-    shape = (len(counts), points)
-    return csr_array((np.ones(len(columns)), columns, ends), shape=shape)
-
-
-def partition(system: System, main: Integers, processes: int) -> Partition:
-    """The whole partition from that of the main blocks' elements, one after another in `main`."""
-    elements: dict[str, Integers] = {}
-    first = 0
-    for name in main_blocks(system):
-        count = len(system.blocks[name].nodes)
-        elements[name] = main[first : first + count]
-        first += count
+def partition(system: System, cells: Cells, main: Integers, processes: int) -> Partition:
+    """The whole partition from the process of each cell, `main`."""
+    elements = {name: main[rows] for name, rows in cells.rows.items()}
     node = _node_owners(system, elements, processes)
     places = _nodes_of_unknowns(system)
     for block in system.assembler.blocks:

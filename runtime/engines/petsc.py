@@ -15,7 +15,7 @@ from softehl.runtime.engines.exchange import Exchange, largest, total
 from softehl.runtime.engines.local import Part, part_of
 from softehl.runtime.engines.matrix import Solver, Times
 from softehl.runtime.engines.mpi import petsc, world
-from softehl.runtime.engines.partition import Partition, main_blocks, neighbours, partition
+from softehl.runtime.engines.partition import Cells, Partition, partition
 from softehl.runtime.engines.spread import Distributed, Spread, Team
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.share import Share
@@ -46,7 +46,8 @@ class Petsc:
         """See `Engine`."""
         system = system.everywhere
         comm = world()
-        cut = partition(system, _cut(system), comm.size)
+        cells = Cells.of(system)
+        cut = partition(system, cells, _cut(system, cells), comm.size)
         part = part_of(system, cut, comm.rank)
         exchange = Exchange.of(part, cut)
         near = _rigid_motions(part, cut, exchange)
@@ -122,6 +123,10 @@ class Processes(Share):
                 flush=True,
             )
 
+    def together(self) -> None:
+        """See `Share`."""
+        world().Barrier()
+
     @property
     def _whole(self) -> System:
         return self.team.part.system.everywhere
@@ -135,18 +140,16 @@ def _gathered(values: Array, places: Integers, count: int) -> Array:
     return np.asarray(total(found).reshape(*values.shape[:-1], count))
 
 
-def _cut(system: System) -> Integers:
-    """Process of each element of the main blocks, by PETSc's partitioner."""
+def _cut(system: System, cells: Cells) -> Integers:
+    """Process of each cell, by PETSc's partitioner."""
     PETSc, comm = petsc(), world()
-    count = sum(len(system.blocks[name].nodes) for name in main_blocks(system))
     if comm.size == 1:
-        return np.zeros(count, dtype=np.int64)
-    bounds = np.linspace(0, count, comm.size + 1).astype(int)
+        return np.zeros(cells.count, dtype=np.int64)
+    bounds = np.linspace(0, cells.count, comm.size + 1).astype(int)
     part = slice(int(bounds[comm.rank]), int(bounds[comm.rank + 1]))
-    graph = neighbours(system, part)
-    own = part.stop - part.start
+    graph = cells.neighbours(part, system.mesh.dimension)
     starts, columns = graph.indptr.astype(PETSc.IntType), graph.indices.astype(PETSc.IntType)
-    sizes = ((own, count), (own, count))
+    sizes = ((part.stop - part.start, cells.count),) * 2
     matrix = PETSc.Mat().createAIJ(sizes, csr=(starts, columns, graph.data), comm=comm)
     divider = PETSc.MatPartitioning().create(comm)
     divider.setAdjacency(matrix.convert("mpiadj"))

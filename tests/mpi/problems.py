@@ -1,0 +1,202 @@
+"""Problems for any engine and any number of processes, and what is compared of their results.
+
+    mpiexec -n 2 python -m tests.mpi.problems NAME ENGINE [FOLDER]
+
+prints a JSON object on process 0.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softehl import Mesh, Study
+from softehl.runtime.arrays import Array
+from softehl.runtime.engines.petsc import Petsc
+from softehl.runtime.fem.loads import Amount
+from softehl.runtime.result import Result
+
+DOCS = Path(__file__).parents[2] / "docs"
+OGDEN: dict[str, Any] = {"mu_1": 0.63, "mu_2": -0.01, "alpha_1": 1.3, "alpha_2": -2.0, "lame": 20.0}
+STEEL: dict[str, Any] = {"G": 80193.8, "K": 164206.0, "sy": 450.0, "H": 20000.0}
+
+
+def cube(n: int) -> Study:
+    """n^3 Ogden hexahedra whose top is lifted by 0.3 and turned by 0.6."""
+    c, s = np.cos(0.6), np.sin(0.6)
+    turn = np.array([[c - 1, -s, 0.0], [s, c - 1, 0.0], [0.0, 0.0, 0.0]])
+
+    def top(axis: int) -> Callable[[Array, float], Array]:
+        lift = [0.0, 0.0, 0.3][axis]
+        return lambda x, t: np.asarray(t * ((x - [0.5, 0.5, 1.0]) @ turn[axis] + lift))
+
+    study = Study(Mesh.box((1, 1, 1), cells=(n, n, n)))
+    study.add("cube", DOCS / "models" / "ogden.py", **OGDEN)
+    study.fix("bottom", u_x=0, u_y=0, u_z=0)
+    study.fix("top", u_x=top(0), u_y=top(1), u_z=top(2))
+    return study
+
+
+def contact() -> Study:
+    """A ring of the shipped rubber pressed onto a plane by its own contact page."""
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(16, 8)).map(lambda x: x + np.array([0.05, 10.0])))
+    study.add("body", "solid_q4", mu_1=1.0, mu_2=0.2, kappa=200.0)
+    wall: dict[str, Any] = {"n_z": 1.0, "n_r": 0.0, "c": 0.0, "area": 8.0, "rho": 10.0}
+    study.add("wall", "contact", on="left", offset=0.0, force_weight=1.0, **wall)
+    study.fix("right", u_z=-0.3, u_r=0)
+    return study
+
+
+def tied() -> Study:
+    """A sheared strip whose sides are tied, on springs, with loads on a side and at a node."""
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(12, 6)).map(lambda x: x + np.array([0.0, 5.0])))
+    study.add("body", "solid_q4", mu_1=1.0, mu_2=0.2, kappa=50.0)
+    study.tie("left", "right", "u_z", "u_r")
+    study.spring("bottom", u_r=40.0)
+    study.fix((0.0, 5.0), u_z=0.0)
+    study.load("top", u_r=0.2, u_z=lambda x, t: 0.1 * t * x[:, 0])
+    study.load((1.0, 6.0), u_r=-0.5)
+    return study
+
+
+def yielding(pull: Amount = 0.2) -> Study:
+    """A strip with a hole of a metal that hardens: points remember plastic strain."""
+
+    def quarter(x: Array) -> Array:
+        angle, far = x[:, 1] * np.pi / 2, np.column_stack([1 - x[:, 1], x[:, 1]])
+        inner = 5.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+        return inner + x[:, :1] * (np.minimum(1, 2 * far) * [10.0, 18.0] - inner)
+
+    mesh = Mesh.rectangle(1, 1, cells=(4, 8), shape="serendipity", order=2).map(quarter)
+    study = Study(mesh.with_side("end", lambda x: x[:, 1] > 18.0 - 1e-9))
+    study.add("steel", DOCS / "gallery" / "models" / "j2.py", **STEEL)
+    study.fix("bottom", u_y=0)
+    study.fix("top", u_x=0)
+    study.fix("end", u_y=pull)
+    return study
+
+
+def warm(cells: int = 40) -> Study:
+    """Heat in a bar: rates, and values of steps before."""
+    study = Study(Mesh.line(1.0, cells=cells))
+    study.add("bar", DOCS / "models" / "heat.py", k=1.0, c=1.0)
+    study.start(T=lambda x: np.sin(np.pi * x[:, 0]))
+    study.fix("left", T=0)
+    study.fix("right", T=0)
+    return study
+
+
+def numbers(result: Result, block: str) -> dict[str, Any]:
+    """What is compared: norm and largest unknown, iterations, sums of fields and reactions."""
+    known = result.system.everywhere.blocks[block].kernel.fields
+    fields = result.fields(block) if known else {}
+    side = "bottom" if "bottom" in result.system.mesh.sides else "left"
+    return {
+        "norm": result.norm(),
+        "largest": float(np.abs(result.x).max()),
+        "t": result.t,
+        "iterations": result.iterations,
+        **{f"field {name}": float(np.abs(values).sum()) for name, values in fields.items()},
+        **{f"force {name}": value for name, value in result.reaction(side).items()},
+        **{f"state {name}": float(np.abs(v).sum()) for name, v in result.state.items()},
+    }
+
+
+def solved(name: str, engine: Any, folder: Path) -> dict[str, Any]:
+    """A problem by name, solved."""
+    if name.startswith("cube"):
+        return numbers(cube(int(name[4:])).solve(steps=10, engine=engine), "cube")
+    if name in ("contact", "tied"):
+        study = contact() if name == "contact" else tied()
+        result = study.solve(steps=4, engine=engine)
+        for file in ("whole.vtu", "parts.pvtu"):
+            result.write(folder / file)
+        return numbers(result, "body")
+    if name == "yielding":
+        study = yielding()
+        half = study.solve(steps=10, until=0.5, engine=engine)
+        return numbers(study.solve(steps=10, start=half, engine=engine), "steel")
+    if name == "adaptive":
+        path = list(warm().march(dt=1e-3, until=0.1, tolerance=1e-3, engine=engine))
+        return numbers(path[-1], "bar")
+    if name in ("march", "restart", "slow"):
+        return _marched(name, engine, folder)
+    if name == "gamg":
+        engine = Petsc({"ksp_type": "gmres", "pc_type": "gamg", "ksp_rtol": 1e-10})
+        result = cube(4).solve(steps=10, engine=engine)
+        return {**numbers(result, "cube"), "krylov": engine.times.iterations}
+    study = FAILING[name]()
+    return numbers(study.solve(engine=engine), "cube")
+
+
+def _marched(name: str, engine: Any, folder: Path) -> dict[str, Any]:
+    file = folder / "march.npz"
+    restart = file if name == "restart" else None
+    in_time = yielding(lambda x, t: np.full(len(x), 0.2 * t))
+    path = in_time.march(dt=0.05, until=1.0, checkpoint=file, restart=restart, engine=engine)
+    results = []
+    for result in path:
+        results.append(result)
+        time.sleep(0.3 if name == "slow" else 0.0)
+    return numbers(results[-1], "steel")
+
+
+def one_fails() -> Study:
+    """A support that fails on the last process alone."""
+
+    def value(x: Array, t: float) -> Array:
+        if t > 0 and _rank() == _ranks() - 1:
+            raise ValueError("no value for the support")
+        return np.zeros(len(x))
+
+    study = cube(2)
+    study.fix("bottom", u_x=value)
+    return study
+
+
+def all_fail() -> Study:
+    """A cube that nothing holds."""
+    study = Study(Mesh.box((1, 1, 1), cells=(2, 2, 2)))
+    study.add("cube", DOCS / "models" / "ogden.py", **OGDEN)
+    study.fix("bottom", u_z=0)
+    study.load("top", u_x=0.1)
+    return study
+
+
+def misspelt() -> Study:
+    """A side that is not there."""
+    study = cube(2)
+    study.fix("ceiling", u_z=0)
+    return study
+
+
+FAILING = {"one fails": one_fails, "all fail": all_fail, "misspelt": misspelt}
+
+
+def _ranks() -> int:
+    from softehl.runtime.engines.mpi import world
+
+    return int(world().size)
+
+
+def _rank() -> int:
+    from softehl.runtime.engines.mpi import world
+
+    return int(world().rank)
+
+
+def main() -> None:
+    name, engine, *rest = sys.argv[1:]
+    found = solved(name, engine, Path(*rest[:1]))
+    if engine == "serial" or _rank() == 0:
+        print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main()
