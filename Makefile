@@ -14,8 +14,11 @@ BUILDER := $(wildcard codegen/tools/build.py codegen/abi.py)
 # a second Python, on which `make test-other` runs the tests
 OTHERS ?= python3.13 python3.12 $(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python \
 	$(HOME)/.pyenv/versions/3.12.*/bin/python)
+# a Python for which PETSc comes as wheels: `make mpi` makes an environment with it
+MPI_PYTHONS ?= python3.12 $(wildcard $(HOME)/.pyenv/versions/3.12.*/bin/python) python3.13 \
+	$(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python) $(PYTHON)
 
-.PHONY: help oring test test-other slow torture wheel lint check format docs pictures clean
+.PHONY: help oring test test-other mpi mpi-tests slow torture wheel lint check format docs pictures clean
 
 help:
 	@echo "make oring    solve the O-ring and write its film-thickness curve to $(OUT)"
@@ -23,6 +26,7 @@ help:
 	@echo "make slow     the tests that take minutes"
 	@echo "make wheel    build the wheel, install it elsewhere and use it, with and without compiler"
 	@echo "make test-other    the test suite on a second Python, where one is installed"
+	@echo "make mpi      the engine petsc on 1, 2 and 3 processes, where Python >= 3.12 is installed"
 	@echo "make lint     ruff and mypy; make check: lint and test"
 	@echo "make docs     the pages of docs/ as a site, in build/docs"
 	@echo "make clean    remove the environment and everything built"
@@ -50,6 +54,21 @@ test-other:
 	done; \
 	echo "no second Python is installed (looked for: $(OTHERS)): its tests are left out"
 
+mpi:
+	@for found in $(MPI_PYTHONS); do \
+	  if $$found -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 12))' 2>/dev/null; \
+	  then \
+	    echo "PETSc on $$($$found --version)"; \
+	    exec $(MAKE) mpi-tests VENV=.venv-mpi PYTHON="$$found"; \
+	  fi; \
+	done; \
+	echo "no Python >= 3.12 is installed (looked for: $(MPI_PYTHONS)): the tests of PETSc are left out"
+
+# the last line: cells of ours in DOLFINx, which the same wheel brings
+mpi-tests: $(VENV)/.mpi $(VENV)/.kernels
+	$(BIN)/python -m pytest -m mpi tests/mpi
+	$(BIN)/python -m pytest tests/codegen/test_dolfinx.py
+
 # faults from outside, at most 15 minutes; writes its table into docs/reliability.md
 torture: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m tests.torture 15 docs/reliability.md
@@ -74,7 +93,7 @@ pictures: $(VENV)/.kernels
 	PYTHONPATH=. $(BIN)/python docs/gallery/pictures.py
 
 clean:
-	rm -rf $(VENV) .venv-other build dist src/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-other .venv-mpi build dist src/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find codegen generated runtime cases tests -name __pycache__ -prune -exec rm -rf {} +
 	rm -f generated/*.so generated/*.sha256
 
@@ -93,6 +112,10 @@ $(VENV)/.installed: pyproject.toml $(VENV)/.created
 
 $(VENV)/.dev: $(VENV)/.installed
 	$(PIP) install --editable '.[dev]'
+	@touch $@
+
+$(VENV)/.mpi: $(VENV)/.dev
+	$(PIP) install --editable '.[dev,mpi]'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.installed

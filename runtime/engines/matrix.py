@@ -186,7 +186,7 @@ class Solver:
             pc.setFactorSolverType("mumps")
         else:
             ksp.setType("gmres")
-            ksp.setTolerances(rtol=1e-8, max_it=500)
+            ksp.setTolerances(rtol=1e-6, max_it=500)
             ksp.setGMRESRestart(60)
             pc.setType("gamg")
         if self.near is not None:
