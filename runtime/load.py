@@ -40,7 +40,6 @@ class LoadSteps:
         def keep(point: Point) -> None:
             problem, x = problem_at(point.parameter), point.solution.x
             state[0] = x, system.committed(problem, x, state[0][1])
-            share.reached("load factor", point.parameter, point.solution)
             reached[:] = [Result(system, problem, point, state[0][1])]
             self.on_step(reached[0])
 

@@ -127,7 +127,6 @@ class March:
             following = min(_GROWTH * wanted, clock.dt)
         states = np.vstack([solution.x, clock.states])[:3]
         times = (step.t, *clock.times)[:3]
-        system.share.reached("time", step.t, solution)
         reached = Result(system, problem, Point(step.t, solution), after)
         return reached, Clock(times, states, after, following)
 

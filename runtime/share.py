@@ -12,7 +12,6 @@ from typing import Any
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.solution import Solution
 
 
 class Share:
@@ -50,9 +49,6 @@ class Share:
     def largest(self, value: float) -> float:
         """The largest of the numbers that the processes have."""
         return value
-
-    def reached(self, name: str, parameter: float, solution: Solution) -> None:
-        """Told of every converged step: of what, and how far."""
 
     def together(self) -> None:
         """Wait for the other processes."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -20,7 +18,6 @@ from softehl.runtime.engines.spread import Distributed, Spread, Team
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.share import Share
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import Solution
 from softehl.runtime.system import System
 
 _AXES = ("x", "y", "z")
@@ -31,12 +28,11 @@ class Petsc:
     """PETSc on all processes.
 
     options: by PETSc's own names, {"ksp_type": "cg", "pc_type": "gamg"}; those of the command line
-    and of PETSC_OPTIONS count too. progress: process 0 tells of every step (where there are
-    several processes, if left out). Raises StudyError where PETSc is missing.
+    and of PETSC_OPTIONS count too. times: what it has cost so far. Raises StudyError where PETSc is
+    missing.
     """
 
     options: Mapping[str, Any] = field(default_factory=dict)
-    progress: bool | None = None
     times: Times = field(default_factory=Times)
 
     def __post_init__(self) -> None:
@@ -53,8 +49,7 @@ class Petsc:
         near = _rigid_motions(part, cut, exchange)
         solver = Solver(self.options, near, _fields(part, exchange), self.times)
         team = Team(part, exchange, cut.interleaved, solver)
-        progress = comm.size > 1 if self.progress is None else self.progress
-        return replace(part.system, share=Processes(team, progress))
+        return replace(part.system, share=Processes(team))
 
     def newton(self, given: Newton | None) -> Newton:
         """See `Engine`."""
@@ -66,8 +61,6 @@ class Processes(Share):
     """See `Share`: what a process of several has."""
 
     team: Team
-    progress: bool
-    began: float = field(default_factory=time.monotonic)
 
     @property
     def first(self) -> bool:  # type: ignore[override]
@@ -111,17 +104,6 @@ class Processes(Share):
     def largest(self, value: float) -> float:
         """See `Share`."""
         return largest(value)
-
-    def reached(self, name: str, parameter: float, solution: Solution) -> None:
-        """See `Share`."""
-        if self.progress and self.first:
-            norm = solution.residual_norms[-1]
-            print(
-                f"{name} {parameter:.6g}: {solution.iterations} iterations, residual {norm:.1e}, "
-                f"{time.monotonic() - self.began:.1f} s",
-                file=sys.stderr,
-                flush=True,
-            )
 
     def together(self) -> None:
         """See `Share`."""

@@ -106,15 +106,16 @@ class Pressure(_Kernel):
         and the points.
         """
         n, k = len(coordinates), len(self.face.nodes)
-        X, u = coordinates.reshape(n, k, -1), dofs.reshape(n, k, -1)
+        shape = n, k, coordinates.shape[1] // k  # n may be 0
+        X, u = coordinates.reshape(shape), dofs.reshape(shape)
         points, weights = self.face.rule(4)
-        shape, along = self.face.shape(points), self.face.gradient(points)
-        places = np.einsum("qk,nkc->nqc", shape, X)
+        values, along = self.face.shape(points), self.face.gradient(points)
+        places = np.einsum("qk,nkc->nqc", values, X)
         load = amount(self.value, places.reshape(-1, X.shape[2]), *given["parameters"].tolist())
         slopes = np.einsum("qkd,nkc->nqcd", along, X + u)
-        weighted = load.reshape(n, -1) * weights
-        r = np.einsum("nq,qk,nqc->nkc", weighted, shape, _normal(slopes))
-        return r.reshape(n, -1), slopes, weighted, points
+        weighted = load.reshape(places.shape[:2]) * weights
+        r = np.einsum("nq,qk,nqc->nkc", weighted, values, _normal(slopes))
+        return r.reshape(dofs.shape), slopes, weighted, points
 
 
 def _normal(slopes: Array) -> Array:

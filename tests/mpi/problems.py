@@ -60,6 +60,7 @@ def tied() -> Study:
     study.tie("left", "right", "u_z", "u_r")
     study.spring("bottom", u_r=40.0)
     study.fix((0.0, 5.0), u_z=0.0)
+    study.pressure("top", lambda x, t: 0.05 * t * x[:, 0], of=("u_z", "u_r"))
     study.load("top", u_r=0.2, u_z=lambda x, t: 0.1 * t * x[:, 0])
     study.load((1.0, 6.0), u_r=-0.5)
     return study
@@ -114,7 +115,7 @@ def solved(name: str, engine: Any, folder: Path) -> dict[str, Any]:
         return numbers(cube(int(name[4:])).solve(steps=10, engine=engine), "cube")
     if name in ("contact", "tied"):
         study = contact() if name == "contact" else tied()
-        result = study.solve(steps=4, engine=engine)
+        result = study.solve(steps=4, engine=engine, progress=True)
         for file in ("whole.vtu", "parts.pvtu"):
             result.write(folder / file)
         return numbers(result, "body")
@@ -139,7 +140,9 @@ def _marched(name: str, engine: Any, folder: Path) -> dict[str, Any]:
     file = folder / "march.npz"
     restart = file if name == "restart" else None
     in_time = yielding(lambda x, t: np.full(len(x), 0.2 * t))
-    path = in_time.march(dt=0.05, until=1.0, checkpoint=file, restart=restart, engine=engine)
+    path = in_time.march(
+        dt=0.05, until=1.0, checkpoint=file, restart=restart, engine=engine, progress=True
+    )
     results = []
     for result in path:
         results.append(result)
