@@ -58,6 +58,7 @@ def gradient(
     constant: Collection[Node] = (),
     given: Given | None = None,
     named: Collection[Node] = (),
+    flat: bool = False,
 ) -> dict[Node, Node]:
     """Adjoints of every node on the way from `wrt` to the scalar `root` (reverse mode).
 
@@ -65,9 +66,11 @@ def gradient(
     meets them as they are and not merged into other expressions.
 
     For a node that varies with the quadrature point the adjoint is that of the summand: it is
-    to be contracted with the node's own dependence and summed by the caller.
+    to be contracted with the node's own dependence and summed by the caller.  With `flat` it is
+    that of a value at a point for the other nodes too, instead of its sum over the points.
     """
-    sweep = _Reverse(g, Dependence(tuple(wrt), constant, given or {}), named=frozenset(named))
+    depends = Dependence(tuple(wrt), constant, given or {})
+    sweep = _Reverse(g, depends, flat, named=frozenset(named))
     adjoint = sweep.run(root)
     return {**dict.fromkeys(wrt, g.zero), **adjoint}
 

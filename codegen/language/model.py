@@ -361,7 +361,12 @@ class Model:
         """
         symbols = Entries.of(by)
         sources = [self._lower(s) for s in symbols.values]
-        slopes = gradient(self.graph, self._lower(value), sources, given=self._given)
+        root = self._lower(value)
+        # at a point, a symbol that is the same for all points is differentiated by there too
+        local = root.varying and not all(s.varying for s in sources)
+        if local and any(n.op is Op.SUM for n in reachable([root], stop=sources.__contains__)):
+            raise ModelError(f"{name}: {value} depends on an integral; give it a name of its own")
+        slopes = gradient(self.graph, root, sources, given=self._given, flat=local)
         return self._named(name, symbols, [slopes[s] for s in sources], [value, *symbols.values])
 
     def integral(self, name: str, integrand: Any) -> sp.Symbol:

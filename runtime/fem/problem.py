@@ -32,6 +32,9 @@ ROUNDING = 8.0 * np.finfo(np.float64).eps
 """What the residual of an element may be off by, relative to the stiffness times the largest number
 that its kernel adds: a few roundings."""
 
+_FAR = 1e6  # times the coordinates and prescribed values: no unknown of a problem that is posed
+_SWAMPED = 1e-3  # of the loads and internal forces: rounding beyond that decides nothing
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -167,6 +170,8 @@ class Problem:
         noise = np.zeros_like(r)
         if K is not None:
             noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + self.assembler.reach()))
+            if self._is_lost(x, size, noise):
+                return np.inf
         free: Flags = np.ones(len(r), dtype=bool)
         free[self.fixed] = False
         wanted = x.copy()
@@ -179,6 +184,17 @@ class Problem:
                 _ratio(x[part] - wanted[part], np.maximum(np.abs(x), np.abs(wanted))[part])
             )
         return float(np.linalg.norm(parts))
+
+    def _is_lost(self, x: Array, size: Array, noise: Array) -> bool:
+        """Whether unknowns have grown until rounding is as large as the loads: nothing holds them.
+
+        Where a body floats, a tangent that rounding alone keeps regular moves it by any amount.
+        """
+        known = max(
+            float(self.assembler.reach().max()), float(np.abs(self.values).max(initial=0.0))
+        )
+        grown = float(np.abs(x).max(initial=0.0)) > _FAR * known > 0.0
+        return grown and float(np.linalg.norm(noise)) > _SWAMPED * float(np.linalg.norm(size))
 
     def _relative(self, name: str, r: Array, size: Array, noise: Array, free: Flags) -> float:
         """Size of the residuals r, (n,), of a field, relative to what it is measured by."""

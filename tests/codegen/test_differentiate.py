@@ -17,12 +17,13 @@ from softehl.codegen.abi import Task
 from softehl.codegen.derive import variants
 from softehl.codegen.derive.linearise import Linearisation
 from softehl.codegen.graph.differentiate import gradient
-from softehl.codegen.graph.evaluate import State, evaluate
+from softehl.codegen.graph.evaluate import State, Walk, evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.partials import DifferentiationError, partials
 from softehl.codegen.graph.traverse import operations
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 from softehl.codegen.tools.oracle import Oracle
@@ -498,6 +499,26 @@ def test_a_mean_of_an_interpolated_field_may_not_enter_a_sum_again() -> None:
     variants.outputs(d, Task.RESIDUAL)
     with pytest.raises(DifferentiationError, match="may not enter a sum again"):
         variants.outputs(d, Task.TANGENT)
+
+
+def test_a_value_at_a_point_by_a_symbol_of_all_points() -> None:
+    """Its derivative there, not the sum over the points."""
+    m = Model("point", nodes=1, rule=quadrature.gauss(2, 1))
+    u = m.unknown("u")
+    (xi,) = m.point()
+    one = m.define("one", sp.Integer(1))
+    slope = m.derivative("slope", (2 + xi) * u**2 * one**3, one)
+    m.fields(slope=slope)
+    m.potential(m.integral("Pi", (2 + xi) * u**2))
+    d = m.finish()
+    state = State((), (5,), (), (), RULE)
+    with mpmath.workdps(50):
+        walk = Walk(state, {})
+        for q, (at, _) in enumerate(RULE):
+            assert close(walk.at(d.fields[0][1], q), 75 * (2 + mpmath.mpf(at)), 1e-45)
+    mean = m.integral("mean", u * one * xi)
+    with pytest.raises(ModelError, match=r"slopes: .* depends on an integral"):
+        m.derivative("slopes", mean * xi * one, one)
 
 
 def test_a_wrong_tangent_graph_is_detected() -> None:
