@@ -73,11 +73,16 @@ class ORingCase(Case[ORing, FilmRow]):
     def notes(self, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
         chosen = {word: [row for row in rows if row.verdict == word] for word in plan.DOUBTS}
-        return [
+        doubts = [
             f"{word}: {plan.DOUBTS[word]}: {self.named(some)}; use a finer mesh (larger density)"
             for word, some in chosen.items()
             if some
         ]
+        thin = [row for row in rows if not row.regime and row.h_min_um < plan.THIN]
+        if not thin:
+            return doubts
+        words = f"films below {plan.THIN:g} um, where surfaces of {plan.USUAL:g} um rms touch"
+        return [*doubts, f"smooth surfaces: {words}: {self.named(thin)}; give their roughness"]
 
     def draw(
         self, parameters: ORing, folder: Path, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]

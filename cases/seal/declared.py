@@ -26,7 +26,7 @@ from softehl.runtime.fem.dofs import (
 from softehl.runtime.kernels import Rule, load_kernel
 
 Place = Literal["nodes", "film", "arc_nodes", "outer_nodes", "wall_nodes", "section"]
-Group = Literal["solid", "load", "contact", "film", "support"]
+Group = Literal["solid", "load", "contact", "film", "squeeze", "support"]
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,9 @@ def number_unknowns(field: Field, p: ORing, section: SealSection) -> Unknowns:
         number = chain_dofs if p.reynolds == "fe" else separate_dofs
         arc = number(section.mesh.arc, field.order or p.pressure_order, 0)
         facets = np.concatenate([arc[:-1], arc[1:]], axis=1)
-        return Unknowns(field, int(arc.max()) + 1, {"arc": arc, "facets": facets})
+        count = int(arc.max()) + 1
+        single = np.arange(count)[:, None]
+        return Unknowns(field, count, {"arc": arc, "facets": facets, "film_nodes": single})
     if field.on == "section":
         rows = {name: np.zeros((len(nodes), 1), np.int64) for name, nodes in elements.items()}
         return Unknowns(field, 1, rows)
@@ -139,12 +141,19 @@ class Numbering:
     def element_block(self, block: Block, p: ORing, data: Array | None) -> ElementBlock:
         """The elements of a block; data: their constants (n, k)."""
         films = [f for f in block.fields if self.unknowns[f].field.on == "film"]
+        kernel = load_kernel(block.kernel_of(p))
+        numbers = gather_rows(*(self.rows(field, block.elements) for field in block.fields))
+        rule, n = block.rule(p, self.unknowns[films[0]].order) if block.rule else None, len(numbers)
+        places = self.section.coordinates(block.elements) if kernel.coordinates else None
+        at_rest = np.zeros((n, len(kernel.data))) if kernel.data and data is None else data
+        points = np.zeros((n, len(rule.weights), len(kernel.point_data))) if rule else None
         return ElementBlock(
             name=block.name,
-            kernel=load_kernel(block.kernel_of(p)),
-            coordinates=self.section.coordinates(block.elements),
-            dofs=gather_rows(*(self.rows(field, block.elements) for field in block.fields)),
-            data=data,
-            rule=block.rule(p, self.unknowns[films[0]].order) if block.rule else None,
+            kernel=kernel,
+            coordinates=np.empty((n, 0)) if places is None else places,
+            dofs=numbers,
+            data=at_rest,
+            rule=rule,
             constant=block.constant,
+            point_data=points if kernel.point_data else None,
         )

@@ -24,6 +24,7 @@ from softehl.cases.seal.system import (
     ROD,
     ROTATION,
     SHEAR,
+    VOID,
     WALLS,
     Values,
     contact_values,
@@ -36,12 +37,13 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.contact import Obstacle, contact_data, tributary_areas
 from softehl.runtime.fem.dofs import DofLayout
-from softehl.runtime.fem.guards import KeepsOrientation, StaysPositive
+from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
 from softehl.runtime.fem.layered import Layer
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.sections import Disc, SectionMesh
 
 _STEP = 0.9  # of its thickness a film may lose in an iteration
+_ROUGH_STEP = 0.7  # of its thickness that of a rough film may change, at least by sigma
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +228,9 @@ class SealSystem:
         fixed = [*map(self._ends, fields), self.layout.dofs(ROD)]
         values: list[Array | float] = [np.array([p_s, 0.0]) for _ in fields]
         values.append(film.multipliers)
+        if self.parameters.conserving:
+            fixed.append(self._ends(VOID))
+            values.append(np.array(film.inflow))
         if film.place is None:
             fixed.append(self.layout.dofs(AXIAL))
             values.append(0.0)
@@ -239,13 +244,16 @@ class SealSystem:
             guards=(*problem.guards, self.film_guard()),
         )
 
-    def film_guard(self) -> StaysPositive:
-        """Film thickness at the nodes of the arc, positive in every iterate."""
+    def film_guard(self) -> Guard:
+        """Film thickness at the nodes of the arc: positive in every iterate between smooth
+        surfaces; between rough ones, which may interpenetrate, it changes little at a time.
+        """
         nodes = self.mesh.arc_nodes
-        start = self.layout.part(DISPLACEMENT).start
-        return StaysPositive(
-            start + 2 * nodes + 1, self.mesh.points[nodes, 1] - self.rod_radius, _STEP
-        )
+        radii = self.layout.part(DISPLACEMENT).start + 2 * nodes + 1
+        gaps = self.mesh.points[nodes, 1] - self.rod_radius
+        if self.parameters.rough:
+            return ChangesLittle(radii, gaps, _ROUGH_STEP, self.parameters.surfaces.sigma)
+        return StaysPositive(radii, gaps, _STEP)
 
     def flux_scales(self, speed: float, gap: Array, field: str = PRESSURE) -> Array:
         """Reference fluxes (n,), mm^2/s, of the equations of a pressure field at |U| (mm/s).
@@ -271,7 +279,10 @@ class SealSystem:
         moment = self.layout.dofs(ROTATION)
         shared = np.concatenate([start + 2 * nodes, start + 2 * nodes + 1, moment])
         own = [self.layout.dofs(field.name) for field in self._fields if field.on == "film"]
-        inner = np.setdiff1d(np.concatenate(own), self.film_ends)
+        inner = np.concatenate(own)
+        if self.parameters.conserving:  # side by side along the film: their matrix is a band
+            inner = np.stack([pressures[1:-1] for pressures in own], axis=1).ravel()
+        inner = inner[~np.isin(inner, self.film_ends)]
         names = [block.name for block in self.blocks if block.layer]
         return Layer.of(self.problem.assembler, names, shared, inner)
 

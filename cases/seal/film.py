@@ -149,6 +149,11 @@ class FastFilm:
         """The stage of falling speed, to the full tolerance."""
         return replace(self._stage(stage, self.corrector, _SPEED_STEPS), predictor="parabola")
 
+    def rising(self, stage: Stage) -> Stage:
+        """The stage of rising speed of a rough film, to the full tolerance, with its own steps."""
+        rising = self._stage(stage, self.corrector, stage.steps)
+        return replace(rising, predictor="parabola")
+
     def _stage(self, stage: Stage, corrector: SchurCorrector, steps: StepRule) -> Stage:
         guards = (self.system.film_guard(),)
 

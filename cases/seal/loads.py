@@ -36,7 +36,8 @@ class FilmLoads:
     contact forces. shear: weight of the shear stress. multipliers, gap: (arc nodes,) rod
     multipliers, MPa, and distance of the rod, mm, of the contact state; rod_offset: the offset of
     the rod in it, mm. moment: moment on the section (N mm) if it is free to roll, None if its
-    rotation is held. place: as of the contact state.
+    rotation is held. place: as of the contact state. rate: coefficient of time derivatives, 1/s, 0
+    where nothing changes. inflow: void fractions at the sealed and the air end, where oil comes in.
     """
 
     sealed_pressure: float
@@ -49,6 +50,8 @@ class FilmLoads:
     moment: float | None = None
     rod_offset: float = 0.0
     place: float | None = None
+    rate: float = 0.0
+    inflow: tuple[float, float] = (0.0, 0.0)
 
     @property
     def rod_speed(self) -> float:

@@ -14,6 +14,13 @@ from pathlib import Path
 from softehl.cases.seal.contact import assembly, contact_problem
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
+from softehl.cases.seal.dry import (
+    dry_film,
+    rising_stage,
+    settle_stage,
+    sliding_stages,
+    wetting_stages,
+)
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.estimate import coarser_system, h_star_error
 from softehl.cases.seal.failure import explained
@@ -28,7 +35,7 @@ from softehl.cases.seal.film import (
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.path import PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import carried_contact
 from softehl.cases.seal.results import (
     contact_numbers,
@@ -96,6 +103,49 @@ class FilmPath:
         stages.append(fast.speed(speed_stage(system, settings, film, p.speeds, on_speed)))
         return not isinstance(self.driver.follow_all(stages, x), StageFailed)
 
+    def settled(self, x: Array) -> Array:
+        """The contact state x where the rod is as near as asperities let it; x itself if smooth."""
+        if not self.system.parameters.rough:
+            return x
+        y = self.driver.follow(settle_stage(self.system, self.settings), x)
+        return x if isinstance(y, StageFailed) else y
+
+    def rise(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """Rough films: from asperities in contact at x to dry sliding, then to higher speeds."""
+        system, settings, p = self.system, self.settings, self.system.parameters
+        film = dry_film(system, stroke, x)
+        y = self.driver.follow_all(wetting_stages(system, film, x), x)
+        if not isinstance(y, StageFailed):
+            y = self.driver.follow_all(sliding_stages(system, settings, film, y), y)
+        if isinstance(y, StageFailed):
+            return y
+        shear = 1.0 if p.shear_traction else 0.0
+        moment = 0.0 if p.rotation == "free" else None
+        return self._faster(replace(film, shear=shear, moment=moment), y, on_speed)
+
+    def _faster(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """Rising speeds by modified Newton iterations; by Newton's method where they fail."""
+        system, p, linear = self.system, self.system.parameters, self.driver.newton.linear
+        reached = [(film, x)]
+
+        def keep(at: FilmLoads, point: Point) -> None:
+            if at.speed > reached[0][0].speed or not reached[1:]:
+                reached[1:] = [(at, point.solution.x)]
+                on_speed(at, point)
+
+        def stage(start: FilmLoads) -> Stage:
+            speeds = tuple(u for u in p.speeds if u >= start.speed)
+            return rising_stage(system, self.settings, start, speeds, keep)
+
+        if p.solver == "auto" and p.rotation == "fixed" and isinstance(linear, Condenser):
+            fast = FastFilm.of(system, linear)
+            if not isinstance(self.driver.follow(fast.rising(stage(film)), x), StageFailed):
+                return None
+        film, x = reached[-1]
+        reached[:] = [(film, x)]
+        end = self.driver.follow(stage(film), x)
+        return end if isinstance(end, StageFailed) else None
+
     def build(self, film: FilmLoads, x: Array) -> BuiltFilm | StageFailed:
         """By Newton's method from the contact state x to the film at its first speed."""
         system, settings, p = self.system, self.settings, self.system.parameters
@@ -143,11 +193,14 @@ class SealRun:
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
         ratios = INLET_RATIO if p.mesh == "graded" else ANY_RATIO
         coarser = _thicknesses(*self.coarser, stroke) if self.coarser else {}
-        progress = StrokeState(Verdict(reference, fewest=fewest, ratios=ratios), set(p.speeds))
+        verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
+        progress = StrokeState(verdict, set(p.speeds))
 
         def on_speed(film: FilmLoads, point: Point) -> None:
             self._judge(progress, coarser, film, point)
 
+        if p.rough:
+            return path.rise(stroke, self.x, on_speed)
         film = path.first(stroke, self.x)
         if path.fast(film, self.x, on_speed):
             return None
@@ -165,12 +218,13 @@ class SealRun:
     ) -> None:
         """Look at a film of falling speed; one at a requested speed becomes a state."""
         system, x = self.system, point.solution.x
-        if progress.slowest is not None and not film.speed < progress.slowest[0].speed:
+        falling = not system.parameters.rough
+        if falling and progress.slowest and not film.speed < progress.slowest[0].speed:
             return  # a slower film is known already
         progress.slowest = film, x
         problem = system.film_problem(film)
         progress.verdict = progress.verdict.after(film_numbers(system, problem, film, x))
-        if film.speed not in system.parameters.speeds:
+        if film.speed not in progress.missing:
             return
         progress.missing.discard(film.speed)
         iterations = point.solution.iterations
@@ -222,7 +276,9 @@ def _thicknesses(path: FilmPath, x: Array, stroke: Stroke) -> dict[float, float]
             problem = system.film_problem(film)
             found[film.speed] = film_numbers(system, problem, film, point.solution.x).h_star
 
-    if not path.fast(film, x, keep):
+    if system.parameters.rough:
+        path.rise(stroke, x, keep)
+    elif not path.fast(film, x, keep):
         path.slower(path.build(film, x), speeds, keep)
     return found
 
@@ -260,13 +316,15 @@ def _begun(path: FilmPath, x: Array, observer: Observer, state: RunState) -> Sea
     system, settings, p = path.system, path.settings, path.system.parameters
     problem = contact_problem(system, settings, p.sealed_pressure)
     observer.contact_state(contact_state(system, problem, p.sealed_pressure, x))
-    seal = SealRun(path, x, observer, state)
+    seal = SealRun(path, path.settled(x), observer, state)
     if not (p.error_estimate and p.mesh == "graded"):
         return seal
     coarser = FilmPath(coarser_system(system), settings, path.driver.named("coarser mesh: "))
     start = carried_contact(system, coarser.system, settings, x, "contact")
     y = coarser.driver.follow(*start)
-    return seal if isinstance(y, StageFailed) else replace(seal, coarser=(coarser, y))
+    if isinstance(y, StageFailed):
+        return seal
+    return replace(seal, coarser=(coarser, coarser.settled(y)))
 
 
 def _outcome(

@@ -12,6 +12,7 @@ from softehl.cases.seal import materials
 from softehl.cases.seal.fitting import fitted
 from softehl.cases.seal.oils import with_oil
 from softehl.cases.seal.rubber import require_stable, with_rubber
+from softehl.cases.seal.surfaces import ROUGHNESS, Roughness, Surfaces
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
@@ -205,9 +206,28 @@ class ORing(Parameters):
         ge=0,
         le=2,
     )
+    cavitation: Literal["penalty", "mass-conserving"] | None = key(
+        None,
+        "model of cavitation",
+        bounds='"penalty" (25) or "mass-conserving", left out = the latter with roughness',
+    )
+    cavitation_pressure: float = key(
+        0.0, "mass-conserving: pressure of the ruptured film", unit="MPa", ge=-0.1, le=0
+    )
     cavitation_penalty: float = key(
         1.0e4, "cavitation penalty epsilon of (25)", unit="mm/(MPa s)", gt=0
     )
+    roughness: Roughness = key(
+        (0.0, 0.0), "rms heights of rod and seal, 0 = smooth", unit="um", bounds=ROUGHNESS
+    )
+    asperity_stiffness: float | None = key(
+        None,
+        "pressure K of touching asperities, K F_3/2(h/sigma)",
+        unit="MPa",
+        bounds="> 0, left out = 4 (mu_1 + mu_2)",
+        gt=0,
+    )
+    boundary_friction: float = key(0.1, "friction coefficient of touching asperities", ge=0, le=2)
 
     groove_width: float = key(3.74, "axial width of the groove", unit="mm", gt=0)
     groove_centre: float = key(
@@ -248,6 +268,22 @@ class ORing(Parameters):
     def rubs(self) -> bool:
         """Whether housing and walls have friction, which then holds the section by itself."""
         return self.housing_friction > 0.0
+
+    @property
+    def rough(self) -> bool:
+        """Whether the film knows roughness."""
+        return any(self.roughness)
+
+    @property
+    def conserving(self) -> bool:
+        """Whether the film conserves mass where it ruptures."""
+        return self.cavitation == "mass-conserving" or (self.cavitation is None and self.rough)
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """Roughness, asperities and their friction; rubber on rigid asperities is as E* = 4 G."""
+        stiffness = self.asperity_stiffness or 4.0 * self.shear_modulus
+        return Surfaces.of(self.roughness, stiffness, self.boundary_friction)
 
     @property
     def shear_modulus(self) -> float:
@@ -304,6 +340,14 @@ class ORing(Parameters):
                 f"quadrature_points = {points} cannot hold {order + 1} pressures of a segment "
                 f"(pressure_order = {order}); give at least {order}, or leave it out"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _film_has_its_model(self) -> Self:
+        if self.rough and not self.conserving:
+            raise ValueError('cavitation = "penalty" knows no roughness; leave cavitation out')
+        if self.conserving and self.reynolds == "dg":
+            raise ValueError('reynolds = "dg" knows the penalty only; use "fe", or leave it out')
         return self
 
     @model_validator(mode="after")

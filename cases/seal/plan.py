@@ -4,9 +4,16 @@ from collections.abc import Sequence
 
 from softehl.cases.seal.parameters import DENSITIES, ORing
 from softehl.cases.seal.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
+from softehl.cases.seal.surfaces import FULL
 
 SIGNS = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
+
+USUAL = 0.2
+"""Rms roughness of usual surfaces, rod and rubber together, um."""
+
+THIN = FULL * USUAL
+"""Film thickness below which these would touch, um."""
 
 DOUBTS = {
     UNDER_RESOLVED: "the inlet is too short for this mesh, h* may be far off",

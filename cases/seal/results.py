@@ -12,6 +12,7 @@ from softehl.cases.seal.catalogue import Ring, fill, squeeze, stretch
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.state import ContactState, FilmState, Profile, Section
+from softehl.cases.seal.surfaces import regime
 from softehl.cases.seal.system import AIR_WALL, FACET, FILM, SEALED_WALL, SOLID
 from softehl.cases.seal.verdict import FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
@@ -72,9 +73,29 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         jump=jump,
         oscillation=oscillation(z, h),
         inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
-        inlet_ratio=inlet_ratio(at, film, h_star),
+        inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(at, film, h_star),
         end_gap=float(min(h[0], h[-1])),
+        **rough_numbers(system, at),
     )
+
+
+def rough_numbers(system: SealSystem, at: Mapping[str, Array]) -> dict[str, float]:
+    """What asperities carry of load and friction, and how far they are apart: see FilmNumbers.
+
+    at: fields of the film. Nothing is known between smooth surfaces.
+    """
+    sigma = system.parameters.surfaces.sigma
+    if not sigma:
+        return {}
+    dx, gap = at["dx"], float(at["h_T"].min())
+    load, drag = ((at[name] * dx).sum() for name in ("p", "tau_rod"))
+    asperities, boundary = ((at[name] * dx).sum() for name in ("p_a", "tau_a"))
+    return {
+        "mean_gap": gap,
+        "lambda_ratio": gap / sigma,
+        "asperity_load": float(asperities / (load + asperities)),
+        "boundary_friction": float(boundary / drag),
+    }
 
 
 def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> float:
@@ -233,6 +254,11 @@ def film_state(
         oscillation_index=numbers.oscillation,
         inlet_segments=numbers.inlet_segments,
         inlet_ratio=numbers.inlet_ratio,
+        mean_gap_um=numbers.mean_gap / MICROMETRE,
+        lambda_ratio=numbers.lambda_ratio,
+        regime=regime(numbers.lambda_ratio) if system.parameters.rough else "",
+        asperity_load_percent=100.0 * numbers.asperity_load,
+        boundary_friction_percent=100.0 * numbers.boundary_friction,
         verdict=verdict.word,
         advice=verdict.advice,
         profile=_profile(system, problem, x),

@@ -7,6 +7,7 @@ import numpy as np
 from softehl.cases.seal.profiles import Slider
 from softehl.cases.seal.strip import Oil, Strip
 from softehl.cases.seal.surfaces import Surfaces
+from softehl.cases.seal.system import DISPLACEMENT, PRESSURE
 from softehl.runtime.fem import dofs, rules
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.chain import chain_block
@@ -48,7 +49,7 @@ def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
     if p.pressure_viscosity and not alpha:
         ends = -np.expm1(-p.pressure_viscosity * ends) / p.pressure_viscosity
     problem = Problem(Assembler.build(layout.total, blocks), layout, parameters, {})
-    return problem.with_fixed([layout.dofs("displacement"), numbers[[0, -1], [0, -1]]], [0.0, ends])
+    return problem.with_fixed([layout.dofs(DISPLACEMENT), numbers[[0, -1], [0, -1]]], [0.0, ends])
 
 
 def conserving_solution(p: Slider, speed: float) -> tuple[Problem, Solution]:
@@ -65,7 +66,7 @@ def transformed(
     problem: Problem, alpha: float, newton: Newton, reduced: Solution
 ) -> tuple[Problem, Solution]:
     """The film by Barus' law, from the one without, whose pressures are reduced ones."""
-    x, part = reduced.x.copy(), problem.layout.part("pressure")
+    x, part = reduced.x.copy(), problem.layout.part(PRESSURE)
     if alpha * x[part].max() >= 1.0:
         words = "no pressure carries this film; use a smaller pressure_viscosity or speed"
         return problem, replace(reduced, status=Status.DIVERGED, message=words)

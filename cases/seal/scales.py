@@ -34,6 +34,11 @@ def place(_: ORing) -> float:
     return _GAP
 
 
+def void(_: ORing) -> float:
+    """The condition of cavitation: a pressure and a void fraction of `surfaces`."""
+    return 1.0
+
+
 def film_flux(speed: float) -> float:
     """Flux (mm^2/s) of a film at |U| (mm/s): mean velocity times 10 micrometres."""
     return 0.5 * speed * _GAP

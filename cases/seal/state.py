@@ -101,6 +101,19 @@ class FilmRow(Row):
         "where the inlet is resolved",
         default=nan,
     )
+    mean_gap_um: float = column(
+        "um", "least mean gap h_T between rough surfaces; nan between smooth ones", default=nan
+    )
+    lambda_ratio: float = column(
+        "", "that over the rms height of both surfaces; nan between smooth ones", default=nan
+    )
+    regime: str = column(
+        "", "`boundary` (lambda < 1), `mixed` (< 3) or `full`; empty where smooth", default=""
+    )
+    asperity_load_percent: float = column("%", "share of asperities in the load", default=0.0)
+    boundary_friction_percent: float = column(
+        "%", "share of asperities in the friction on the rod", default=0.0
+    )
     density: int = column("", "density of the mesh that the state was solved on")
     verdict: str = column(
         "",

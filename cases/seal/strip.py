@@ -8,14 +8,15 @@ import numpy as np
 
 from softehl.cases.seal import scales
 from softehl.cases.seal.surfaces import PRESSURE_SCALE, VOID_SCALE, Surfaces, void_values
+from softehl.cases.seal.system import DISPLACEMENT, FILM, PRESSURE, SQUEEZE, VOID
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem import dofs, rules
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
 
-FILM, VOID, SQUEEZE = "film", "void", "squeeze"
-"""Blocks: flow, the condition of cavitation, and what the film holds where it changes."""
+CAVITATION = "cavitation"
+"""Block of the condition of cavitation."""
 
 
 _EVEN = 1e-9  # relative rise of the void fraction that counts as none
@@ -75,14 +76,14 @@ class Strip:
             ElementBlock(
                 *(FILM, flow, nodes, film, np.zeros((n, 2))), rule=rules.rupture_rule(self.order)
             ),
-            ElementBlock(VOID, load_kernel("film_void"), np.empty((m, 0)), voids),
+            ElementBlock(CAVITATION, load_kernel("film_void"), np.empty((m, 0)), voids),
             ElementBlock(
                 *(SQUEEZE, content, nodes, film),
                 rule=rules.content_rule(self.order),
                 point_data=history,
             ),
         ]
-        layout = dofs.DofLayout.of(displacement=4 * n, pressure=m, void=m)
+        layout = dofs.DofLayout.of(**{DISPLACEMENT: 4 * n, PRESSURE: m, VOID: m})
         values = {
             **{"rod_radius": 0.0, "rod_speed": speed, "viscosity": self.oil.viscosity},
             **{"pressure_viscosity": self.oil.alpha, "force_weight": 0.0, "shear_weight": 0.0},
@@ -92,8 +93,8 @@ class Strip:
         return Problem(
             Assembler.build(layout.total, blocks),
             layout,
-            {FILM: chosen, VOID: void_values(self.oil.cavitation_pressure)},
-            {"displacement": 1.0, "pressure": self._fluxes(speed, pressures - 4 * n), "void": 1.0},
+            {FILM: chosen, CAVITATION: void_values(self.oil.cavitation_pressure)},
+            {DISPLACEMENT: 1.0, PRESSURE: self._fluxes(speed, pressures - 4 * n), VOID: 1.0},
             absolute=True,
         )
 
@@ -108,8 +109,8 @@ class Strip:
     def between(self, problem: Problem, ends: Array, inflow: Array) -> Problem:
         """The problem with pressures (MPa) and void fractions (2,) prescribed at both ends."""
         layout = problem.layout
-        outer = (layout.dofs(name)[[0, -1]] for name in ("pressure", VOID))
-        return problem.with_fixed([layout.dofs("displacement"), *outer], [0.0, ends, inflow])
+        outer = (layout.dofs(name)[[0, -1]] for name in (PRESSURE, VOID))
+        return problem.with_fixed([layout.dofs(DISPLACEMENT), *outer], [0.0, ends, inflow])
 
     def starved(self, speed: float, supply: float | None) -> Array:
         """Void fractions (2,) of the ends where the plane brings in a film of this thickness, mm.

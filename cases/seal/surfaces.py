@@ -31,6 +31,9 @@ Rms = Annotated[float, Field(ge=0, le=20)]
 Roughness = Annotated[tuple[Rms, Rms], Field(strict=False), BeforeValidator(_pair)]
 """Rms heights of the moving surface and of the one that rests, um."""
 
+SLIP = 1e-3
+"""Speed at which the friction of asperities has 0.7 of its value where nothing moves, mm/s."""
+
 ROUGHNESS = "[moving, resting] or one number for the resting one alone; each 0 to 20"
 
 
@@ -46,7 +49,7 @@ class Surfaces:
     resting: float = 0.0
     stiffness: float = 0.0
     friction: float = 0.0
-    slip: float = 1.0
+    slip: float = SLIP
 
     @classmethod
     def of(cls, roughness: tuple[float, float], stiffness: float, friction: float) -> Surfaces:

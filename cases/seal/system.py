@@ -7,7 +7,7 @@ and nobody else knows how fields are called and where their unknowns stand.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import copysign
 from typing import TypeAlias
 
@@ -16,8 +16,15 @@ from softehl.cases.seal.declared import Block, Field, Place
 from softehl.cases.seal.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection
+from softehl.cases.seal.surfaces import void_values
 from softehl.runtime.fem.contact import Obstacle, inner_cylinder, outer_cylinder, plane
-from softehl.runtime.fem.rules import facet_rule, film_rule
+from softehl.runtime.fem.rules import (
+    content_rule,
+    facet_rule,
+    film_rule,
+    rupture_rule,
+    subcell_rule,
+)
 from softehl.runtime.kernels import Rule
 
 Values: TypeAlias = Mapping[str, float]
@@ -25,17 +32,23 @@ Values: TypeAlias = Mapping[str, float]
 
 
 def _segment_rule(p: ORing, order: int) -> Rule:
+    if p.conserving:
+        return subcell_rule(order)
     return film_rule(order, p.quadrature, p.quadrature_points)
 
 
 DISPLACEMENT, PRESSURE, ROD = "displacement", "pressure", "rod"
 """Displacements; film pressures; contact multipliers of the rod."""
 
+VOID = "void"
+"""Void fractions of the film, where its pressures stand."""
+
 ROTATION, AXIAL = "rotation", "axial"
 """Moment that holds the mean rotation of the section; force that holds its mean axial place."""
 
-SOLID, FILM, FACET = "solid", "film", "facet"
-"""Blocks whose fields are results: the section, segments of the film, what lies between them."""
+SOLID, FILM, FACET, SQUEEZE = "solid", "film", "facet", "squeeze"
+"""Blocks whose fields are results: the section, segments of the film, what lies between them, and
+what the film holds where it changes with time."""
 
 BORE, SEALED_WALL, AIR_WALL = "housing", "sealed_wall", "air_wall"
 WALLS: dict[str, Place] = {BORE: "outer_nodes", SEALED_WALL: "wall_nodes", AIR_WALL: "wall_nodes"}
@@ -54,9 +67,15 @@ def _rubs(p: ORing) -> bool:
     return p.rubs
 
 
+_RUPTURING: tuple[tuple[str, Callable[[ORing], bool]], ...] = (
+    ("conserving", lambda p: p.conserving and not p.rough),
+    ("rough", lambda p: p.rough),
+)
+
 FIELDS = (
     Field(DISPLACEMENT, "nodes", scales.force),
     Field(PRESSURE, "film", scales.largest_flux),
+    Field(VOID, "film", scales.void, needed=lambda p: p.conserving),
     Field(ROD, "arc_nodes", scales.gap),
     *(Field(name, nodes, scales.gap) for name, nodes in WALLS.items()),
     *(Field(SHEAR[name], nodes, scales.gap, needed=_rubs) for name, nodes in WALLS.items()),
@@ -77,11 +96,45 @@ BLOCKS = (
         Block(name, FRICTION, on, (DISPLACEMENT, name, SHEAR[name]), "contact", needed=_rubs)
         for name, on in WALLS.items()
     ),
-    Block(FILM, "film", "arc", (DISPLACEMENT, PRESSURE), "film", layer=True, rule=_segment_rule),
+    Block(
+        *(FILM, "film", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        layer=True,
+        needed=lambda p: not p.conserving,
+        rule=_segment_rule,
+    ),
+    *(
+        Block(
+            *(FILM, f"film_{kind}", "arc", (DISPLACEMENT, PRESSURE, VOID), "film"),
+            layer=True,
+            needed=needed,
+            rule=lambda _, order: rupture_rule(order),
+        )
+        for kind, needed in _RUPTURING
+    ),
+    Block(
+        *("cavitation", "film_void", "film_nodes", (PRESSURE, VOID), "film"),
+        layer=True,
+        needed=lambda p: p.conserving,
+    ),
+    *(
+        Block(
+            *(SQUEEZE, f"film_squeeze{kind}", "arc", (DISPLACEMENT, PRESSURE, VOID), "squeeze"),
+            layer=True,
+            needed=needed,
+            rule=lambda _, order: content_rule(order),
+        )
+        for kind, needed in zip(("", "_rough"), (n for _, n in _RUPTURING), strict=True)
+    ),
     Block(
         *("upwind", "film_upwind", "arc", (DISPLACEMENT, PRESSURE), "film"),
         layer=True,
-        needed=lambda p: p.upwinding != 0.0,
+        needed=lambda p: p.upwinding != 0.0 and not p.rough,
+        rule=_segment_rule,
+    ),
+    Block(
+        *("upwind", "film_upwind_rough", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        layer=True,
+        needed=lambda p: p.upwinding != 0.0 and p.rough,
         rule=_segment_rule,
     ),
     Block(
@@ -159,6 +212,9 @@ def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
         "shear_weight": film.shear,
         "shear_modulus": p.shear_modulus,
         "upwinding": p.upwinding * copysign(1.0, film.rod_speed),
+        "rate": film.rate,
+        **p.surfaces.values(),
+        **void_values(p.cavitation_pressure),
     }
 
 

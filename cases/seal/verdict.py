@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, nan
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.state import CLIPPED, COLLAPSED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED
+from softehl.cases.seal.surfaces import FULL
 from softehl.runtime.fem.postprocess import local_exponent
 
 EXCESS_PRESSURE = 0.1
@@ -49,7 +50,8 @@ class FilmNumbers:
     oscillation: index of `cases.seal.results.oscillation`. inlet_segments: number of segments
     over which the film narrows from ten times to one and a half times h* at its inlet. inlet_ratio:
     h* over that of the steepest slope of the pressure in the inlet, by (14) at h = 3/2 h*. end_gap:
-    the smaller film thickness of both ends of the arc.
+    the smaller film thickness of both ends of the arc. mean_gap: least h_T, mm. lambda_ratio: that
+    over sigma, nan between smooth surfaces. asperity_load, boundary_friction: shares of asperities.
     """
 
     speed: float
@@ -64,6 +66,15 @@ class FilmNumbers:
     inlet_segments: float
     inlet_ratio: float = 1.0
     end_gap: float = inf
+    mean_gap: float = nan
+    lambda_ratio: float = nan
+    asperity_load: float = 0.0
+    boundary_friction: float = 0.0
+
+    @property
+    def touching(self) -> bool:
+        """Whether asperities decide about the film too: its inlet is not that of (14)."""
+        return self.lambda_ratio < FULL
 
     @property
     def clipped(self) -> bool:
@@ -85,7 +96,8 @@ class Verdict:
     friction that rises while the speed falls, or a thickness that falls too fast. A path that
     has once collapsed does not recover; too few segments in the inlet or an oscillating film
     are judged for each film alone. fewest: segments that the inlet needs. ratios: credible
-    inlet_ratio. error: estimated error of the last film's h*, %, None where none is wanted.
+    inlet_ratio. error: estimated error of the last film's h*, %, None where none is wanted. rough:
+    between rough surfaces friction may rise while the speed falls, and h may be negative.
     """
 
     reference: float
@@ -94,6 +106,7 @@ class Verdict:
     fewest: float = FEWEST_INLET_SEGMENTS
     ratios: tuple[float, float] = ANY_RATIO
     error: float | None = None
+    rough: bool = False
 
     def after(self, film: FilmNumbers) -> Verdict:
         """The verdict that includes one more film; `collapsed` says what gave it away."""
@@ -107,7 +120,7 @@ class Verdict:
             return COLLAPSED
         if self.last is None:
             return OK
-        if self.last.inlet_segments < self.fewest:
+        if self.last.inlet_segments < self.fewest and not self.last.touching:
             return UNDER_RESOLVED
         if self.last.clipped:
             return CLIPPED
@@ -151,12 +164,12 @@ class Verdict:
         )
 
     def _suspicion(self, film: FilmNumbers) -> str:
-        if film.h_min <= 0.0:
+        if film.h_min <= 0.0 and not self.rough:
             return f"its least thickness is {1e3 * film.h_min:.2g} um"
         excess = film.p_max - self.reference
         if excess > EXCESS_PRESSURE * self.reference:
             return f"the maximum pressure is {excess:.2f} MPa above that of frictionless contact"
-        if self.last is None or not film.speed < self.last.speed:
+        if self.rough or self.last is None or not film.speed < self.last.speed:
             return ""
         if abs(film.friction) > abs(self.last.friction):
             return "the friction on the rod rises while the speed falls"

@@ -36,6 +36,23 @@ class StaysPositive:
 
 
 @dataclass(frozen=True, eq=False)
+class ChangesLittle:
+    """Quantities x[dofs] + offsets may change by a `fraction`, or by `least`, at a time."""
+
+    dofs: Integers
+    offsets: Array
+    fraction: float
+    least: float
+
+    def limit(self, x: Array, dx: Array) -> float:
+        """See `Guard`."""
+        allowed = np.maximum(self.fraction * np.abs(x[self.dofs] + self.offsets), self.least)
+        change = np.abs(dx[self.dofs])
+        moving = change > allowed
+        return float(np.min(allowed[moving] / change[moving])) if moving.any() else 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class KeepsOrientation:
     """Quadrilaterals must not turn inside out, nor radii negative: the step is halved until not.
 

@@ -47,7 +47,8 @@ HEADER = (
     "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_star_error_percent,h_min_um,p_max_MPa,"
     "pressure_jump_max_MPa,rod_friction_N,leak_rate_mm3_s,contact_start_mm,contact_end_mm,"
     "newton_iterations,flux_variation,moment_N_mm,contact_p_max_MPa,oscillation_index,"
-    "inlet_segments,inlet_ratio,density,verdict"
+    "inlet_segments,inlet_ratio,mean_gap_um,lambda_ratio,regime,"
+    "asperity_load_percent,boundary_friction_percent,density,verdict"
 )
 FAST = ("--set", "speeds=[400, 100]")
 PLOTS = {f"{name}.{kind}" for name in PICTURES for kind in ("png", "svg")}

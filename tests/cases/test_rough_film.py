@@ -1,0 +1,150 @@
+"""Films of the O-ring that conserve mass and touch: limits, Stribeck curve, what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from softehl.cases.oring import CASE
+from softehl.cases.seal.equations import build_system
+from softehl.cases.seal.method import run
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.state import FilmRow, FilmState, Silent
+from softehl.cases.seal.surfaces import Surfaces, regime
+from softehl.runtime.fem.guards import ChangesLittle
+
+SPEEDS = (2000.0, 500.0, 200.0, 50.0, 10.0, 1.0, 0.1, 0.01)
+
+
+def solved(**given: Any) -> dict[float, FilmState]:
+    """States by their signed speed."""
+    p = ORing.model_validate({"density": 1, "error_estimate": False, **given})
+    outcome = run(p, Silent())
+    assert outcome.converged, outcome.message
+    return {s.rod_speed_mm_s: s for s in outcome.states}
+
+
+def test_the_mass_conserving_film_is_that_of_the_penalty_where_nothing_forms_again() -> None:
+    """Pressures are linear on subcells there: 0.2 % at density 1, 0.04 % at density 2."""
+    given = {"speeds": (400.0,), "density": 1}
+    penalty, conserving = solved(**given), solved(cavitation="mass-conserving", **given)
+    for speed, state in penalty.items():
+        assert conserving[speed].h_star_um == pytest.approx(state.h_star_um, rel=3e-3)
+        assert conserving[speed].flux_variation < 1e-6  # also where the film is ruptured
+        assert conserving[speed].regime == ""
+        assert np.isnan(conserving[speed].lambda_ratio)
+    # what drags on the rod is less by what the void takes
+    assert conserving[400.0].rod_friction_N < penalty[400.0].rod_friction_N
+
+
+def test_a_stribeck_curve_from_dry_sliding_unattended() -> None:
+    states = solved(roughness=0.3, speeds=SPEEDS)
+    assert sorted(states) == sorted([*SPEEDS, *(-u for u in SPEEDS)])
+    for sign in (1.0, -1.0):
+        stroke = [states[sign * u] for u in sorted(SPEEDS)]
+        friction = np.array([sign * s.rod_friction_N for s in stroke])
+        ratios = [s.lambda_ratio for s in stroke]
+        shares = [s.asperity_load_percent for s in stroke]
+        assert np.diff(ratios).min() > -0.01  # the film hardly knows the slowest speeds
+        assert np.diff(shares).max() < 1.0
+        assert [s.regime for s in stroke] == [regime(r) for r in ratios]
+        assert stroke[0].regime == "boundary"
+        assert stroke[-1].regime == "full"
+        least = int(np.argmin(friction))
+        assert 0 < least < len(stroke) - 1
+        assert friction[0] > 5.0 * friction[least]
+        assert friction[-1] > friction[least]
+        assert stroke[0].boundary_friction_percent > 98.0
+        assert all(s.verdict == "ok" for s in stroke)
+    # dry friction: the coefficient of asperities times what they carry
+    dry = states[0.01]
+    assert 40.0 < dry.rod_friction_N < 70.0
+
+
+def test_little_roughness_is_the_smooth_film() -> None:
+    given: dict[str, Any] = {"speeds": (1000.0,), "stroke": "out"}
+    smooth = solved(cavitation="mass-conserving", **given)[1000.0]
+    errors = []
+    for sigma in (0.08, 0.04):
+        rough = solved(roughness=sigma, **given)[1000.0]
+        errors.append(abs(rough.rod_friction_N / smooth.rod_friction_N - 1.0))
+        assert rough.h_star_um == pytest.approx(smooth.h_star_um, rel=1e-4)
+    assert errors[1] < errors[0] < 2e-2
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
+
+
+def test_without_roughness_the_pages_are_the_smooth_ones() -> None:
+    default = build_system(ORing(density=1))
+    zero = build_system(ORing.model_validate({"density": 1, "roughness": 0}))
+    names = [[b.kernel.name for b in s.problem.assembler.blocks] for s in (default, zero)]
+    assert names[0] == names[1]
+    assert not any("rough" in name or "void" in name for name in names[0])
+    assert zero.layout == default.layout
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"roughness": 0.2, "cavitation": "penalty"}, "leave cavitation out"),
+        ({"roughness": 0.2, "reynolds": "dg"}, '"fe"'),
+        ({"roughness": [0.1, -0.2]}, "greater than or equal to 0"),
+        ({"boundary_friction": -0.1}, "greater than or equal to 0"),
+        ({"cavitation_pressure": 0.2}, "less than or equal to 0"),
+    ],
+)
+def test_what_does_not_fit_is_said(keys: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        ORing.model_validate(keys)
+
+
+def test_a_smooth_run_says_where_usual_surfaces_would_touch() -> None:
+    values: dict[str, Any] = {
+        "sealed_pressure_MPa": 1.0,
+        "rod_speed_mm_s": 25.0,
+        "h_star_um": 0.3,
+        "h_min_um": 0.2,
+        "p_max_MPa": 3.6,
+        "pressure_jump_max_MPa": 0.0,
+        "rod_friction_N": 2.0,
+        "leak_rate_mm3_s": 0.1,
+        "contact_start_mm": -1.0,
+        "contact_end_mm": 1.0,
+        "newton_iterations": 5,
+        "flux_variation": 0.0,
+        "moment_N_mm": 0.0,
+        "contact_p_max_MPa": 3.6,
+        "oscillation_index": 0.0,
+        "inlet_segments": 9.0,
+        "density": 2,
+        "verdict": "ok",
+    }
+    row = FilmRow(**values)
+    (note,) = CASE.notes([row])
+    assert "roughness" in note
+    assert "+25" in note
+
+
+def test_the_guard_of_rough_films_lets_them_interpenetrate() -> None:
+    guard = ChangesLittle(np.array([1, 2]), np.array([0.0, 1.0]), 0.7, 1e-3)
+    x = np.array([5.0, 2e-4, -0.5])
+    assert guard.limit(x, np.array([9.0, -1e-3, 0.0])) == 1.0
+    assert guard.limit(x, np.array([0.0, -4e-3, 0.0])) == 0.25
+    assert guard.limit(x, np.array([0.0, 0.0, 0.7])) == pytest.approx(0.5)
+
+
+def test_stiffness_of_asperities_is_that_of_the_rubber() -> None:
+    assert ORing().surfaces == Surfaces(0.0, 0.0, 14.64, 0.1)
+    assert ORing(asperity_stiffness=3.0).surfaces.stiffness == 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sigma", [0.1, 0.2, 0.4])
+def test_densities_agree_on_rough_films(sigma: float) -> None:
+    """Mean gap and friction within 1 % between densities 2 and 4."""
+    coarse, fine = (solved(roughness=sigma, speeds=SPEEDS, density=d) for d in (2, 4))
+    for speed, state in fine.items():
+        assert coarse[speed].mean_gap_um == pytest.approx(state.mean_gap_um, rel=1e-2)
+        assert coarse[speed].rod_friction_N == pytest.approx(state.rod_friction_N, rel=1e-2)
