@@ -46,6 +46,13 @@ _NAMES = ", ".join(SHIPPED)
     default=1,
     help="Up to N parts of the run (such as the two strokes) side by side, in a process each.",
 )
+@click.option(
+    "--engine",
+    type=click.Choice(["serial", "petsc"]),
+    default="serial",
+    show_default=True,
+    help="petsc: factors by MUMPS on all processes that mpirun started (the key linear).",
+)
 @click.option("--quiet", is_flag=True, help="No progress and no table.")
 def run(
     case: str,
@@ -55,18 +62,25 @@ def run(
     resume: bool,
     overwrite: bool,
     jobs: int,
+    engine: str,
     quiet: bool,
 ) -> int:
     """Run a case."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.earlier import existing_of
+    from softehl.cases.harness.engine import leading
     from softehl.cases.harness.session import run_case
 
     options = {} if tolerance is None else {"tolerance": tolerance.strip().removesuffix("%")}
-    read = read_case(case, SHIPPED, assignments, options)
-    target = Path("results", read.case.name) if folder is None else folder
-    existing = existing_of(resume=resume, overwrite=overwrite)
-    return run_case(read, target, existing, jobs=jobs, quiet=quiet)
+    with leading(engine, jobs) as leads:
+        if not leads:
+            return 0
+        if engine == "petsc":
+            assignments = (*assignments, "linear=petsc")
+        read = read_case(case, SHIPPED, assignments, options)
+        target = Path("results", read.case.name) if folder is None else folder
+        existing = existing_of(resume=resume, overwrite=overwrite)
+        return run_case(read, target, existing, jobs=jobs, quiet=quiet)
 
 
 @click.command(

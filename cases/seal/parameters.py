@@ -99,8 +99,11 @@ class ORing(Parameters):
         "way to the solution",
         bounds='"auto" (fast, checks itself) or "monolithic" (reference)',
     )
-    linear: Literal["auto", "superlu", "pardiso"] = key(
-        "auto", "linear solver", bounds='"superlu", "pardiso" or "auto" (pardiso where installed)'
+    linear: Literal["auto", "superlu", "pardiso", "petsc"] = key(
+        "auto",
+        "linear solver",
+        bounds='"superlu", "pardiso", "petsc" (MUMPS, also under mpirun) or "auto" (pardiso where '
+        "installed)",
     )
 
     ring: str | None = key(

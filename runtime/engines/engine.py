@@ -39,7 +39,7 @@ class Serial:
 
 
 def engine_of(engine: AnyEngine) -> Engine:
-    """The engine of that name.  Raises StudyError for an unknown one, or where PETSc is missing."""
+    """The engine of that name.  Raises StudyError for an unknown one, MissingPetsc."""
     if engine is None or engine == "serial":
         return Serial()
     if engine == "petsc":

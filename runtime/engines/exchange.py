@@ -9,8 +9,8 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.local import Part
-from softehl.runtime.engines.mpi import petsc, world
 from softehl.runtime.engines.partition import Partition
+from softehl.runtime.mpi import petsc, world
 
 
 @dataclass(eq=False)

@@ -11,8 +11,8 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.exchange import Exchange
-from softehl.runtime.engines.mpi import petsc, world
 from softehl.runtime.fem.assembly import Assembler
+from softehl.runtime.mpi import petsc, world
 from softehl.runtime.solve.linear import SingularMatrix
 
 DIRECT_BELOW = 200_000

@@ -12,10 +12,10 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.exchange import Exchange, largest, total
 from softehl.runtime.engines.local import Part, part_of
 from softehl.runtime.engines.matrix import Solver, Times
-from softehl.runtime.engines.mpi import petsc, world
 from softehl.runtime.engines.partition import Cells, Partition, partition
 from softehl.runtime.engines.spread import Distributed, Spread, Team
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.mpi import petsc, world
 from softehl.runtime.share import Share
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.system import System
@@ -28,8 +28,7 @@ class Petsc:
     """PETSc on all processes.
 
     options: by PETSc's own names, {"ksp_type": "cg", "pc_type": "gamg"}; those of the command line
-    and of PETSC_OPTIONS count too. times: what it has cost so far. Raises StudyError where PETSc is
-    missing.
+    and of PETSC_OPTIONS count too. times: what it has cost so far. Raises MissingPetsc.
     """
 
     options: Mapping[str, Any] = field(default_factory=dict)

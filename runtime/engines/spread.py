@@ -12,9 +12,9 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.exchange import Exchange, total
 from softehl.runtime.engines.local import Part
 from softehl.runtime.engines.matrix import Solver, Tangent
-from softehl.runtime.engines.mpi import world
 from softehl.runtime.fem.checks import element_name, rows_not_finite, unknown_name
 from softehl.runtime.fem.problem import ROUNDING, Problem, ratio
+from softehl.runtime.mpi import world
 
 
 @dataclass(eq=False)

@@ -13,6 +13,7 @@ from scipy.sparse import linalg as sparse_linalg
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.solve.linear import (
     Factorisation,
+    Factors,
     SingularMatrix,
     SparseMatrix,
     checked_row_sums,
@@ -75,7 +76,7 @@ class SuperLU:
 
 @dataclass(frozen=True, eq=False)
 class SchurBySolves:
-    """A condensation by SuperLU; satisfies `Condensed`.
+    """A condensation by solves with many right sides; satisfies `Condensed`.
 
     interior: (n - m,) eliminated unknowns. couplings: K_BI and K_IB.
     """
@@ -83,7 +84,7 @@ class SchurBySolves:
     boundary: Integers
     schur: Array
     interior: NDArray[np.intp]
-    factors: sparse_linalg.SuperLU
+    factors: Factors
     couplings: tuple[SparseMatrix, SparseMatrix]
 
     def reduce(self, r: Array) -> tuple[Array, Array]:

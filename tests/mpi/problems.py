@@ -183,13 +183,13 @@ FAILING = {"one fails": one_fails, "all fail": all_fail, "misspelt": misspelt}
 
 
 def _ranks() -> int:
-    from softehl.runtime.engines.mpi import world
+    from softehl.runtime.mpi import world
 
     return int(world().size)
 
 
 def _rank() -> int:
-    from softehl.runtime.engines.mpi import world
+    from softehl.runtime.mpi import world
 
     return int(world().rank)
 

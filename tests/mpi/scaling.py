@@ -15,8 +15,8 @@ import sys
 import time
 from typing import Any, cast
 
-from softehl.runtime.engines.mpi import world
 from softehl.runtime.engines.petsc import Petsc, Processes
+from softehl.runtime.mpi import world
 from tests.mpi.problems import cube
 
 

@@ -9,7 +9,10 @@ from functools import cache
 from types import TracebackType
 from typing import Any
 
-from softehl.runtime.statement.records import StudyError
+
+class MissingPetsc(ValueError):  # noqa: N818 (named after what it is)
+    """PETSc is not installed; the message says what to do."""
+
 
 _TOGETHER = 1.0  # seconds within which an error of all processes is one
 
@@ -22,17 +25,18 @@ _EXPLAINED = (ValueError, ArithmeticError, RuntimeError, OSError)
 def petsc() -> Any:
     """The module petsc4py.PETSc, with the options of the command line.
 
-    Raises StudyError where it is not installed.
+    Raises MissingPetsc where it is not installed.
     """
     try:
         _bundled()
         import petsc4py
     except ImportError as error:
-        raise StudyError(
-            f'engine = "petsc": {error}; install the extra `mpi` on Python 3.12 or newer '
+        raise MissingPetsc(
+            f'"petsc": {error}; install the extra `mpi` on Python 3.12 or newer '
             "(pip install 'softehl[mpi]'), or petsc4py and mpi4py of your cluster"
         ) from None
-    petsc4py.init(sys.argv)
+    # one dash is PETSc's, two are of softehl or the script
+    petsc4py.init([word for word in sys.argv if not word.startswith("--")])
     PETSc = importlib.import_module("petsc4py.PETSc")
     PETSc.Sys.popErrorHandler()  # errors are exceptions, not pages of text from every process
     PETSc.Sys.pushErrorHandler("python")
