@@ -218,7 +218,10 @@ def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
     }
 
 
+_FILM = ("film", "squeeze")
+
+
 def contact_kernels(p: ORing) -> tuple[str, ...]:
     """Names of the kernels that the contact problem of a case depends on, each once."""
-    kernels = [b.kernel_of(p) for b in BLOCKS if b.group != "film" and b.needed(p)]
+    kernels = [b.kernel_of(p) for b in BLOCKS if b.group not in _FILM and b.needed(p)]
     return tuple(dict.fromkeys(kernels))
