@@ -206,4 +206,5 @@ class Solver:
 
 
 def _words(error: BaseException) -> str:
-    return " ".join(str(error).split())
+    """What PETSc says in the end, after the calls that led there."""
+    return " ".join(str(error).split()).rsplit("] ", 1)[-1]

@@ -169,7 +169,7 @@ def _fields(part: Part, exchange: Exchange) -> dict[str, Integers]:
     found: dict[str, list[Integers]] = {}
     for name in layout.names:
         stem, _, axis = name.rpartition("_")
-        label = stem if stem and axis in _AXES else name
+        label = stem if stem and axis in (*_AXES, "r") else name
         span = layout.part(name)
         own = (exchange.owned >= span.start) & (exchange.owned < span.stop)
         found.setdefault(label, []).append(exchange.places[own])

@@ -128,6 +128,8 @@ def solved(name: str, engine: Any, folder: Path) -> dict[str, Any]:
         return numbers(path[-1], "bar")
     if name in ("march", "restart", "slow"):
         return _marched(name, engine, folder)
+    if name == "split":
+        return numbers(contact().solve(steps=4, engine=Petsc(SPLIT)), "body")
     if name == "gamg":
         engine = Petsc({"ksp_type": "gmres", "pc_type": "gamg", "ksp_rtol": 1e-10})
         result = cube(4).solve(steps=10, engine=engine)
@@ -179,6 +181,20 @@ def misspelt() -> Study:
     return study
 
 
+SPLIT = {
+    "ksp_type": "fgmres",
+    "ksp_rtol": 1e-10,
+    "pc_type": "fieldsplit",
+    "pc_fieldsplit_type": "schur",
+    "pc_fieldsplit_schur_fact_type": "full",
+    "fieldsplit_u_ksp_type": "preonly",
+    "fieldsplit_u_pc_type": "lu",
+    "fieldsplit_u_pc_factor_mat_solver_type": "mumps",
+    "fieldsplit_lambda_ksp_type": "gmres",
+    "fieldsplit_lambda_ksp_rtol": 1e-10,
+    "fieldsplit_lambda_pc_type": "none",
+}
+"""The displacements of `contact` by factors, its multipliers on the Schur complement."""
 FAILING = {"one fails": one_fails, "all fail": all_fail, "misspelt": misspelt}
 
 

@@ -95,6 +95,10 @@ def test_multigrid_by_options(tmp_path: Path) -> None:
     assert_equal(found, serially("cube4", tmp_path), limit=1e-8)
 
 
+def test_fields_are_split_by_the_names_of_the_page(tmp_path: Path) -> None:
+    assert_equal(run("split", 2, tmp_path), serially("contact", tmp_path), limit=1e-8)
+
+
 def test_pieces_are_the_whole(tmp_path: Path) -> None:
     import meshio
 
