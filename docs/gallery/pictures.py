@@ -258,6 +258,83 @@ def friction(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="lower left")
 
 
+def maxwell(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2)
+    t = np.linspace(0.05, 3, 200)
+    left.plot(t, 0.01 * (1 + 3 * np.exp(-(t - 0.05) / 0.5)), color=GREY, label="closed form")
+    left.plot(space["t"], space["stress"], "o", color=BLUE, label="steps of 0.1 s")
+    left.set(xlabel="time [s]", ylabel="shear stress [MPa]", ylim=(0, 0.045))
+    left.legend()
+    omega = np.geomspace(0.2, 40, 100)
+    w2 = (0.5 * omega) ** 2
+    right.plot(omega, 1 + 3 * w2 / (1 + w2), color=GREY, label="closed forms")
+    right.plot(omega, 3 * 0.5 * omega / (1 + w2), color=GREY)
+    some = np.array([0.25, 0.5, 1, 2, 4, 8, 16, 32])
+    found = np.array([space["moduli"](one, 50) for one in some])
+    right.plot(some, found[:, 0], "o", color=BLUE, label="storage modulus")
+    right.plot(some, found[:, 1], "s", color=ORANGE, label="loss modulus")
+    right.set(xscale="log", xlabel="angular frequency [1/s]", ylabel="[MPa]", ylim=(0, 4.8))
+    right.legend(loc="upper left", ncols=1)
+
+
+def seal(figure: Figure, space: dict[str, Any]) -> None:
+    early, late, right = figure.subplots(1, 3, width_ratios=[1, 1, 1.3])
+    path = space["squeezed"](3)
+    for axes, result in ((early, path[len(path) // 2]), (late, path[-1])):
+        cells = result.system.mesh.cells["quad9"]
+        places = result.deformed(("u_x", "u_y"))
+        values = result.fields("rubber")["mises"].mean(axis=1)
+        for side in (1, -1):
+            drawn = draw_cells(
+                axes, places * [side, 1], cells, values, cmap="viridis", clim=(0, 0.6)
+            )
+        axes.set_title(f"{2.2 * result.t:.1f} mm", fontsize=8.5)
+    figure.colorbar(drawn, ax=late, label="von Mises [MPa]", shrink=0.8)
+    right.plot(space["stroke"], space["force"], "o-", ms=3, color=BLUE)
+    right.axvline(1.1, color=GREY, lw=0.8, ls="--")
+    right.annotate("half the stroke", (1.12, 0.02), color=GREY)
+    right.set(xlabel="stroke [mm]", ylabel="force on half the seal [N/mm]", ylim=(0, 0.65))
+
+
+def finite_plasticity(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.6])
+    result = space["perfect"][-1]
+    cells, places = result.system.mesh.cells["quad8"], result.deformed(("u_x", "u_y"))
+    alpha = result.fields("steel")["alpha"].mean(axis=1)
+    for sides in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
+        drawn = draw_cells(left, places * sides, cells, alpha, cmap="viridis", clim=(0, 0.8))
+    figure.colorbar(drawn, ax=left, label="equivalent plastic strain", shrink=0.85)
+    for name, color in (("hardening", ORANGE), ("perfect", BLUE)):
+        path = space[name]
+        load = [r.reaction("end")["u_y"] / space["W"] / space["limit"] for r in path]
+        label = {"perfect": "perfectly plastic", "hardening": "hardening, H = 1000 MPa"}[name]
+        right.plot([r.t for r in path], load, "o-", ms=3, color=color, label=label)
+    right.axhline(1.0, color=GREY, lw=0.8, ls="--")
+    right.set(xlabel="displacement of the end [mm]", ylabel="load / limit load", ylim=(0, 1.4))
+    right.legend(loc="lower right")
+
+
+def stick_slip(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2)
+    path, nearest = space["path"], space["nearest"]
+    for t, color in ((0.5, BLUE), (1.0, ORANGE), (3.0, GREY)):
+        result = path[nearest(t)]
+        x = np.linspace(0.5, 99.5, 100)
+        stress = result.fields("floor")["traction"].mean(axis=1)
+        label = f"end at {space['end_stress'](result.t):+.2f} MPa"
+        left.plot(x, stress, color=color, label=label)
+    left.set(xlabel="along the floor [mm]", ylabel="friction [MPa]", ylim=(-0.013, 0.017))
+    left.legend(loc="upper left")
+    moved, bar, top = space["moved"], space["bar"], space["largest"]
+    right.plot(moved[:, 1], moved[:, 0], ".", color=BLUE, label="block")
+    s = np.linspace(0, top, 50)
+    right.plot([bar(v) for v in s], s, color=GREY, label="bar")
+    s = np.linspace(top, -top, 100)
+    right.plot([bar(top) - 2 * bar((top - v) / 2) for v in s], s, color=GREY)
+    right.set(xlabel="displacement of the end [mm]", ylabel="stress at the end [MPa]")
+    right.legend(loc="upper left")
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
@@ -266,6 +343,10 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "fbar": fbar,
     "cahn-hilliard": cahn_hilliard,
     "friction": friction,
+    "maxwell": maxwell,
+    "seal": seal,
+    "finite-plasticity": finite_plasticity,
+    "stick-slip": stick_slip,
 }
 
 if __name__ == "__main__":
