@@ -15,7 +15,10 @@ import sys
 import time
 from typing import Any, cast
 
+import numpy as np
+
 from softehl.runtime.engines.petsc import Petsc, Processes
+from softehl.runtime.engines.spread import Team
 from softehl.runtime.mpi import world
 from tests.mpi.problems import cube
 
@@ -48,8 +51,17 @@ def measured(n: int) -> dict[str, Any]:
         "newton": times.solves,
         "krylov": times.iterations,
         "vector bytes a newton step": comm.allreduce(team.exchange.sent) // max(times.solves, 1),
+        "matrix bytes a newton step": comm.allreduce(_entries_sent(team)),
         "norm": result.norm(),
     }
+
+
+def _entries_sent(team: Team) -> int:
+    """Bytes of element entries whose row belongs to another process."""
+    foreign = np.ones(len(team.part.unknowns), dtype=bool)
+    foreign[team.part.owned] = False
+    blocks = team.part.system.assembler.blocks
+    return sum(8 * int(foreign[b.dofs].sum()) * b.dofs.shape[1] for b in blocks)
 
 
 def main() -> None:
