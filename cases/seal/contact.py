@@ -9,16 +9,19 @@ Without a pressure it stays, as friction on the housing would, and its force is 
 
 from __future__ import annotations
 
-from math import pi
+from dataclasses import replace
+from math import exp, log, pi
 
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import ContactLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
-from softehl.cases.seal.system import AIR_WALL, BORE, ROD, SEALED_WALL
+from softehl.cases.seal.pressure_newton import PressureNewton
+from softehl.cases.seal.system import AIR_WALL, BORE, ROD, SEALED_WALL, SOLID
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.newton import Corrector, NonlinearProblem
+from softehl.runtime.kernels import load_kernel
+from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
 
 WEDGED = 2
@@ -186,6 +189,37 @@ def load_stage(
         sealed_pressure=sealed_pressure,
         stroke="both",
     )
+
+
+def approach_stage(system: SealSystem, settings: PathSettings, offset: float) -> Stage:
+    """Between contact and film: the rod moves from where contact holds it to another offset, mm.
+
+    The path parameter is the logarithm of the offset.
+    """
+    p_s = system.parameters.sealed_pressure
+
+    def at(t: float) -> Problem:
+        return contact_problem(system, replace(settings, offset=exp(t)), p_s)
+
+    way = max(abs(log(offset / settings.offset)), 1e-3)
+    return Stage(
+        name="rod to the film",
+        problem_at=at,
+        start=log(settings.offset),
+        stop=log(offset),
+        steps=StepRule(way, 0.05 * way),
+        sealed_pressure=p_s,
+        stroke="both",
+        shown=exp,
+    )
+
+
+def along(system: SealSystem, newton: Newton) -> Corrector | None:
+    """What corrects the steps of a contact path, None for Newton's method as it stands."""
+    p = system.parameters
+    if p.solver != "auto" or p.rubs:
+        return None
+    return PressureNewton(newton, SOLID, load_kernel("follower_pressure"), p.bulk_modulus)
 
 
 def contact_stage(

@@ -8,11 +8,12 @@ Where a route fails the next one begins on a finer mesh, the last of them on the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from softehl.cases.seal.contact import (
     against_wall,
+    along,
     held_place,
     lean_stage,
     let_go_stage,
@@ -27,14 +28,22 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import carried_contact, finer
 from softehl.runtime.arrays import Array
+from softehl.runtime.mesh.sections import Disc
 from softehl.runtime.solve.newton import Newton
 
 State: TypeAlias = tuple[SealSystem, Array]
 
 _CUTS = (1.0, 0.25, 0.0625)  # of the first step of the squeeze, one after the other
 
+_CARRIED = ((14, False), (30, True))
+"""Iterations that a state may need that was carried to another mesh, and whether each has to reduce
+the residual: that helps where the ring is squeezed into the corners of its groove."""
+
+COARSE = 1
+"""Density on which a path from rest is followed first: it is cheap there."""
+
 GUIDE = 2
-"""Least density of the uniform mesh whose contact shows where a graded one is to be fine."""
+"""Least density of a mesh whose contact shows where another one is to be fine."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +95,9 @@ class ContactRoute:
     def _squeezed(self, system: SealSystem) -> Followed:
         """Unknowns of a squeezed section without pressure; a failed start is tried closer."""
         for cut in _CUTS:
-            x = self.follow(squeeze_stage(system, self.settings, cut), system.at_rest())
+            stage = squeeze_stage(system, self.settings, cut)
+            stage = replace(stage, corrector=along(system, self.newton))
+            x = self.follow(stage, system.at_rest())
             if not isinstance(x, StageFailed) or x.branch.points:
                 break
         return x
@@ -96,7 +107,10 @@ class ContactRoute:
         p_s, force = system.parameters.sealed_pressure, 0.0
         if p_s > 0.0 and not wedged(system, x):
             y, place = against_wall(system, x)
-            leaning = self.follow(lean_stage(system, self.settings, place), y)
+            stage = replace(
+                lean_stage(system, self.settings, place), corrector=along(system, self.newton)
+            )
+            leaning = self.follow(stage, y)
             if isinstance(leaning, StageFailed):
                 return leaning
             x, force = leaning, system.axial_force(leaning)
@@ -105,7 +119,8 @@ class ContactRoute:
             if isinstance(free, StageFailed):
                 return free
             x = free
-        return self.follow(load_stage(system, self.settings, p_s, force), x)
+        stage = load_stage(system, self.settings, p_s, force)
+        return self.follow(replace(stage, corrector=along(system, self.newton)), x)
 
     def _graded(self, p: ORing) -> State | StageFailed:
         """Graded at a low density, from the uniform mesh of that density, then refined."""
@@ -120,36 +135,57 @@ class ContactRoute:
         return self._regraded(p)
 
     def _placed(self, p: ORing) -> State | StageFailed:
-        """On an arc that the contact places: seen on a wide guide, then on meshes graded in turn.
-
-        Where a state cannot be carried to the first of these, the whole path is followed on it;
-        where it cannot be carried to the next one, the first one has to do.
-        """
-        guide = build_system(_at(p.model_copy(update={"mesh": "uniform"}), GUIDE))
-        low, x = _at(p, min(GUIDE, p.density)), self._guided(guide)
-        if isinstance(x, StageFailed):
-            return x
-        state: State | StageFailed = guide, x
-        for number in range(1, PASSES + 1):
-            before = state
-            assert not isinstance(before, StageFailed)
-            new = build_system(low, placed_disc(*before, p))
-            state = self._carried(*before, new, f"contact on graded mesh {number}")
-            if isinstance(state, StageFailed) and number == 1:
-                x = self._loaded(new)
-                state = x if isinstance(x, StageFailed) else (new, x)
-            if isinstance(state, StageFailed):
-                state = before if number > 1 else state
+        """On an arc that the contact places, from the coarsest guide that leads there."""
+        density = min(GUIDE, p.density)
+        state: State | StageFailed
+        for guide in _doublings(COARSE, density):
+            state = self._guided(p, guide)
+            if not isinstance(state, StageFailed) and guide < density:
+                state = self._finer(state, density)
+            if not isinstance(state, StageFailed):
+                state = self._on(placed_disc(*state, p), _at(p, density), state, PASSES)
+            if not isinstance(state, StageFailed):
+                state = self._refined(*state, p.density)
+            if not isinstance(state, StageFailed):
                 break
-        return state if isinstance(state, StageFailed) else self._refined(*state, p.density)
+        return state
 
-    def _guided(self, guide: SealSystem) -> Followed:
-        """Unknowns of the guide in contact, from a stored state if there is a good one."""
-        if self.contacts.densities(guide.parameters, (GUIDE,)):
-            x = self._stored(guide)
+    def _finer(self, state: State, density: int) -> State | StageFailed:
+        """From a contact state to that of the same mesh at `density`, if need be from rest."""
+        found = self._refined(*state, density)
+        if not isinstance(found, StageFailed):
+            return found
+        system = build_system(_at(state[0].parameters, density), state[0].section.disc)
+        return self._refined(system, self._loaded(system), density)
+
+    def _guided(self, p: ORing, density: int) -> State | StageFailed:
+        """Seen on a wide uniform arc of low density, then on all but the last of graded meshes."""
+        guide = build_system(_at(p.model_copy(update={"mesh": "uniform"}), density))
+        x = self._kept(guide)
+        state = x if isinstance(x, StageFailed) else (guide, x)
+        for number in range(1, PASSES):
+            if not isinstance(state, StageFailed):
+                disc = placed_disc(*state, p, most=0)
+                state = self._on(disc, _at(p, density), state, number)
+        return state
+
+    def _on(self, disc: Disc, p: ORing, before: State, number: int) -> State | StageFailed:
+        """On a graded mesh: carried to it, or else by the path from rest, coarse or as it is."""
+        new = build_system(p, disc)
+        state = self._carried(*before, new, f"contact on graded mesh {number}")
+        for density in _doublings(COARSE, p.density):
+            if isinstance(state, StageFailed):
+                coarse = build_system(_at(p, density), disc)
+                state = self._refined(coarse, self._loaded(coarse), p.density)
+        return state
+
+    def _kept(self, system: SealSystem) -> Followed:
+        """Unknowns of a section in contact, from a stored state if there is a good one."""
+        if self.contacts.densities(system.parameters, (system.parameters.density,)):
+            x = self._stored(system)
             if not isinstance(x, StageFailed):
                 return x
-        return self._loaded(guide)
+        return self._loaded(system)
 
     def _regraded(self, p: ORing) -> State | StageFailed:
         """On meshes graded in turn, each by the contact on the one before."""
@@ -178,7 +214,15 @@ class ContactRoute:
         self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
     ) -> State | StageFailed:
         """The contact state x of one mesh on another."""
-        found = self.follow(*carried_contact(old, new, self.settings, x, name))
+        stage, start = carried_contact(old, new, self.settings, x, name)
+        if not new.section.placed:
+            found = self.follow(stage, start)
+            return found if isinstance(found, StageFailed) else (new, found)
+        for iterations, line_search in _CARRIED:
+            newton = replace(self.newton, max_iterations=iterations, line_search=line_search)
+            found = self.follow(replace(stage, corrector=newton), start)
+            if not isinstance(found, StageFailed):
+                break
         return found if isinstance(found, StageFailed) else (new, found)
 
 

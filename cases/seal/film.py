@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 
 from softehl.cases.seal.contact import held_moment, held_place
 from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.grading import contact_edges, film_thickness
 from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered
@@ -35,6 +37,38 @@ _SHEAR_STEPS = StepRule(1.0, 0.05, target_iterations=8)
 _SPEED_STEPS = StepRule(math.log(2.0), 0.004, math.log(2.0) + 1e-9, target_iterations=30)
 
 
+FILMS_OFF = (5.0, 2.5, 10.0)
+"""Where a film is built up the rod is so many of `film_thickness` off, one after the other: a film
+of p_s = 0 needs three h*, below which pressures rise without bound; others come sooner from one or
+two, or from more."""
+
+
+def film_offsets(
+    system: SealSystem, settings: PathSettings, stroke: Stroke, x: Array
+) -> tuple[float, ...]:
+    """Where the rod may be (mm) when the film of a stroke is built up from the contact state x.
+
+    Where it is, without edges, on the arc of the paper's scheme, and where the section rubs on its
+    groove: its place depends on the way.
+    """
+    p, edges = system.parameters, contact_edges(system, x)
+    if _stays(p) or not edges:
+        return (settings.offset,)
+    h = film_thickness(p, [edges[0 if stroke == "out" else 1]], _start_speed(system, settings))
+    return tuple(films * h for films in FILMS_OFF)
+
+
+def _start_speed(system: SealSystem, settings: PathSettings) -> float:
+    p = system.parameters
+    least = settings.start_speed if _stays(p) else settings.placed_start_speed
+    return max(least, *p.speeds)
+
+
+def _stays(p: ORing) -> bool:
+    """Whether the rod stays where the contact stage holds it."""
+    return p.given_arc is not None or p.rubs
+
+
 def first_film(system: SealSystem, settings: PathSettings, stroke: Stroke, x: Array) -> FilmLoads:
     """The film at its highest speed, under the rod forces of the contact state x."""
     p = system.parameters
@@ -42,7 +76,7 @@ def first_film(system: SealSystem, settings: PathSettings, stroke: Stroke, x: Ar
     return FilmLoads(
         p.sealed_pressure,
         stroke,
-        speed=max(settings.start_speed, *p.speeds),
+        speed=_start_speed(system, settings),
         multipliers=system.rod_multipliers(x).copy(),
         gap=gap,
         shear=1.0 if p.shear_traction else 0.0,

@@ -23,7 +23,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG, Disc
 from softehl.runtime.mesh.spacing import Spot, graded
 
-PASSES = 2
+PASSES = 3
 """Meshes in a row, each graded by the contact on the one before."""
 
 RATE = 0.3
@@ -68,15 +68,23 @@ REACH, FILMS = 0.15, 60.0
 STEEPEST = 55.0
 """Or where the surface is this steep, degrees: beyond it is no film."""
 
+MOST_SEGMENTS, FINEST = 60, 0.7
+"""An arc that the contact places gets more segments, up to so many at density 1, until the finest
+one at density 2 is so much of the inlet at the slowest speed: with 0.8 inlet lengths h* is right to
+one per cent, with 2.5 to five."""
+
+_MULTIPLE = 3  # of segments at density 1: meshes exist for thirds of a density
 _PLACED_COARSEST = 12  # as COARSEST, of an arc that the contact places
 
 
-def placed_disc(system: SealSystem, x: Array, p: ORing) -> Disc:
+def placed_disc(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGMENTS) -> Disc:
     """The disc of a case whose arc reaches as far as a film may matter in the contact state x.
 
     With k = K / K_max of each edge, segments are as k^-0.3 at it and grow by 0.3 k^0.5 outside and
     0.3 min(1 / k, 1.5) inside: at the flatter edge the dip is as wide as the inlet of the other
     one, and lies outside. The exponents were fitted to states at p_s / mu = 0, 1 and 2.7.
+    most: segments at density 1 that it may get; a state that shows the edges only roughly is no
+    reason for many.
     """
     old, s = system.section.disc, arc_positions(system.section)
     edges = contact_edges(system, x)
@@ -92,11 +100,15 @@ def placed_disc(system: SealSystem, x: Array, p: ORing) -> Disc:
         rates = RATE * k**0.5, RATE * min(1.0 / k, 1.5)
         place = min(max(edge.place - ends[0], 0.0), length)
         spots.append(Spot(place, k**-0.3, rates if side == 0 else rates[::-1]))
-    count = disc.long * _DENSITY
-    spacing = graded(length, spots, count, coarsest=length / _PLACED_COARSEST, rate=RATE)
+    for long in range(disc.long, max(most, disc.long) + 1, _MULTIPLE):
+        coarsest = length / _PLACED_COARSEST
+        spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
+        if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet_length(p, steepest):
+            break
     return replace(
         disc,
         spacing=spacing,
+        long=long,
         top=max(_TOP, end + _SIDES, _SIDES - start),
         corner_radius=_CORNERS,
         layer_growth=_LAYER_GROWTH,
@@ -104,9 +116,15 @@ def placed_disc(system: SealSystem, x: Array, p: ORing) -> Disc:
     )
 
 
-def film_thickness(p: ORing, edges: Sequence[Edge]) -> float:
-    """About h* (mm) at the highest speed, K l^(3/2) / E with the l of the head of this page."""
-    flow, E = p.viscosity * max(p.speeds), 3.0 * p.shear_modulus
+def inlet_length(p: ORing, rise: float) -> float:
+    """Length l (mm) of the inlet at an edge of this K^2, at the slowest speed; see the head."""
+    flow, E = p.viscosity * min(p.speeds), 3.0 * p.shear_modulus
+    return float((flow * E**2 / rise**1.5) ** 0.4)
+
+
+def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
+    """About half of h* (mm) at |U|, K l^(3/2) / E with the l of the head of this page."""
+    flow, E = p.viscosity * speed, 3.0 * p.shear_modulus
     return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
 
 
@@ -120,7 +138,7 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, p: ORing) -> flo
         z, h, s, first = -z[::-1], h[::-1], s[::-1], len(s) - 1 - touching[0]
     else:
         first = touching[-1]
-    reach = max(REACH, FILMS * film_thickness(p, contact_edges(system, x)))
+    reach = max(REACH, FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds)))
     steep = np.degrees(np.arctan2(np.diff(h), np.diff(z))) >= STEEPEST
     for i in range(first, len(s) - 1):
         if steep[i]:

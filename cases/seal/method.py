@@ -6,12 +6,12 @@ records of the path driver; everything else is frozen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 
-from softehl.cases.seal.contact import assembly, contact_problem
+from softehl.cases.seal.contact import along, approach_stage, assembly, contact_problem
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
 from softehl.cases.seal.dry import (
@@ -26,6 +26,7 @@ from softehl.cases.seal.estimate import coarser_system, h_star_error
 from softehl.cases.seal.failure import explained
 from softehl.cases.seal.film import (
     FastFilm,
+    film_offsets,
     first_film,
     release_stage,
     shear_stage,
@@ -35,7 +36,7 @@ from softehl.cases.seal.film import (
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, Stage, StageFailed
+from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import carried_contact
 from softehl.cases.seal.results import (
     contact_numbers,
@@ -85,23 +86,57 @@ class FilmPath:
     settings: PathSettings
     driver: PathDriver
 
-    def first(self, stroke: Stroke, x: Array) -> FilmLoads:
-        """The first film of a stroke, from the contact state x."""
-        return first_film(self.system, self.settings, stroke, x)
+    def starts(self, stroke: Stroke, x: Array) -> Iterator[BuiltFilm]:
+        """First films of a stroke, one after the other, and the contact states they begin at.
 
-    def fast(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> bool:
-        """All film stages by modified Newton iterations; whether they reached the slowest speed."""
+        x: the contact state of the section.
+        """
+        system, settings = self.system, self.settings
+        for offset in film_offsets(system, settings, stroke, x):
+            y: Followed = x
+            if offset != settings.offset:
+                stage = approach_stage(system, settings, offset)
+                stage = replace(stage, corrector=along(system, self.driver.newton))
+                y = self.driver.follow(stage, x)
+            if not isinstance(y, StageFailed):
+                yield first_film(system, replace(settings, offset=offset), stroke, y), y
+
+    @property
+    def quick(self) -> bool:
+        """Whether modified Newton iterations are to be tried."""
+        p, linear = self.system.parameters, self.driver.newton.linear
+        held = p.rotation == "fixed" and not p.rubs
+        return p.solver == "auto" and held and isinstance(linear, Condenser)
+
+    def fast(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All film stages by modified Newton iterations; the one that ended early, if one did."""
         system, settings, p = self.system, self.settings, self.system.parameters
         linear = self.driver.newton.linear
-        held = p.rotation == "fixed" and not p.rubs
-        if p.solver != "auto" or not held or not isinstance(linear, Condenser):
-            return False
+        assert isinstance(linear, Condenser)
         fast = FastFilm.of(system, linear)
         stages = [fast.weight(weight_stage(system, settings, film))]
         if p.shear_traction:
             stages.append(fast.shear(shear_stage(system, settings, film)))
         stages.append(fast.speed(speed_stage(system, settings, film, p.speeds, on_speed)))
-        return not isinstance(self.driver.follow_all(stages, x), StageFailed)
+        end = self.driver.follow_all(stages, x)
+        return end if isinstance(end, StageFailed) else None
+
+    def begun(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> tuple[FilmLoads, Array] | None:
+        """The start to go on from by Newton's method, None if the films of a stroke are all solved.
+
+        Other starts are tried where one does not lead to a film.
+        """
+        first: BuiltFilm | None = None
+        for film, y in self.starts(stroke, x):
+            first = first or (film, y)
+            if not self.quick:
+                break
+            failed = self.fast(film, y, on_speed)
+            if failed is None:
+                return None
+            if "contact to film" not in failed.stage.name:
+                return film, y
+        return first or (first_film(self.system, self.settings, stroke, x), x)
 
     def settled(self, x: Array) -> Array:
         """The contact state x where the rod is as near as asperities let it; x itself if smooth."""
@@ -201,16 +236,16 @@ class SealRun:
 
         if p.rough:
             return path.rise(stroke, self.x, on_speed)
-        film = path.first(stroke, self.x)
-        if path.fast(film, self.x, on_speed):
+        start = path.begun(stroke, self.x, on_speed)
+        if start is None:
             return None
-        built = progress.slowest or path.build(film, self.x)
+        built = progress.slowest or path.build(*start)
         left = p.speeds if progress.slowest is None else _below(p.speeds, progress.slowest[0].speed)
         failed = path.slower(built, left, on_speed)
         if failed is None:
             return None
         last = progress.verdict.last
-        self._from_higher_order(film, progress, on_speed)
+        self._from_higher_order(stroke, progress, on_speed)
         return replace(failed, last=last) if progress.missing else None
 
     def _judge(
@@ -238,7 +273,7 @@ class SealRun:
         self.state.states.append(state)
         self.observer.film_state(state)
 
-    def _from_higher_order(self, film: FilmLoads, progress: StrokeState, on_speed: OnSpeed) -> None:
+    def _from_higher_order(self, stroke: Stroke, progress: StrokeState, on_speed: OnSpeed) -> None:
         """The speeds that a low pressure order did not reach by itself, as far as possible."""
         low, driver = self.system, self.path.driver
         if low.parameters.pressure_order >= REFERENCE_ORDER or low.parameters.rubs:
@@ -251,8 +286,8 @@ class SealRun:
             if at.speed in missing:
                 found[at.speed] = at, point.solution.x
 
-        x = transferred(self.x, low, pair.high)
-        high.slower(high.build(high.first(film.stroke, x), x), missing, keep)
+        start = next(high.starts(stroke, transferred(self.x, low, pair.high)))
+        high.slower(high.build(*start), missing, keep)
         for at, x in found.values():
             both = driver.follow(pair.stage(self.path.settings, at), pair.start(x))
             if isinstance(both, StageFailed):
@@ -269,7 +304,7 @@ def _below(speeds: tuple[float, ...], speed: float) -> tuple[float, ...]:
 def _thicknesses(path: FilmPath, x: Array, stroke: Stroke) -> dict[float, float]:
     """h* (mm) at the requested speeds, as far as they are reached; nothing is reported."""
     system, found = path.system, dict[float, float]()
-    film, speeds = path.first(stroke, x), system.parameters.speeds
+    speeds = system.parameters.speeds
 
     def keep(film: FilmLoads, point: Point) -> None:
         if film.speed in speeds:
@@ -278,8 +313,10 @@ def _thicknesses(path: FilmPath, x: Array, stroke: Stroke) -> dict[float, float]
 
     if system.parameters.rough:
         path.rise(stroke, x, keep)
-    elif not path.fast(film, x, keep):
-        path.slower(path.build(film, x), speeds, keep)
+        return found
+    start = path.begun(stroke, x, keep)
+    if start is not None:
+        path.slower(path.build(*start), speeds, keep)
     return found
 
 

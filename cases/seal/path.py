@@ -44,8 +44,9 @@ class PathSettings:
     at density 1, 0 = just touching and 1 = all the way; it falls with density^2, so that the first
     contact is as many nodes wide. first_way: the same in section diameters of way. lean: how far
     the section is pushed against its wall before the pressure does it, in section diameters.
-    start_speed: least |U| at which the film is built up, mm/s. load_steps: in shear moduli. The
-    rest: step rules.
+    start_speed: least |U| at which the film is built up, mm/s. placed_start_speed: the same on an
+    arc that the contact has placed, where the rod is put as far off as that film will be thick.
+    load_steps: in shear moduli. The rest: step rules.
     """
 
     offset: float = 0.01
@@ -53,6 +54,7 @@ class PathSettings:
     first_way: float = 0.004
     lean: float = 0.01
     start_speed: float = 6400.0
+    placed_start_speed: float = 1600.0
     longest_squeeze: float = 0.3
     load_steps: StepRule = field(default_factory=lambda: StepRule(0.055, 3e-4, 0.3))
     weight_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-5))

@@ -50,6 +50,10 @@ class Spacing:
         """Relative positions (n,) of the relative indices t (n,)."""
         return np.interp(t, self._indices, self.places)
 
+    def smallest(self, count: int) -> float:
+        """The smallest of `count` segments, relative to the length of the line."""
+        return float(np.diff(self(np.linspace(0.0, 1.0, count + 1))).min())
+
     @cached_property
     def _indices(self) -> Array:
         return np.arange(len(self.places)) / (len(self.places) - 1)

@@ -1,13 +1,21 @@
 """Glands drawn at random, by number: the sample of docs/limits.md.
 
-`python -m tests.cases.gland_matrix FIRST LAST` solves some and prints a line for each.
+`python -m tests.cases.gland_matrix FIRST LAST FILE` solves some, prints a line for each and adds
+it to a file of JSON lines; those that are there already are not solved again. `--density 4` solves
+them on a finer mesh, `--every 10` takes every tenth, `--limit` is the time for one, s of CPU.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import math
-import sys
+import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +23,7 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.catalogue import as568
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import Silent
+from softehl.cases.seal.state import FilmState, Silent
 
 SEED = 13
 SPEEDS = (1000.0, 100.0, 10.0)
@@ -56,20 +64,92 @@ def drawn(number: int) -> ORing:
         )
 
 
-def main(first: int, last: int) -> None:
-    """Solve and print; a line of its states for each gland."""
-    for number in range(first, last):
-        p, begin = drawn(number), time.process_time()
-        outcome = run(p, Silent())
-        seconds = time.process_time() - begin
-        words = [f"{s.rod_speed:+g}: {s.verdict} {s.h_star_um:.4g}" for s in outcome.states]
-        ok = sum(s.verdict == OK for s in outcome.states)
-        ratio = p.sealed_pressure / p.shear_modulus
-        print(
-            f"{number} p_s/mu {ratio:.2f} {seconds:.0f} s, {ok} of {2 * len(SPEEDS)} ok; ", end=""
-        )
-        print(", ".join(words), "" if outcome.converged else outcome.message, flush=True)
+class _Late(BaseException):
+    """The time for one gland is over."""
+
+
+@contextmanager
+def _limited(seconds: float) -> Iterator[None]:
+    """Raise _Late in what takes longer, in CPU time."""
+
+    def late(*_: object) -> None:
+        raise _Late
+
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+class Watch(Silent):
+    """Keeps the stages and states that were reached, also of a run that is stopped."""
+
+    def __init__(self) -> None:
+        """Nothing was reached."""
+        self.stages: list[str] = []
+        self.states: list[FilmState] = []
+
+    def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
+        """See `Observer`."""
+        self.stages.append(f"{name}, {stroke}")
+
+    def film_state(self, state: FilmState) -> None:
+        """See `Observer`."""
+        self.states.append(state)
+
+
+def solved(number: int, limit: float, **changes: Any) -> dict[str, Any]:
+    """What came out of a gland, as it is written to the file."""
+    p, watch, begin = drawn(number).model_copy(update=changes), Watch(), time.process_time()
+    message, factorisations = f"not ended within {limit:g} s", 0
+    try:
+        with _limited(limit):
+            outcome = run(p, watch)
+            message = "" if outcome.converged else outcome.message
+            factorisations = sum(stage.factorisations or 0 for stage in outcome.stages)
+    except _Late:
+        message += f": {watch.stages[-1]}"
+    keys = ("h_star_um", "h_star_error_percent", "inlet_ratio", "inlet_segments", "verdict")
+    return {
+        "number": number,
+        "density": p.density,
+        "p_s/mu": round(p.sealed_pressure / p.shear_modulus, 2),
+        "seconds": round(time.process_time() - begin, 1),
+        "factorisations": factorisations,
+        "message": message,
+        "states": [
+            {"speed": s.rod_speed_mm_s, **{k: getattr(s, k) for k in keys}, "advice": s.advice}
+            for s in watch.states
+        ],
+    }
+
+
+def main(arguments: argparse.Namespace) -> None:
+    """Solve, print and keep."""
+    file, done = Path(arguments.file), set[int]()
+    if file.exists():
+        done = {int(json.loads(line)["number"]) for line in file.read_text().splitlines()}
+    for number in range(arguments.first, arguments.last, arguments.every):
+        if number in done:
+            continue
+        found = solved(number, arguments.limit, density=arguments.density)
+        with file.open("a") as lines:
+            lines.write(json.dumps(found) + "\n")
+        words = [f"{s['speed']:+g}: {s['verdict']} {s['h_star_um']:.4g}" for s in found["states"]]
+        ok = sum(s["verdict"] == OK for s in found["states"])
+        print(f"{number} p_s/mu {found['p_s/mu']} {found['seconds']} s, ", end="")
+        print(f"{ok} of {2 * len(SPEEDS)} ok;", ", ".join(words), found["message"], flush=True)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("first", type=int)
+    parser.add_argument("last", type=int)
+    parser.add_argument("file")
+    parser.add_argument("--density", type=int, default=2)
+    parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--limit", type=float, default=100.0)
+    main(parser.parse_args())
