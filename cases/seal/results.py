@@ -74,7 +74,8 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         oscillation=oscillation(z, h),
         inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
         inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(at, film, h_star),
-        end_gap=float(min(h[0], h[-1])),
+        end_gap=float(h[-1] if film.stroke == "out" else h[0]),
+        lacking=0.0 if system.parameters.rough else lacking(at, film, z, h),
         **rough_numbers(system, at),
     )
 
@@ -98,21 +99,46 @@ def rough_numbers(system: SealSystem, at: Mapping[str, Array]) -> dict[str, floa
     }
 
 
+def lacking(at: Mapping[str, Array], film: FilmLoads, z: Array, h: Array) -> float:
+    """Pressure that a film builds up before the arc begins, relative to that of its inlet.
+
+    at: fields of the film; z, h: (nodes,) its nodes. Beyond its end the gap goes on as a wedge, in
+    which (14) gives 6 eta U / (slope h) at most; the pressure of an inlet is that at its steepest
+    rise, in excess of the pressure outside.
+    """
+    first, second = (0, 1) if film.stroke == "out" else (-1, -2)
+    slope = (h[first] - h[second]) / abs(z[first] - z[second])
+    steepest = _steepest(at, film)
+    if steepest is None or not slope > 0.0:
+        return np.inf
+    outside, eta = (at[name].ravel()[0 if film.stroke == "out" else -1] for name in ("p", "eta"))
+    inlet = float(at["p"].ravel()[steepest] - outside)
+    return float(6.0 * eta * film.speed / (slope * h[first]) / inlet) if inlet > 0.0 else np.inf
+
+
+def _steepest(at: Mapping[str, Array], film: FilmLoads) -> int | None:
+    """Where in the inlet the pressure rises most steeply, None if it does not rise."""
+    x, h, p = (at[name].ravel() for name in ("x", "h", "p"))
+    slope = (at["tau_rod"] - at["tau"]).ravel() / h
+    top = x[np.argmax(p)]
+    inlet = x < top if film.rod_speed > 0.0 else x > top
+    rise = np.where(inlet, np.copysign(1.0, film.rod_speed) * slope, -np.inf)
+    steepest = int(np.argmax(rise))
+    return steepest if rise[steepest] > 0.0 else None
+
+
 def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> float:
     """h* over sqrt(8 eta |U| / (9 p')), p' the steepest rise of the pressure in the inlet.
 
     at: fields of the film, (segments, points) each. By (14) p' = 6 eta U (h - h*) / h^3, which is
     largest at h = 3/2 h*: the ratio is 1 for a film that fulfils (14), on a mesh that shows it.
     """
-    x, h, p, eta = (at[name].ravel() for name in ("x", "h", "p", "eta"))
-    slope = (at["tau_rod"] - at["tau"]).ravel() / h
-    top = x[np.argmax(p)]
-    inlet = x < top if film.rod_speed > 0.0 else x > top
-    rise = np.where(inlet, np.copysign(1.0, film.rod_speed) * slope, -np.inf)
-    steepest = int(np.argmax(rise))
-    if not rise[steepest] > 0.0:
+    steepest = _steepest(at, film)
+    if steepest is None:
         return np.nan
-    return float(h_star / np.sqrt(8.0 * eta[steepest] * film.speed / (9.0 * rise[steepest])))
+    h, eta = (at[name].ravel()[steepest] for name in ("h", "eta"))
+    rise = abs((at["tau_rod"] - at["tau"]).ravel()[steepest]) / h
+    return float(h_star / np.sqrt(8.0 * eta * film.speed / (9.0 * rise)))
 
 
 def oscillation(x: Array, h: Array) -> float:

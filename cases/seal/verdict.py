@@ -30,8 +30,12 @@ resolved, 0.83 to 0.94 where it is not. Judged on graded meshes."""
 ANY_RATIO = (-inf, inf)
 """That of meshes where it is not judged."""
 
-END_FILMS, END_GAP = 50.0, 0.1
-"""At its ends the arc is outside the film where the gap is so many h*, or so many mm."""
+EXIT_FILMS, END_GAP = 10.0, 0.1
+"""At its exit the arc is outside the film where the gap is so many h*, or so many mm."""
+
+MOST_LACKING = 0.04
+"""Largest share of its pressure that an inlet may lack because the arc begins within the film: h*
+was too small by 0.09 to 0.12 of it where arcs were cut."""
 
 LARGEST_ERROR = 2.0
 """Largest estimated error of h*, %, of a state that is `ok`."""
@@ -50,7 +54,9 @@ class FilmNumbers:
     oscillation: index of `cases.seal.results.oscillation`. inlet_segments: number of segments
     over which the film narrows from ten times to one and a half times h* at its inlet. inlet_ratio:
     h* over that of the steepest slope of the pressure in the inlet, by (14) at h = 3/2 h*. end_gap:
-    the smaller film thickness of both ends of the arc. mean_gap: least h_T, mm. lambda_ratio: that
+    the film thickness at the exit end of the arc. lacking: pressure that a film would
+    have built up before the arc begins, relative to that of the inlet.
+    mean_gap: least h_T, mm. lambda_ratio: that
     over sigma, nan between smooth surfaces. asperity_load, boundary_friction: shares of asperities.
     """
 
@@ -66,6 +72,7 @@ class FilmNumbers:
     inlet_segments: float
     inlet_ratio: float = 1.0
     end_gap: float = inf
+    lacking: float = 0.0
     mean_gap: float = nan
     lambda_ratio: float = nan
     asperity_load: float = 0.0
@@ -79,7 +86,8 @@ class FilmNumbers:
     @property
     def clipped(self) -> bool:
         """Whether the arc ends within the film."""
-        return self.end_gap < min(END_FILMS * self.h_star, END_GAP)
+        short = self.end_gap < min(EXIT_FILMS * self.h_star, END_GAP)
+        return short or not self.lacking <= MOST_LACKING
 
 
 def fewest_inlet_segments(reynolds: str, m_p: int) -> float:
@@ -139,10 +147,11 @@ class Verdict:
         if last is None or word == OK:
             return ""
         if word == CLIPPED:
-            return (
-                f"the arc ends where the film is only {1e3 * last.end_gap:.3g} um thick: its inlet "
-                "may be cut off; leave arc_start and arc_end out, or move them outwards"
-            )
+            if last.lacking <= MOST_LACKING:
+                where = f"the arc ends where the film is only {1e3 * last.end_gap:.3g} um thick"
+            else:
+                where = f"the arc cuts off {100.0 * last.lacking:.2g} % of the inlet's pressure"
+            return f"{where}; leave arc_start and arc_end out, or move them outwards"
         if word == UNCERTAIN:
             known = self.error is not None and isfinite(self.error)
             size = f"is {self.error:+.2g} %" if known else "is not known"
