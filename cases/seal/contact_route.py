@@ -172,7 +172,7 @@ class ContactRoute:
     def _on(self, disc: Disc, p: ORing, before: State, number: int) -> State | StageFailed:
         """On a graded mesh: carried to it, or else by the path from rest, coarse or as it is."""
         new = build_system(p, disc)
-        state = self._carried(*before, new, f"contact on graded mesh {number}")
+        state = self.carried(*before, new, f"contact on graded mesh {number}")
         for density in _doublings(COARSE, p.density):
             if isinstance(state, StageFailed):
                 coarse = build_system(_at(p, density), disc)
@@ -195,7 +195,7 @@ class ContactRoute:
                 break
             graded = build_system(p, graded_disc(*state))
             name = f"contact on graded mesh {number}"
-            state = self._carried(*state, graded, name)
+            state = self.carried(*state, graded, name)
         return state
 
     def _refined(self, system: SealSystem, x: Followed, density: int) -> State | StageFailed:
@@ -203,14 +203,19 @@ class ContactRoute:
         state = x if isinstance(x, StageFailed) else (system, x)
         while not isinstance(state, StageFailed) and state[0].parameters.density < density:
             coarse = state[0]
-            state = self._carried(
+            state = self.carried(
                 *state, build_system(finer(coarse.parameters), coarse.section.disc)
             )
             if not isinstance(state, StageFailed) and coarse.parameters.mesh == "uniform":
                 self.contacts.keep(*state)
         return state
 
-    def _carried(
+    def elsewhere(self, old: SealSystem, x: Array, new: SealSystem) -> Followed:
+        """Unknowns in contact on a mesh of its own, from the contact state x of another one."""
+        state = self.carried(old, x, new, "contact")
+        return self._loaded(new) if isinstance(state, StageFailed) else state[1]
+
+    def carried(
         self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
     ) -> State | StageFailed:
         """The contact state x of one mesh on another."""

@@ -37,7 +37,6 @@ from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
-from softehl.cases.seal.refinement import carried_contact
 from softehl.cases.seal.results import (
     contact_numbers,
     contact_pressure,
@@ -357,8 +356,8 @@ def _begun(path: FilmPath, x: Array, observer: Observer, state: RunState) -> Sea
     if not (p.error_estimate and p.mesh == "graded"):
         return seal
     coarser = FilmPath(coarser_system(system), settings, path.driver.named("coarser mesh: "))
-    start = carried_contact(system, coarser.system, settings, x, "contact")
-    y = coarser.driver.follow(*start)
+    route = ContactRoute(settings, coarser.driver.follow, coarser.driver.newton)
+    y = route.elsewhere(system, x, coarser.system)
     if isinstance(y, StageFailed):
         return seal
     return replace(seal, coarser=(coarser, coarser.settled(y)))
