@@ -37,6 +37,11 @@ _NAMES = ", ".join(SHIPPED)
     metavar="PERCENT",
     help="Largest estimated error of h*, as in 1%: speeds that miss it run on finer meshes.",
 )
+@click.option(
+    "--sensitivity",
+    is_flag=True,
+    help="Also write sensitivity.csv: per cent for one per cent of every parameter, exactly.",
+)
 @click.option("--resume", is_flag=True, help="Keep the rows that DIR has and run the others.")
 @click.option("--overwrite", is_flag=True, help="Begin anew in a DIR that holds a run.")
 @click.option(
@@ -59,6 +64,7 @@ def run(
     assignments: tuple[str, ...],
     folder: Path | None,
     tolerance: str | None,
+    sensitivity: bool,
     resume: bool,
     overwrite: bool,
     jobs: int,
@@ -72,6 +78,8 @@ def run(
     from softehl.cases.harness.session import run_case
 
     options = {} if tolerance is None else {"tolerance": tolerance.strip().removesuffix("%")}
+    if sensitivity:
+        options["sensitivity"] = "true"
     with leading(engine, jobs) as leads:
         if not leads:
             return 0

@@ -10,6 +10,7 @@ from softehl.cases.seal import plan
 from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import PICTURES, write_plots
+from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmRow
 from softehl.cases.seal.telling import Teller
 
@@ -24,6 +25,7 @@ class ORingCase(Case[ORing, FilmRow]):
     selection = ("speeds", "stroke", "solver", "linear", "tolerance")
     ways = ("solver", "linear")
     files = (
+        *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv", "tornado.png", "tornado.svg"),
         *("leakage.csv", "fit.csv", "contact_*.csv", "contact_*.vtu"),
         *(f"{name}.{kind}" for name in (*PICTURES, "fit") for kind in ("png", "svg")),
     )
@@ -68,6 +70,8 @@ class ORingCase(Case[ORing, FilmRow]):
         words = [f"collapsed film, {complaint}" for complaint in collapsed]
         if outside:
             words.append(f"h* not known to {parameters.tolerance:g} %: {self.named(outside)}")
+        if parameters.sensitivity:
+            words += _not_differentiated(rows)
         return words
 
     def notes(self, rows: Sequence[FilmRow]) -> list[str]:
@@ -89,12 +93,28 @@ class ORingCase(Case[ORing, FilmRow]):
     ) -> None:
         """See :class:`Case`."""
         write_plots(parameters, folder, rows, rejected)
+        if parameters.sensitivity:
+            from softehl.cases.seal.report.sensitivity import write_sensitivities
+
+            write_sensitivities(parameters, folder, rows)
 
     def share(self, parameters: ORing) -> tuple[float, str]:
         """See :class:`Case`."""
         from softehl.cases.seal.contact_store import contact_key
 
         return parameters.density, contact_key(parameters)
+
+
+def _not_differentiated(rows: Sequence[FilmRow]) -> list[str]:
+    """Why states have no sensitivities, in words; empty where all have them."""
+    left_out = [row for row in rows if not resolved(row)]
+    if not left_out:
+        return []
+    return [
+        f"no sensitivities of {CASE.named(left_out)}: the mesh does not show the film well enough "
+        "to differentiate it (verdict and inlet_ratio in curve.csv); use a graded mesh or a larger "
+        "density"
+    ]
 
 
 CASE = ORingCase()

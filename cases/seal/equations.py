@@ -34,7 +34,7 @@ from softehl.cases.seal.system import (
     values_at_rest,
 )
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.assembly import Assembler
+from softehl.runtime.fem.assembly import Assembler, Memo
 from softehl.runtime.fem.contact import Obstacle, contact_data, tributary_areas
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
@@ -72,12 +72,8 @@ class SealSystem:
     ) -> SealSystem:
         """The system of a case on a section."""
         numbering = Numbering.of(fields, p, section)
-        present, obstacles = tuple(b for b in blocks if b.needed(p)), obstacles_of(p)
-        constants = {
-            b.name: _contact_constants(b, obstacles[b.name], p, section)
-            for b in present
-            if b.group == "contact"
-        }
+        present = tuple(b for b in blocks if b.needed(p))
+        constants = _contact_constants(p, section, present)
         elements = [numbering.element_block(b, p, constants.get(b.name)) for b in present]
         cells = section.coordinates("cells"), numbering.rows(DISPLACEMENT, "cells")
         problem = Problem(
@@ -88,7 +84,26 @@ class SealSystem:
             absolute=True,
             guards=(KeepsOrientation(*cells),),
         )
-        system = cls(p, section, numbering, present, obstacles, problem)
+        system = cls(p, section, numbering, present, obstacles_of(p), problem)
+        return replace(system, problem=system._at_rest())
+
+    def moved(self, p: ORing, section: SealSection) -> SealSystem:
+        """The system of other numbers on the same mesh with its nodes moved; nothing is checked."""
+        constants = _contact_constants(p, section, self.blocks)
+        assembler = self.problem.assembler
+        elements = tuple(
+            replace(b, coordinates=section.coordinates(d.elements), data=constants.get(d.name))
+            for b, d in zip(assembler.blocks, self.blocks, strict=True)
+        )
+        cells = section.coordinates("cells"), self.numbering.rows(DISPLACEMENT, "cells")
+        problem = replace(
+            self.problem,
+            assembler=replace(assembler, blocks=elements, memo=Memo()),
+            guards=(KeepsOrientation(*cells),),
+        )
+        system = replace(
+            self, parameters=p, section=section, obstacles=obstacles_of(p), problem=problem
+        )
         return replace(system, problem=system._at_rest())
 
     # --- the section ----------------------------------------------------------------------------
@@ -347,11 +362,19 @@ class SealSystem:
         return self.layout.dofs(field)[[0, -1]]
 
 
-def _contact_constants(block: Block, obstacle: Obstacle, p: ORing, section: SealSection) -> Array:
-    """Constants (n, k) of the contact elements of a block; slip is counted from the start."""
-    chain = section.chains[block.elements]
-    constants = contact_data(obstacle, section.mesh.points, *chain, p.shear_modulus)
-    return np.pad(constants, ((0, 0), (0, 2 if block.kernel == FRICTION else 0)))
+def _contact_constants(
+    p: ORing, section: SealSection, blocks: tuple[Block, ...]
+) -> dict[str, Array]:
+    """Constants (n, k) of the contact elements, by block; slip is counted from the start."""
+    obstacles, found = obstacles_of(p), {}
+    for block in (b for b in blocks if b.group == "contact"):
+        chain = section.chains[block.elements]
+        constants = contact_data(
+            obstacles[block.name], section.mesh.points, *chain, p.shear_modulus
+        )
+        slip = 2 if block.kernel == FRICTION else 0
+        found[block.name] = np.pad(constants, ((0, 0), (0, slip)))
+    return found
 
 
 def build_system(p: ORing, disc: Disc | None = None, density: Fraction | None = None) -> SealSystem:

@@ -44,11 +44,14 @@ from softehl.cases.seal.results import (
     film_numbers,
     film_state,
 )
+from softehl.cases.seal.sensitivity import rates_of, sensitivities
+from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmState, Observer, Outcome
 from softehl.cases.seal.verdict import ANY_RATIO, INLET_RATIO, Verdict, fewest_inlet_segments
 from softehl.runtime.arrays import Array
+from softehl.runtime.fem.design import Inputs
 from softehl.runtime.solve.backends import choose
-from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.linear import Condenser, SingularMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Point, Status
 
@@ -69,12 +72,13 @@ class StrokeState:
     """What changes along a stroke.
 
     verdict: on the films so far. slowest: the slowest film that was solved, and its unknowns.
-    missing: requested speeds that were not reached yet.
+    missing: requested speeds that were not reached yet. rates: of the inputs by each parameter.
     """
 
     verdict: Verdict
     missing: set[float]
     slowest: BuiltFilm | None = None
+    rates: Mapping[str, Inputs] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,8 +273,21 @@ class SealRun:
         verdict = replace(progress.verdict, error=wanted)
         state = film_state(system, problem, film, x, verdict, iterations)
         state = replace(state, h_star_error_percent=error)
+        if p.sensitivity and resolved(state):
+            state = replace(state, sensitivity=self._differentiated(progress, film, x))
         self.state.states.append(state)
         self.observer.film_state(state)
+
+    def _differentiated(
+        self, progress: StrokeState, film: FilmLoads, x: Array
+    ) -> Mapping[str, Mapping[str, float]] | None:
+        """Sensitivities of a film x (n,); none where its tangent has no usable factors."""
+        progress.rates = rates_of(self.system, film, progress.rates)
+        try:
+            linear = self.path.driver.newton.linear
+            return sensitivities(self.system, film, x, linear, progress.rates)
+        except SingularMatrix:
+            return None
 
     def _from_higher_order(self, stroke: Stroke, progress: StrokeState, on_speed: OnSpeed) -> None:
         """The speeds that a low pressure order did not reach by itself, as far as possible."""

@@ -13,6 +13,7 @@ from softehl.cases.seal.fitting import fitted
 from softehl.cases.seal.oils import with_oil
 from softehl.cases.seal.rubber import require_stable, with_rubber
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness, Surfaces
+from softehl.cases.seal.tolerances import read_tolerances
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
@@ -62,6 +63,15 @@ class ORing(Parameters):
         unit="%",
         bounds="left out = any",
         gt=0,
+    )
+    sensitivity: bool = key(
+        False, "whether sensitivity.csv is written: how results follow every parameter"
+    )
+    tolerances: tuple[str, ...] = key(
+        (),
+        "+- tolerances for tolerances.csv, beside those of a catalogue ring",
+        bounds='texts such as "viscosity 10 %", "rod_diameter 0.05 mm" or "modulus 15 %"',
+        strict=False,
     )
     solid: Literal["taylor_mean", "taylor", "fbar", "q4"] = key(
         "taylor_mean",
@@ -333,6 +343,22 @@ class ORing(Parameters):
                 '"taylor_mean" have "mooney-rivlin" and "neo-hooke" alone; leave solid out'
             )
         require_stable(self.material, self._rubber)
+        return self
+
+    @model_validator(mode="after")
+    def _sensitivity_has_a_meaning(self) -> Self:
+        read_tolerances(self.tolerances, dict(self), self.ring)
+        if self.tolerances and not self.sensitivity:
+            raise ValueError(
+                "tolerances need the sensitivities of the run; set sensitivity = true "
+                "(--sensitivity)"
+            )
+        if self.sensitivity and self.rubs:
+            raise ValueError(
+                f"sensitivity = true with housing_friction = {self.housing_friction:g}: with "
+                "friction a state depends on how it was reached, and has no derivative by its "
+                "parameters alone; set housing_friction = 0"
+            )
         return self
 
     @model_validator(mode="after")

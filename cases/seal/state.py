@@ -3,7 +3,7 @@
 Units are mm, MPa, N, s; film thicknesses are in micrometres.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from math import nan
 from typing import Any, Protocol
@@ -156,12 +156,14 @@ class FilmRow(Row):
 class FilmState(FilmRow):
     """One converged soft-EHL state: its row, and the fields that it comes from.
 
-    advice: what to do about a verdict that is not "ok".
+    advice: what to do about a verdict that is not "ok". sensitivity: quantity -> parameter ->
+    d log quantity / d log parameter, where it was asked for and the mesh shows it.
     """
 
     advice: str
     profile: Profile
     section: Section
+    sensitivity: Mapping[str, Mapping[str, float]] | None = None
 
     @property
     def sealed_pressure(self) -> float:

@@ -4,7 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from softehl.cases.harness import observer as harness
+from softehl.cases.seal.sensitivity_table import rows_of
 from softehl.cases.seal.state import (
     PROFILE_COLUMNS,
     ContactState,
@@ -54,9 +57,13 @@ class Teller(Observer):
         self.to.files({f"{name}.csv": columns, f"{name}.vtu": state.section})
 
     def film_state(self, state: FilmState) -> None:
-        """A row, its profile and its section."""
+        """A row, its profile and its section, and a file of its sensitivities."""
         profile = {name: getattr(state.profile, name) for name in PROFILE_COLUMNS}
         row = FilmRow.part_of(state)
+        if state.sensitivity:
+            table = rows_of(row, state.sensitivity)
+            columns = {n: np.array([getattr(r, n) for r in table]) for n in table[0].header()}
+            self.to.files({f"sensitivity_{row.name}.csv": columns})
         self.to.state(harness.State(row, (profile, state.section), state.advice))
 
 

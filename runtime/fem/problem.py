@@ -137,7 +137,7 @@ class Problem:
         if defect.any():
             r = r - K @ defect
         r[self.fixed] = defect[self.fixed]
-        return r, self._eliminate(K)
+        return r, self.eliminated(K)
 
     def norm(self, r: Array) -> float:
         """Root of the sum over fields of |R / scale|^2, 2-norms; every field needs a scale."""
@@ -269,7 +269,7 @@ class Problem:
             return in_order(block, values)
         return in_order(block, {**dict(zip(names, old, strict=True)), **values})
 
-    def _eliminate(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
+    def eliminated(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
         """K with the rows and columns of prescribed unknowns replaced by those of the identity."""
         if not len(self.fixed):
             return K

@@ -320,7 +320,9 @@ def test_a_task_that_is_not_offered_is_named(rng: np.random.Generator) -> None:
     with pytest.raises(ArgumentError, match=message):
         load_kernel("solid_fbar").energy(*positional, **named)
     positional, named = arguments("contact", 1, rng)
-    with pytest.raises(ArgumentError, match="contact offers residual, tangent, not fields"):
+    with pytest.raises(
+        ArgumentError, match="contact offers residual, tangent, pseudo_load, not fields"
+    ):
         load_kernel("contact").fields_at(*positional, **named)
 
 

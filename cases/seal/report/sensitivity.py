@@ -1,0 +1,92 @@
+"""The tables of sensitivities and tolerances of a run, and the tornado picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from softehl.cases.seal.report import style
+from softehl.cases.seal.sensitivity_table import SensitivityRow
+from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.tolerances import band, read_tolerances
+from softehl.runtime.io import read_csv, write_csv
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from softehl.cases.seal.parameters import ORing
+
+PANELS = {"h_star": "film thickness $h^*$", "friction": "friction", "leakage": "leakage"}
+"""Quantities of the picture, and what they are called in it."""
+
+_SHOWN = 10  # parameters
+_TICKS = (-10.0, -1.0, 0.0, 1.0, 10.0)
+Table = dict[float, dict[str, dict[str, float]]]
+
+
+def write_sensitivities(p: ORing, folder: Path, rows: Sequence[FilmRow]) -> None:
+    """Join the sensitivities of the states into `sensitivity.csv`; tolerances; the picture.
+
+    Raises OSError, ValueError.
+    """
+    parts = [folder / f"sensitivity_{row.name}.csv" for row in rows]
+    header = SensitivityRow.header()
+    cells = [line for part in parts if part.exists() for line in read_csv(part, header)]
+    if not cells:
+        return
+    write_csv(folder / "sensitivity.csv", header, cells)
+    table: Table = {}
+    for row in map(SensitivityRow.parse, cells):
+        quantity = table.setdefault(row.rod_speed_mm_s, {}).setdefault(row.quantity, {})
+        quantity[row.parameter] = row.log_derivative
+    shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
+    if shares:
+        bands = [
+            band((p.sealed_pressure, speed), name, slopes, shares)
+            for speed, found in table.items()
+            for name, slopes in found.items()
+        ]
+        write_csv(folder / "tolerances.csv", bands[0].header(), [b.cells() for b in bands])
+    import matplotlib
+
+    with matplotlib.rc_context(style.STYLE):
+        style.save(tornado_figure(p, table), folder / "tornado")
+
+
+def tornado_figure(p: ORing, table: Table) -> Figure:
+    """Bars: per cent of each quantity for one per cent of a parameter, at the slowest speeds."""
+    from matplotlib.figure import Figure
+
+    shown = [
+        max((u for u in table if u * s > 0.0), key=lambda u: -abs(u), default=None)
+        for s in (1.0, -1.0)
+    ]
+    speeds = [u for u in shown if u is not None]
+    figure = Figure(figsize=(3.3 * len(PANELS) + 1.2, 4.2))
+    panels = figure.subplots(1, len(PANELS), squeeze=False)[0]
+    for axes, (quantity, title) in zip(panels, PANELS.items(), strict=True):
+        slopes = [table[u][quantity] for u in speeds]
+        names = sorted(slopes[0], key=lambda n: max(abs(s[n]) for s in slopes))[-_SHOWN:]
+        height = 0.8 / len(speeds)
+        for k, (u, values) in enumerate(zip(speeds, slopes, strict=True)):
+            stroke = "out" if u > 0.0 else "in"
+            places = [i + height * (0.5 * (len(speeds) - 1) - k) for i in range(len(names))]
+            axes.barh(
+                places,
+                [values[n] for n in names],
+                height,
+                color=style.COLOURS[stroke],
+                label=f"{style.STROKES[stroke]} {abs(u):g} mm/s",
+            )
+        axes.set_yticks(range(len(names)), [n.replace("_", " ") for n in names])
+        axes.set_xscale("symlog", linthresh=0.1)
+        axes.set_xticks(_TICKS, [f"{t:g}" for t in _TICKS])
+        axes.minorticks_off()
+        axes.set_xlabel("% for 1 % of the parameter")
+        axes.set_title(title)
+        axes.axvline(0.0, color="0.2", linewidth=0.8)
+    panels[-1].legend(loc="lower right", fontsize="x-small")
+    style.write_head(figure, style.subject(p), 0.3)
+    style.set_margins(figure, 1.45, 0.15, 0.5, 0.85, 0.75)
+    return figure

@@ -1,0 +1,63 @@
+"""Exact sensitivities of a film: what a change of any parameter by one per cent does, in per cent.
+
+All derivatives are those of the discrete equations at the converged state, d log q / d log s, with
+the mesh frozen (`cases.seal.variation`). The film does not depend on the contact it began from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.quantities import along, by_unknowns, quantities
+from softehl.cases.seal.variation import SPEED, FilmCase
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.design import Inputs, Tangent
+from softehl.runtime.solve.linear import LinearSolver
+from softehl.runtime.solve.sensitivity import adjoints, direct
+
+
+def rates_of(
+    system: SealSystem, film: FilmLoads, known: Mapping[str, Inputs] = MappingProxyType({})
+) -> dict[str, Inputs]:
+    """Parameter -> rate of the inputs of a film by its logarithm.
+
+    known: the rates at another speed of the stroke; of these only that of the speed is another.
+    """
+    case = FilmCase(system, film)
+    kept = {name: rate for name, rate in known.items() if name != SPEED}
+    return {name: kept.get(name) or case.rate(name) for name in case.parameters}
+
+
+def sensitivities(
+    system: SealSystem,
+    film: FilmLoads,
+    x: Array,
+    linear: LinearSolver,
+    rates: Mapping[str, Inputs],
+    method: str = "adjoint",
+) -> dict[str, dict[str, float]]:
+    """Quantity -> parameter -> d log quantity / d log parameter at a converged film x (n,).
+
+    rates: of the parameters, by `rates_of` at this film. method: "adjoint", a solve for each
+    quantity, or "direct", one for each parameter. Raises SingularMatrix.
+    """
+    case, problem = FilmCase(system, film), system.film_problem(film)
+    found, tangent = quantities(case, problem, x), Tangent.at(problem, x)
+    gradients = np.stack([by_unknowns(case, problem, x, q) for q in found.values()], axis=1)
+    loads = np.stack([tangent.load(rate) for rate in rates.values()], axis=1)
+    if method == "adjoint":
+        through = -adjoints(linear, tangent.reduced, gradients).T @ loads
+    else:
+        through = gradients.T @ direct(linear, tangent.reduced, loads)
+    return {
+        name: {
+            key: float(through[i, j]) + along(problem, x, q, key, rate)
+            for j, (key, rate) in enumerate(rates.items())
+        }
+        for i, (name, q) in enumerate(found.items())
+    }

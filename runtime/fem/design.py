@@ -1,0 +1,180 @@
+"""How a problem changes when its elements and parameters do: pseudo-loads, gradients of fields.
+
+A variation says of every block how the coordinates and data of its elements and its parameters
+move, and how prescribed values do. With dq = q_x dx + q_v and K dx = -load(v), sensitivities follow
+directly (one solve for each variation) or from the adjoint K^T l = q_x (one for each quantity).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.assembly import ElementBlock
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.kernels import Kernel
+
+Weights = Mapping[str, Array]
+"""Field of a block -> (elements, points), what a quantity weights its values with."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """All that a problem is given besides its unknowns, or the rate of it.
+
+    blocks: name of a block that is switched on -> (n, coordinates + data + parameters), the rows
+    of its elements. values: (fixed,) prescribed values.
+    """
+
+    blocks: Mapping[str, Array]
+    values: Array
+
+    @classmethod
+    def of(cls, problem: Problem) -> Inputs:
+        """Those of a problem."""
+        rows = {
+            b.name: _rows(b, problem.parameters[b.name])
+            for b in problem.assembler.blocks
+            if b.name in problem.parameters
+        }
+        return cls(rows, problem.values)
+
+
+def _rows(block: ElementBlock, parameters: Array) -> Array:
+    n = len(block.dofs)
+    coordinates = np.reshape(block.coordinates, (n, -1))
+    data = np.empty((n, 0)) if block.data is None else block.data
+    return np.hstack([coordinates, data, np.broadcast_to(parameters, (n, len(parameters)))])
+
+
+_STENCIL = ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0))  # places, weights times 12
+
+
+def rate_of(inputs: Callable[[float], Inputs], step: float) -> Inputs:
+    """d inputs / ds at s = 0 by the five-point difference, which is exact for polynomials of
+    degree 4: then only rounding is left, however wide the step is.
+    """
+    at = [(inputs(k * step), weight / (12.0 * step)) for k, weight in _STENCIL]
+    names = at[0][0].blocks
+    return Inputs(
+        {name: np.asarray(sum(w * one.blocks[name] for one, w in at)) for name in names},
+        np.asarray(sum(w * one.values for one, w in at)),
+    )
+
+
+def pseudo_load(problem: Problem, x: Array, rate: Inputs) -> Array:
+    """(n,): the derivative of the equations at the unknowns x (n,) along a variation, x held.
+
+    Blocks that do not move are not called.
+    """
+    load = np.zeros(problem.layout.total)
+    for block in problem.assembler.blocks:
+        moved = rate.blocks.get(block.name)
+        if moved is None or not moved.any():
+            continue
+        kernel = kernel_of(block)
+        local = kernel.pseudo_load(
+            block.coordinates,
+            x[block.dofs],
+            moved,
+            data=block.data,
+            parameters=problem.parameters[block.name],
+            rule=block.rule,
+        )
+        np.add.at(load, block.dofs.ravel(), local.ravel())
+    return load
+
+
+def kernel_of(block: ElementBlock) -> Kernel:
+    """The kernel of a block.  TypeError where it is not one that was generated."""
+    if not isinstance(block.kernel, Kernel):
+        raise TypeError(f"block {block.name!r} has no generated kernel")
+    return block.kernel
+
+
+@dataclass(frozen=True, eq=False)
+class FieldRates:
+    """Derivatives of the weighted sums of a block's fields at a state x (n,) of a problem."""
+
+    problem: Problem
+    name: str
+    x: Array
+
+    def along(self, rows: Array, weights: Weights) -> float:
+        """Rate of a weighted sum when elements and parameters move by rows, unknowns held."""
+        if not rows.any():
+            return 0.0
+        still = np.zeros((len(rows), self._block.dofs.shape[1]))
+        return float(_sum(self._rates(np.hstack([rows, still])), weights).sum())
+
+    def by_unknowns(self, weights: Weights) -> Array:
+        """Derivative (n,) of a weighted sum by all unknowns; elements without weight are left out.
+
+        An element's fields depend on its own unknowns alone: one call for each of these.
+        """
+        whole = self._block
+        chosen = np.flatnonzero(np.any([w.any(axis=1) for w in weights.values()], axis=0))
+        data = None if whole.data is None else whole.data[chosen]
+        coordinates, dofs = whole.coordinates[chosen], whole.dofs[chosen]
+        part = replace(whole, coordinates=coordinates, dofs=dofs, data=data)
+        some = {name: w[chosen] for name, w in weights.items()}
+        gradient = np.zeros(len(self.x))
+        n, ndof = part.dofs.shape
+        width = _rows(part, self.problem.parameters[self.name]).shape[1]
+        for k in range(ndof):
+            along = np.zeros((n, width + ndof))
+            along[:, width + k] = 1.0
+            np.add.at(gradient, part.dofs[:, k], _sum(self._rates(along, part), some))
+        return gradient
+
+    @property
+    def _block(self) -> ElementBlock:
+        return self.problem.assembler.block(self.name)
+
+    def _rates(self, along: Array, block: ElementBlock | None = None) -> dict[str, Array]:
+        block = block or self._block
+        kernel = kernel_of(block)
+        values = kernel.fields_rate(
+            block.coordinates,
+            self.x[block.dofs],
+            along,
+            data=block.data,
+            parameters=self.problem.parameters[self.name],
+            rule=block.rule,
+        )
+        return {name: values[:, :, i] for i, name in enumerate(kernel.fields)}
+
+
+def _sum(rates: Mapping[str, Array], weights: Weights) -> Array:
+    """(elements,) sums over fields and points."""
+    return np.asarray(sum((w * rates[name]).sum(axis=1) for name, w in weights.items()))
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """The tangent of a problem at a state x (n,), with the loads of variations."""
+
+    problem: Problem
+    x: Array
+    full: csc_array[np.float64]
+    reduced: csc_array[np.float64]
+
+    @classmethod
+    def at(cls, problem: Problem, x: Array) -> Tangent:
+        """Assembled at x."""
+        _, K = problem.assembler.linearise(x, problem.parameters)
+        return cls(problem, x, K, problem.eliminated(K.copy()))
+
+    def load(self, rate: Inputs) -> Array:
+        """(n,): b of K dx = -b for a variation, that of prescribed values included."""
+        fixed, b = self.problem.fixed, pseudo_load(self.problem, self.x, rate)
+        if rate.values.any():
+            moved = np.zeros(len(b))
+            moved[fixed] = rate.values
+            b += np.asarray(self.full @ moved)
+        b[fixed] = -rate.values
+        return b

@@ -1,0 +1,259 @@
+"""Sensitivities against central differences of what a run reports, and against dimensions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from softehl.__main__ import main
+from softehl.cases.oring import CASE
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.method import FilmPath
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.quantities import QUANTITIES
+from softehl.cases.seal.results import CONTACT_FILM, film_numbers
+from softehl.cases.seal.sensitivity import rates_of, sensitivities
+from softehl.cases.seal.sensitivity_table import SensitivityRow, resolved
+from softehl.cases.seal.state import FilmRow, Silent
+from softehl.cases.seal.tolerances import band, read_tolerances
+from softehl.cases.seal.variation import LENGTHS, FilmCase
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.design import Inputs
+from softehl.runtime.fem.postprocess import interval_below
+from softehl.runtime.io import read_csv
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import Point
+from softehl.runtime.solve.superlu import SuperLU
+from tests.cases.oring_cases import film_values
+
+SLOPES = Mapping[str, Mapping[str, float]]
+CASES = {
+    "out": (ORing(density=1, speeds=(400.0,), error_estimate=False), "out"),
+    "in": (ORing(density=1, speeds=(400.0,), error_estimate=False), "in"),
+    "dg": (
+        ORing(density=1, speeds=(800.0,), error_estimate=False, reynolds="dg", solid="fbar"),
+        "out",
+    ),
+}
+STEP = 5e-7
+"""A tenth of what makes a point of the film cavitate: there the friction has a kink."""
+
+
+@cache
+def state(name: str) -> tuple[FilmCase, Array]:
+    """A film and its unknowns, solved to rounding."""
+    p, stroke = CASES[name]
+    newton, settings = Newton(max_iterations=10), PathSettings()
+    driver = PathDriver(Silent(), newton)
+    found = ContactRoute(settings, driver.follow, newton).contact(p)
+    assert not isinstance(found, StageFailed)
+    path, kept = FilmPath(found[0], settings, driver), list[tuple[FilmLoads, Array]]()
+
+    def keep(film: FilmLoads, point: Point) -> None:
+        if film.speed in p.speeds:
+            kept.append((film, point.solution.x))
+
+    assert path.fast(path.first(stroke, found[1]), found[1], keep)  # type: ignore[arg-type]
+    case = FilmCase(found[0], kept[0][0])
+    return case, solved(case, kept[0][1])
+
+
+def solved(case: FilmCase, x: Array) -> Array:
+    solution = Newton(tolerance=1e-11, stagnation=1e3).solve(case.system.film_problem(case.film), x)
+    assert solution.converged, solution.message
+    return solution.x
+
+
+def reported(case: FilmCase, x: Array) -> dict[str, float]:
+    """What `film_state` reports."""
+    numbers = film_numbers(case.system, case.system.film_problem(case.film), case.film, x)
+    start, end = interval_below(*case.system.arc_film(x), CONTACT_FILM)
+    return {
+        "h_star": numbers.h_star,
+        "friction": numbers.friction,
+        "leakage": 2.0 * math.pi * case.system.rod_radius * numbers.flux,
+        "p_max": numbers.p_max,
+        "contact_width": end - start,
+    }
+
+
+@cache
+def slopes(name: str, method: str = "adjoint") -> SLOPES:
+    case, x = state(name)
+    rates = rates_of(case.system, case.film)
+    return sensitivities(case.system, case.film, x, SuperLU(), rates, method)
+
+
+def differences(name: str, key: str) -> dict[str, float]:
+    """Central differences of the logarithms of what is reported, the mesh frozen."""
+    case, x = state(name)
+    ahead, behind = (
+        reported(moved, solved(moved, x))
+        for moved in (case.scaled(key, STEP), case.scaled(key, -STEP))
+    )
+    span = math.log1p(STEP) - math.log1p(-STEP)
+    return {q: math.log(ahead[q] / behind[q]) / span for q in QUANTITIES}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_derivative_agrees_with_central_differences(name: str) -> None:
+    """To 1e-5 of the largest derivative of a quantity, all of which are of this order."""
+    case, _ = state(name)
+    found = slopes(name)
+    for key in case.parameters:
+        expected = differences(name, key)
+        for quantity in QUANTITIES:
+            scale = max(1.0, abs(expected[quantity]))
+            assert abs(found[quantity][key] - expected[quantity]) <= 1e-5 * scale, (key, quantity)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_direct_and_adjoint_agree(name: str) -> None:
+    one, other = slopes(name), slopes(name, "direct")
+    for quantity in QUANTITIES:
+        for key, value in one[quantity].items():
+            assert value == pytest.approx(other[quantity][key], abs=1e-7, rel=1e-7)
+
+
+def defects(found: SLOPES) -> dict[str, float]:
+    """What is left of the identities that dimensions demand: pressure, time and length."""
+    left = {}
+    for quantity, pressures, lengths in (("h_star", 0, 1), ("friction", 1, 2), ("p_max", 1, 0)):
+        s = found[quantity]
+        stress = sum(s[k] for k in ("mu_1", "mu_2", "bulk_modulus", "sealed_pressure", "viscosity"))
+        stress -= s["pressure_viscosity"] + s["cavitation_penalty"]
+        left[f"{quantity} stress"] = stress - pressures
+        left[f"{quantity} time"] = s["viscosity"] - s["U"] - s["cavitation_penalty"]
+        length = sum(s.get(k, 0.0) for k in LENGTHS) + s["U"] + s["cavitation_penalty"]
+        left[f"{quantity} length"] = length - lengths
+    return left
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_dimensions_are_kept(name: str) -> None:
+    assert max(map(abs, defects(slopes(name)).values())) < 1e-6
+
+
+def test_dimensions_show_a_mesh_that_does_not_move() -> None:
+    """The oracle itself: without the velocities of the nodes lengths do not add up."""
+    case, x = state("out")
+    rates = rates_of(case.system, case.film)
+    still = {}
+    for key, rate in rates.items():
+        rows = {name: value.copy() for name, value in rate.blocks.items()}
+        rows["solid"][:, :8] = 0.0
+        still[key] = Inputs(rows, rate.values)
+    found = sensitivities(case.system, case.film, x, SuperLU(), still)
+    assert abs(defects(found)["h_star length"]) > 1e-3
+    wrong = {q: {**s, "mu_2": 1.01 * s["mu_2"]} for q, s in slopes("out").items()}
+    assert abs(defects(wrong)["h_star stress"]) > 1e-5
+
+
+def test_the_rates_of_one_speed_serve_another() -> None:
+    case, x = state("out")
+    slower = replace(case.film, speed=0.9 * case.film.speed)
+    y = solved(FilmCase(case.system, slower), x)
+    known = rates_of(case.system, slower, rates_of(case.system, case.film))
+    new = rates_of(case.system, slower)
+    one, other = (sensitivities(case.system, slower, y, SuperLU(), r) for r in (known, new))
+    for quantity in QUANTITIES:
+        assert one[quantity] == pytest.approx(other[quantity], rel=1e-9, abs=1e-9)
+
+
+def test_only_states_that_the_mesh_shows_are_differentiated() -> None:
+    row = FilmRow(**film_values(verdict="ok", inlet_ratio=0.997))
+    assert resolved(row)
+    assert not resolved(replace(row, inlet_ratio=0.9))
+    assert not resolved(replace(row, inlet_ratio=math.nan))
+    assert not resolved(replace(row, verdict="under-resolved"))
+    p = ORing(sensitivity=True)
+    (words,) = CASE.complaints(p, [replace(row, inlet_ratio=0.9)], [], "")
+    assert "the mesh does not show the film well enough" in words
+    assert CASE.complaints(p, [row], [], "") == []
+
+
+# ------------------------------------------------------------------------------------- tolerances
+
+
+def test_tolerances_of_a_catalogue_ring_and_given_ones() -> None:
+    p = ORing(
+        ring="AS568-226", rod=50.0, sensitivity=True, tolerances=("viscosity 20 %", "modulus 10 %")
+    )
+    shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
+    assert shares["viscosity"] == (0.2, ("viscosity",))
+    assert shares["modulus"] == (0.1, ("mu_1", "mu_2"))
+    # AS568-226: section 0.139 +- 0.004 in
+    assert shares["section_diameter"][0] == pytest.approx(0.004 / 0.139, rel=1e-3)
+    assert set(shares) == {"section_diameter", "inner_diameter", "viscosity", "modulus"}
+
+
+def test_a_band_adds_up() -> None:
+    shares = {"a": (0.01, ("a",)), "both": (0.02, ("b", "c"))}
+    row = band((1.0, 400.0), "friction", {"a": -3.0, "b": 1.0, "c": 1.0, "d": 9.0}, shares)
+    assert row.worst_percent == pytest.approx(3.0 + 4.0)
+    assert row.likely_percent == pytest.approx(5.0)
+    assert (row.largest, row.largest_percent) == ("both", pytest.approx(4.0))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"tolerances": ["viscosity"]}, '"viscosity" is not understood'),
+        ({"tolerances": ["colour 3 %"]}, '"colour 3 %" is not understood'),
+        ({"tolerances": ["groove_centre 3 %"]}, "a number other than 0"),
+        ({"tolerances": ["viscosity 3 %"], "sensitivity": False}, "need the sensitivities"),
+        ({"housing_friction": 0.1}, "depends on how it was reached"),
+    ],
+    ids=str,
+)
+def test_what_makes_no_sense_is_refused(given: dict[str, object], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        ORing(**{"sensitivity": True, **given})  # type: ignore[arg-type]
+
+
+# ----------------------------------------------------------------------------------- command line
+
+
+@pytest.mark.slow
+def test_a_run_writes_its_sensitivities(tmp_path: Path) -> None:
+    settings = ["stroke=out", "speeds=[800,400]", "error_estimate=false"]
+    settings.append('tolerances=["viscosity 10 %"]')
+    given = [a for s in settings for a in ("--set", s)]
+    out = tmp_path / "run"
+    assert main(["run", "oring", "--sensitivity", "--quiet", "--out", str(out), *given]) == 0
+    rows = [SensitivityRow.parse(c) for c in read_csv(out / "sensitivity.csv", HEADER)]
+    assert {r.quantity for r in rows} == set(QUANTITIES)
+    assert {r.rod_speed_mm_s for r in rows} == {800.0, 400.0}
+    (speed,) = (
+        r.log_derivative
+        for r in rows
+        if (r.quantity, r.parameter, r.rod_speed_mm_s) == ("h_star", "U", 800.0)
+    )
+    assert speed == pytest.approx(0.6, abs=0.02)  # theory: h* grows with U^(3/5)
+    assert (out / "tornado.png").stat().st_size > 10_000
+    assert "viscosity" in (out / "tolerances.csv").read_text()
+    assert np.isfinite([r.log_derivative for r in rows]).all()
+
+
+@pytest.mark.slow
+def test_an_unresolved_mesh_is_refused_with_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Uniform and coarse: the sign of dh*/dp_s would be wrong at instroke."""
+    settings = ["stroke=in", "speeds=[100]", "mesh=uniform", "density=2"]
+    given = [a for s in settings for a in ("--set", s)]
+    assert main(["run", "oring", "--sensitivity", "--out", str(tmp_path), *given]) == 3
+    assert "no sensitivities of U = -100 mm/s" in capsys.readouterr().err
+    assert not (tmp_path / "sensitivity.csv").exists()
+
+
+HEADER = ("sealed_pressure_MPa", "rod_speed_mm_s", "quantity", "parameter", "log_derivative")
