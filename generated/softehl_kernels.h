@@ -625,6 +625,20 @@ void softehl_film_conserving_fields(
     const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent);
+void softehl_film_conserving_pseudo_load(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_film_conserving_fields_rate(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
 void softehl_film_rough_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -640,6 +654,20 @@ void softehl_film_rough_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent);
 void softehl_film_rough_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_film_rough_pseudo_load(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_film_rough_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,
@@ -675,6 +703,13 @@ void softehl_film_void_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent);
 void softehl_film_void_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_film_void_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
     const double *restrict data, const double *restrict parameters,

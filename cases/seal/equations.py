@@ -91,9 +91,13 @@ class SealSystem:
         """The system of other numbers on the same mesh with its nodes moved; nothing is checked."""
         constants = _contact_constants(p, section, self.blocks)
         assembler = self.problem.assembler
-        elements = tuple(
-            replace(b, coordinates=section.coordinates(d.elements), data=constants.get(d.name))
+        placed = [
+            section.coordinates(d.elements) if d.elements in section.elements else b.coordinates
             for b, d in zip(assembler.blocks, self.blocks, strict=True)
+        ]
+        elements = tuple(
+            replace(b, coordinates=at, data=constants.get(b.name, b.data))
+            for b, at in zip(assembler.blocks, placed, strict=True)
         )
         cells = section.coordinates("cells"), self.numbering.rows(DISPLACEMENT, "cells")
         problem = replace(

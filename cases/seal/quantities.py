@@ -124,6 +124,6 @@ def along(problem: Problem, x: Array, q: Quantity, name: str, rate: Inputs) -> f
         ends = rate.blocks[FILM][:, :4].reshape(-1, 2, 2)  # (segments, both nodes, (z, r))
         nodes = np.concatenate([ends[:, 0], ends[-1:, 1]])
         names = problem.assembler.block(FILM).kernel.parameters
-        rod = rate.blocks[FILM][0, 4 + names.index("rod_radius")]
+        rod = rate.blocks[FILM][0, names.index("rod_radius") - len(names)]
         total += float(q.z @ nodes[:, 0] + q.h @ (nodes[:, 1] - rod))
     return float(total)

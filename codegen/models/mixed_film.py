@@ -141,6 +141,7 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
         v_out=v_out,
         v_in=v_in,
     )
+    m.offer(pseudo_load=True, fields_rate=True)
     return m.finish()
 
 
@@ -183,6 +184,7 @@ def void_fraction() -> Definition:
     large = 2 * a * b / (a + b + root)
     row = m.define("row", sp.Piecewise((large, a + b > 0), (a + b - root, True)))
     m.weak_form([(row, v)])
+    m.offer(pseudo_load=True)
     return m.finish()
 
 

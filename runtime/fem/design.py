@@ -46,7 +46,8 @@ class Inputs:
 
 def _rows(block: ElementBlock, parameters: Array) -> Array:
     n = len(block.dofs)
-    coordinates = np.reshape(block.coordinates, (n, -1))
+    width = kernel_of(block).nodes * len(kernel_of(block).coordinates)
+    coordinates = np.reshape(block.coordinates, (n, -1))[:, :width]
     data = np.empty((n, 0)) if block.data is None else block.data
     return np.hstack([coordinates, data, np.broadcast_to(parameters, (n, len(parameters)))])
 

@@ -87,6 +87,7 @@ def test_rates_of_fields_agree_with_the_reference(state: State) -> None:
     places = load_kernel(state.family).fields_at(
         np.array([state.coordinates]),
         np.array([state.dofs]),
+        data=np.array([state.data]) if state.data else None,
         parameters=np.array(state.parameters),
         rule=rule_of(state),
     )[0]
