@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.engines.exchange import Exchange, total
+from softehl.runtime.engines.exchange import Exchange, largest, total
 from softehl.runtime.engines.local import Part
 from softehl.runtime.engines.matrix import Solver, Tangent
 from softehl.runtime.fem.checks import element_name, rows_not_finite, unknown_name
-from softehl.runtime.fem.problem import ROUNDING, Problem, ratio
+from softehl.runtime.fem.problem import ROUNDING, Problem, is_lost, ratio
 from softehl.runtime.mpi import world
 
 
@@ -122,12 +122,14 @@ class Spread:
         if total(np.array([float(not np.isfinite(r).all())]))[0]:
             return float("inf")
         noise = np.zeros(len(own)) if K is None else self._noise(x, K)
+        if K is not None and self._is_lost(x, size, noise):
+            return float("inf")
         wanted = self._wanted(x)
         free = np.ones(len(x), dtype=bool)
         free[problem.fixed] = False
         defect = np.maximum(np.abs(r) - noise, 0.0) * free[own]
-        off, largest = (x - wanted)[own], np.maximum(np.abs(x), np.abs(wanted))[own]
-        squares = [v * v for v in (defect, size, off, largest)]
+        off, extent = (x - wanted)[own], np.maximum(np.abs(x), np.abs(wanted))[own]
+        squares = [v * v for v in (defect, size, off, extent)]
         table = total(np.array([[v[p].sum() for v in squares] for p in self._fields()]))
         roots = np.sqrt(table)
         parts = [(ratio(d, s), ratio(o, w)) for d, s, o, w in roots]
@@ -175,6 +177,13 @@ class Spread:
             team.reach = team.exchange.highest(self.problem.assembler.reach())
         magnitudes = np.abs(x)[team.part.owned] + team.reach
         return ROUNDING * K.tangent.times_magnitudes(magnitudes)
+
+    def _is_lost(self, x: Array, size: Array, noise: Array) -> bool:
+        """See `Problem`."""
+        values = np.abs(self.problem.values).max(initial=0.0)
+        known = largest(max(float(self.team.reach.max(initial=0.0)), float(values)))
+        norms = np.sqrt(total(np.array([noise @ noise, size @ size])))
+        return is_lost(largest(float(np.abs(x).max(initial=0.0))), known, *norms.tolist())
 
     def _fields(self) -> list[Integers]:
         """For each field the places of its unknowns among own ones."""

@@ -193,8 +193,8 @@ class Problem:
         known = max(
             float(self.assembler.reach().max()), float(np.abs(self.values).max(initial=0.0))
         )
-        grown = float(np.abs(x).max(initial=0.0)) > _FAR * known > 0.0
-        return grown and float(np.linalg.norm(noise)) > _SWAMPED * float(np.linalg.norm(size))
+        largest = float(np.abs(x).max(initial=0.0))
+        return is_lost(largest, known, float(np.linalg.norm(noise)), float(np.linalg.norm(size)))
 
     def _relative(self, name: str, r: Array, size: Array, noise: Array, free: Flags) -> float:
         """Size of the residuals r, (n,), of a field, relative to what it is measured by."""
@@ -280,6 +280,13 @@ class Problem:
 
 def _ratio(defect: Array, size: Array) -> float:
     return ratio(float(np.linalg.norm(defect)), float(np.linalg.norm(size)))
+
+
+def is_lost(largest: float, known: float, noise: float, size: float) -> bool:
+    """Whether the largest unknown is far from what is known of the problem, and rounding (noise)
+    as large as the loads and internal forces (size).
+    """
+    return largest > _FAR * known > 0.0 and noise > _SWAMPED * size
 
 
 def ratio(off: float, size: float) -> float:
