@@ -84,11 +84,25 @@ def run(
         if not leads:
             return 0
         if engine == "petsc":
-            assignments = (*assignments, "linear=petsc")
+            assignments = (*assignments, _by_petsc(case))
         read = read_case(case, SHIPPED, assignments, options)
         target = Path("results", read.case.name) if folder is None else folder
         existing = existing_of(resume=resume, overwrite=overwrite)
         return run_case(read, target, existing, jobs=jobs, quiet=quiet)
+
+
+def _by_petsc(case: str) -> str:
+    """What a case is told so that PETSc solves its linear systems.  Raises BadInput."""
+    from softehl.cases.harness.case_file import find_case
+    from softehl.cases.harness.errors import BadInput
+
+    found = find_case(case, SHIPPED)[0]
+    if "linear" not in found.parameters.model_fields:
+        raise BadInput(
+            f"--engine petsc: {found.name} has no linear systems worth several processes; "
+            "allowed: --engine serial"
+        )
+    return "linear=petsc"
 
 
 @click.command(

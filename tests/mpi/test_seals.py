@@ -95,3 +95,11 @@ def test_a_sweep_by_the_processes_of_mpi(tmp_path: Path) -> None:
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["1", "1"]
+
+
+def test_a_case_without_factors_is_refused(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "softehl", "run", "slider", "--engine", "petsc"]
+    done = subprocess.run([*words, "--out", str(tmp_path / "no")], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "slider has no linear systems worth several processes" in done.stderr
+    assert not (tmp_path / "no").exists()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import softehl
 from softehl import Mesh, Study
 from softehl.runtime.arrays import Array
 from softehl.runtime.engines.engine import engine_of
@@ -121,3 +123,15 @@ def test_an_engine_that_is_not_there() -> None:
 def test_without_petsc_the_message_says_what_to_install() -> None:
     with pytest.raises(MissingPetsc, match=r"pip install 'softehl\[mpi\]'"):
         engine_of("petsc")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("petsc4py") is not None, reason="PETSc is there")
+def test_a_seal_without_petsc_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for way in (["--engine", "petsc"], ["--set", "linear=petsc"]):
+        assert softehl.main(["run", "oring", *way, "--out", str(tmp_path / "no")]) == 2
+        told = capsys.readouterr().err
+        assert told.count("\n") == 1
+        assert "pip install 'softehl[mpi]'" in told
+    assert not (tmp_path / "no").exists()
