@@ -59,6 +59,7 @@ _NAMES = ", ".join(SHIPPED)
     help="petsc: factors by MUMPS on all processes that mpirun started (the key linear).",
 )
 @click.option("--quiet", is_flag=True, help="No progress and no table.")
+@click.option("--report", is_flag=True, help="Write report.html, as `softehl report DIR` does.")
 def run(
     case: str,
     assignments: tuple[str, ...],
@@ -70,6 +71,7 @@ def run(
     jobs: int,
     engine: str,
     quiet: bool,
+    report: bool,
 ) -> int:
     """Run a case."""
     from softehl.cases.harness.case_file import read_case
@@ -88,7 +90,60 @@ def run(
         read = read_case(case, SHIPPED, assignments, options)
         target = Path("results", read.case.name) if folder is None else folder
         existing = existing_of(resume=resume, overwrite=overwrite)
-        return run_case(read, target, existing, jobs=jobs, quiet=quiet)
+        code = run_case(read, target, existing, jobs=jobs, quiet=quiet)
+        if report:
+            code = _report_of(target, code, quiet=quiet)
+        return code
+
+
+@click.command(name="report")
+@click.argument(
+    "folders", metavar="DIR...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@click.option(
+    "--out",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="File of the report  [default: report.html in the first DIR]",
+)
+@click.option("--xlsx", is_flag=True, help="Write its tables beside it, as .xlsx.")
+def report_runs(folders: tuple[Path, ...], out: Path | None, xlsx: bool) -> int:
+    """Report the run in DIR, or several side by side: one file of HTML that works offline.
+
+    What was asked, gland, deformed section, film with a slider over the speeds, curve with errors
+    and verdicts, friction, leakage, tolerances, limits and versions; of several runs also the
+    differences from the first, in per cent.
+    """
+    _write_report(folders, out or folders[0] / "report.html", xlsx=xlsx, quiet=False)
+    return 0
+
+
+def _report_of(folder: Path, code: int, *, quiet: bool) -> int:
+    """Report a run that is done; its exit code, or 2 where there is nothing that says so yet."""
+    from softehl.cases.harness.errors import BadInput
+
+    try:
+        _write_report((folder,), folder / "report.html", xlsx=False, quiet=quiet)
+    except BadInput as error:
+        click.echo(f"softehl: no report: {error}", err=True)
+        return code or 2
+    return code
+
+
+def _write_report(folders: tuple[Path, ...], path: Path, *, xlsx: bool, quiet: bool) -> None:
+    from softehl.cases.harness.errors import BadInput
+    from softehl.cases.harness.report.page import parts_of, read_finished, write_page, write_xlsx
+
+    runs = [read_finished(folder, SHIPPED) for folder in folders]
+    try:
+        parts = parts_of(runs)
+        size = write_page(runs, parts, path)
+        if xlsx:
+            write_xlsx(parts, path.with_suffix(".xlsx"))
+    except OSError as error:
+        raise BadInput(f"cannot write {path}: {error.strerror or error}") from None
+    if not quiet:
+        click.echo(f"written to {path} ({size / 1e6:.1f} MB)")
 
 
 def _by_petsc(case: str) -> str:

@@ -5,11 +5,13 @@ from pathlib import Path
 
 from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
 from softehl.cases.seal import plan
 from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import PICTURES, write_plots
+from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmRow
 from softehl.cases.seal.telling import Teller
@@ -30,6 +32,7 @@ class ORingCase(Case[ORing, FilmRow]):
         *(f"{name}.{kind}" for name in (*PICTURES, "fit") for kind in ("png", "svg")),
     )
     shared = "contacts"
+    left_out = LEFT_OUT
 
     def solve(self, parameters: ORing, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`; runs of one section share their contact states."""
@@ -97,6 +100,12 @@ class ORingCase(Case[ORing, FilmRow]):
             from softehl.cases.seal.report.sensitivity import write_sensitivities
 
             write_sensitivities(parameters, folder, rows)
+
+    def report(self, runs: Sequence[FinishedRun]) -> Sequence[Part]:
+        """See :class:`Case`."""
+        from softehl.cases.seal.report.parts import parts
+
+        return parts(runs)
 
     def share(self, parameters: ORing) -> tuple[float, str]:
         """See :class:`Case`."""

@@ -25,7 +25,8 @@ class Case(Generic[P, R]):
     list_key: the key whose values the rows follow.  selection: keys that only select rows, which a
     resumed run may change.  ways: keys that choose a way to the same rows.  files: patterns of the
     files that it writes beside those of its rows.  shared: name of the folder in which the runs of
-    a sweep leave something for each other, empty for none.
+    a sweep leave something for each other, empty for none.  left_out: what its model leaves out, in
+    words for a report.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Case(Generic[P, R]):
     ways: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     shared: str = ""
+    left_out: tuple[str, ...] = ()
 
     def solve(self, parameters: P, observer: Observer, shared: Path | None) -> Outcome:
         """Compute all rows that are asked for; failure is in the outcome's status.
@@ -97,6 +99,10 @@ class Case(Generic[P, R]):
 
         Raises OSError, and ValueError where a file cannot be read back.
         """
+
+    def report(self, runs: Sequence[Any]) -> Sequence[Any]:
+        """Parts (`harness.report.part.Part`) that a report of finished runs has of this case."""
+        return ()
 
     def share(self, parameters: P) -> tuple[float, str]:
         """How long a run takes compared with others, and a name that is equal for those which can

@@ -108,7 +108,7 @@ def section_figure(p: ORing, views: Sequence[View]) -> Figure:
 
 def draw_view(axes: Axes, p: ORing, view: View, scale: Scale) -> TriContourSet:
     """One state in its gland; what a colour bar needs."""
-    _draw_gland(axes, p)
+    draw_gland(axes, p)
     shown = _draw_ring(axes, view.section, scale.levels)
     _draw_film(axes, p, view.profile, scale.height)
     _draw_contact(axes, p, view.section, scale.height)
@@ -116,7 +116,7 @@ def draw_view(axes: Axes, p: ORing, view: View, scale: Scale) -> TriContourSet:
     return shown
 
 
-def _draw_gland(axes: Axes, p: ORing) -> None:
+def draw_gland(axes: Axes, p: ORing) -> None:
     """Rod, housing with its walls, and the fluid on the sealed side; limits of the picture."""
     size, lip = p.section_diameter, 0.5 * p.rod_diameter + _CLEARANCE * p.section_diameter
     rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter

@@ -1,0 +1,1 @@
+"""Self-contained reports of runs: one file of HTML that works offline, and tables for a sheet."""

@@ -1,0 +1,207 @@
+"""From the folders of runs to a report: `report.html`, and the tables as `report.xlsx`."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from softehl.cases.harness.case import load_case
+from softehl.cases.harness.curve import CurveFolder
+from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.parameters import keys_of
+from softehl.cases.harness.report.part import FinishedRun, Part, Table
+from softehl.runtime.io import Cell, read_json, replacing, write_text
+
+_HERE = Path(__file__).parent
+_SHEET_NAME = 31  # letters, by the file format
+_MISSING = "softehl report needs Bokeh and openpyxl: pip install 'softehl[report]'"
+
+
+def read_finished(folder: Path, shipped: Mapping[str, str]) -> FinishedRun:
+    """The run in a folder.  Raises BadInput where there is none that can be read."""
+    if not (folder / "run.json").exists():
+        raise BadInput(f"{folder} holds no run (there is no run.json); allowed: the DIR of a run")
+    try:
+        content = read_json(folder / "run.json")
+        case = load_case(shipped[content["case"]])
+        parameters = case.parameters(**content["parameters"])
+        curve, rejected = (CurveFolder(f, case.row) for f in (folder, folder / "rejected"))
+        for rows in (curve, rejected):
+            rows.load()
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        reason = " ".join(str(error).split())[:120]
+        raise BadInput(f"{folder} holds no run that can be read: {reason}") from None
+    return FinishedRun(folder, case, parameters, curve.rows, rejected.rows, content)
+
+
+def write_page(runs: Sequence[FinishedRun], parts: Sequence[Part], path: Path) -> int:
+    """Write a report; returns its size in bytes.  Raises OSError, and BadInput without Bokeh."""
+    text = render(runs, parts)
+    write_text(path, text)
+    return len(text.encode())
+
+
+def parts_of(runs: Sequence[FinishedRun]) -> list[Part]:
+    """All parts in order: of the harness, and between them those of the case."""
+    cases = {run.case.name for run in runs}
+    if len(cases) > 1:
+        raise BadInput(f"runs of different cases ({', '.join(sorted(cases))}); allowed: of one")
+    for run in runs:
+        if not run.rows:
+            raise BadInput(f"{run.folder} has no result yet: nothing to report")
+    try:
+        own = list(runs[0].case.report(runs))
+    except ImportError as error:
+        raise BadInput(f"{_MISSING} ({error})") from None
+    parts = [_asked(runs), *([_side_by_side(runs)] if len(runs) > 1 else []), *own]
+    left_out = runs[0].case.left_out
+    if left_out:
+        parts.append(Part("What the model leaves out", lines=left_out))
+    return [*parts, _all_rows(runs), _all_keys(runs), _versions(runs)]
+
+
+def render(runs: Sequence[FinishedRun], parts: Sequence[Part]) -> str:
+    """The page, with everything that it needs."""
+    try:
+        from bokeh.embed import components
+        from bokeh.resources import Resources
+        from jinja2 import Environment, FileSystemLoader
+    except ImportError as error:
+        raise BadInput(f"{_MISSING} ({error})") from None
+    plots = {f"{i}-{k}": plot for i, part in enumerate(parts) for k, plot in enumerate(part.plots)}
+    script, divs = components(plots) if plots else ("", {})
+    resources = Resources(mode="inline", components=["bokeh", "bokeh-widgets"])
+    page = Environment(
+        loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    page.filters["shown"] = shown
+    page.filters["base64"] = lambda data: base64.b64encode(data).decode()
+    return page.get_template("report.html").render(
+        title=runs[0].case.title,
+        runs=runs,
+        parts=parts,
+        resources=resources.render() if plots else "",
+        script=script,
+        divs=divs,
+    )
+
+
+def shown(value: Cell | None) -> str:
+    """A cell in words: four digits of a number, nothing where it is not known."""
+    if value is None or (isinstance(value, float) and not isfinite(value)):
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def write_xlsx(parts: Sequence[Part], path: Path) -> None:
+    """Write every table of a report as a sheet.  Raises BadInput where openpyxl is missing."""
+    try:
+        from openpyxl import Workbook
+    except ImportError as error:
+        raise BadInput(f"{_MISSING} ({error})") from None
+    book, names = Workbook(), dict[str, int]()
+    book.remove(book.worksheets[0])
+    for title, table in _tables(parts):
+        name = "".join(c for c in title if c not in "[]:*?/\\")[: _SHEET_NAME - 3]
+        names[name] = names.get(name, 0) + 1
+        sheet = book.create_sheet(name if names[name] == 1 else f"{name} {names[name]}")
+        sheet.append([table.caption])
+        sheet.append(list(table.header))
+        for row in table.rows:
+            known = [isinstance(c, str) or (c is not None and isfinite(c)) for c in row]
+            sheet.append([c if good else None for c, good in zip(row, known, strict=True)])
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        book.save(file)
+
+
+def _tables(parts: Sequence[Part]) -> Iterator[tuple[str, Table]]:
+    for part in parts:
+        for table in part.tables:
+            yield part.title, table
+
+
+# --- parts that every case has ------------------------------------------------------------------
+
+
+def _asked(runs: Sequence[FinishedRun]) -> Part:
+    """The keys that are not at their defaults, with units and meaning, a column for each run."""
+    default = runs[0].case.parameters().model_dump()
+    given = [run.parameters.model_dump() for run in runs]
+    rows = [
+        (key.name, *(_text(g[key.name]) for g in given), key.unit, key.meaning)
+        for key in keys_of(runs[0].case.parameters)
+        if any(g[key.name] != default[key.name] for g in given)
+    ]
+    header = ("key", *(run.name for run in runs), "unit", "meaning")
+    words = "Every key is at its default." if not rows else ""
+    table = Table("Keys that are not at their defaults", header, rows)
+    status = [
+        f"{run.name}: {run.content.get('status')} {run.content.get('message') or ''}"
+        for run in runs
+        if run.content.get("status") != "converged"
+    ]
+    return Part("What was asked", words, tables=[table] if rows else [], lines=status)
+
+
+def _side_by_side(runs: Sequence[FinishedRun]) -> Part:
+    """Every shown column of the rows that all runs share, and differences from the first run."""
+    first, *others = runs
+    columns = [c for c in first.case.row.columns() if c.head and c.kind is float]
+    key = first.case.row.key_column()
+    found = [{row.key: row for row in run.rows} for run in runs]
+    common = [row.key for row in first.rows if all(row.key in rows for rows in found[1:])]
+    tables = []
+    for column in columns:
+        if column.name == key.name:
+            continue
+        rows: list[list[Cell]] = []
+        for at in common:
+            values = [float(getattr(rows[at], column.name)) for rows in found]
+            changes = [_percent(v, values[0]) for v in values[1:]]
+            rows.append([at, *values, *changes])
+        header = [f"{key.head} [{key.unit}]", *(run.name for run in runs)]
+        header += [f"{run.name}, difference in %" for run in others]
+        tables.append(Table(f"{column.name}: {column.meaning}", header, rows))
+    words = "" if common else "The runs share no row."
+    return Part("Side by side", words, tables=tables if common else [])
+
+
+def _percent(value: float, reference: float) -> float:
+    return 100.0 * (value / reference - 1.0) if reference else float("nan")
+
+
+def _all_rows(runs: Sequence[FinishedRun]) -> Part:
+    tables = []
+    for run in runs:
+        columns = run.case.row.columns()
+        header = [f"{c.name}" for c in columns]
+        tables.append(Table(f"{run.name}: curve.csv", header, [row.cells() for row in run.rows]))
+    return Part("All columns", tables=tables, folded=True)
+
+
+def _all_keys(runs: Sequence[FinishedRun]) -> Part:
+    given = [run.parameters.model_dump() for run in runs]
+    rows = [
+        (key.name, *(_text(g[key.name]) for g in given), key.unit, key.bounds, key.meaning)
+        for key in keys_of(runs[0].case.parameters)
+    ]
+    header = ("key", *(run.name for run in runs), "unit", "allowed", "meaning")
+    return Part("All keys", tables=[Table("As used", header, rows)], folded=True)
+
+
+def _versions(runs: Sequence[FinishedRun]) -> Part:
+    versions = [run.content.get("versions") or {} for run in runs]
+    names = dict.fromkeys(name for found in versions for name in found)
+    rows = [(name, *(str(found.get(name) or "") for found in versions)) for name in names]
+    rows.append(("seconds", *(shown(run.content.get("seconds")) for run in runs)))
+    table = Table("Versions", ("", *(run.name for run in runs)), rows)
+    return Part("Versions", tables=[table], folded=True)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_text, value))
+    return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

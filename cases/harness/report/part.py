@@ -1,0 +1,60 @@
+"""What a report is made of; a case adds parts of its own, the page puts them one below another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from softehl.runtime.io import Cell
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a caption; numbers are shown with four digits."""
+
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture (PNG) with a caption."""
+
+    caption: str
+    png: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of a report under a title: text, pictures, interactive plots (Bokeh), tables, lines.
+
+    folded: whether it is shown closed until it is asked for.
+    """
+
+    title: str
+    text: str = ""
+    pictures: Sequence[Picture] = ()
+    plots: Sequence[Any] = ()
+    tables: Sequence[Table] = ()
+    lines: Sequence[str] = ()
+    folded: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedRun:
+    """A run that is in a folder, whole or not: its parameters, its rows, what run.json says."""
+
+    folder: Path
+    case: Any
+    parameters: Any
+    rows: Sequence[Any]
+    rejected: Sequence[Any] = ()
+    content: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """What it is called in a report."""
+        return self.folder.resolve().name

@@ -1,0 +1,78 @@
+"""The gland and the free ring before it is squeezed, with their measures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from softehl.cases.seal.catalogue import Ring, fill, squeeze, stretch
+from softehl.cases.seal.report import style
+from softehl.cases.seal.report.section import draw_gland
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from softehl.cases.seal.parameters import ORing
+
+
+def gland_figure(p: ORing) -> Figure:
+    """The section as it is made, at its radius on the rod, and the gland that it goes into."""
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Circle
+
+    figure = Figure(figsize=(4.6, 4.2))
+    axes = figure.subplots()
+    draw_gland(axes, p)
+    rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
+    half, size = 0.5 * p.groove_width, p.section_diameter
+    ring = Circle((0.0, rod + 0.5 * size), 0.5 * size, facecolor="#f2c14e", edgecolor="#3b3f45")
+    axes.add_patch(ring)
+    left, right = p.groove_centre - half, p.groove_centre + half
+    _measure(axes, (left, housing), (right, housing), f"{p.groove_width:.4g}", (0, 5))
+    depth = housing - rod
+    _measure(axes, (right, rod), (right, housing), f"{depth:.4g}", (5, 0))
+    _measure(
+        axes, (-0.5 * size, rod + 0.5 * size), (0.5 * size, rod + 0.5 * size), f"{size:.4g}", (0, 4)
+    )
+    axes.set_xlabel("$z$ [mm]   (sealed side left, air side right)")
+    axes.set_ylabel("$r$ [mm]")
+    axes.set_title(f"rod {p.rod_diameter:g} mm, housing {p.housing_diameter:.6g} mm")
+    style.set_margins(figure, left=0.6, right=0.1, bottom=0.5, top=0.35)
+    return figure
+
+
+def fit_numbers(p: ORing) -> list[tuple[str, float, str]]:
+    """How the ring sits in its gland: name, value, unit."""
+    ring = Ring("", p.inner_diameter, p.section_diameter)
+    depth = 0.5 * (p.housing_diameter - p.rod_diameter)
+    filled = fill(ring, p.rod_diameter, p.housing_diameter, p.groove_width)
+    return [
+        ("squeeze", squeeze(p.section_diameter, depth), "%"),
+        ("stretch", stretch(p.inner_diameter, p.rod_diameter), "%"),
+        ("gland fill", filled, "%"),
+        ("shear modulus of the rubber", p.shear_modulus, "MPa"),
+        ("viscosity of the oil", p.viscosity * 1e9, "mPa s"),
+    ]
+
+
+def _measure(
+    axes: Axes,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    text: str,
+    shift: tuple[float, float],
+) -> None:
+    """An arrow with both ends and a length."""
+    axes.annotate(
+        "", end, start, arrowprops={"arrowstyle": "<|-|>", "linewidth": 0.7, "color": "0.2"}
+    )
+    middle = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
+    axes.annotate(
+        text,
+        middle,
+        xytext=shift,
+        textcoords="offset points",
+        fontsize="small",
+        ha="center" if shift[1] else "left",
+        va="bottom" if shift[1] else "center",
+    )

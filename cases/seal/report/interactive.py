@@ -1,0 +1,205 @@
+"""Plots of a report that answer to the reader: Bokeh, whose script the report carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from softehl.cases.harness.report.part import FinishedRun
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.report import style
+from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.telling import read_profile
+from softehl.runtime.arrays import Array
+
+_WIDTH, _HEIGHT = 460, 300
+_POINTS = 400  # of a profile at most
+_SPEED, _FILM = "rod speed |U| [mm/s]", "film thickness h* [µm]"
+_DASHES = {"out": "solid", "in": "dashed"}
+_COLOURS = ("#1b6ca8", "#c8553d", "#4f8a52", "#7a5195", "#b58900", "#444444")
+_MOVE = """
+for (const [source, states] of pairs) source.data = states[cb_obj.value];
+cb_obj.title = titles[cb_obj.value];
+"""
+"""What the slider does: every line shows its state at the speed of that number."""
+
+Profiles = dict[str, list[dict[str, list[float]]]]
+
+
+def film_plot(run: FinishedRun) -> Any:
+    """Pressure and film thickness of both strokes, at the speed that a slider chooses."""
+    from bokeh.layouts import column, row
+    from bokeh.models import ColumnDataSource, CustomJS
+    from bokeh.models.widgets import Slider
+
+    speeds = sorted({abs(r.rod_speed_mm_s) for r in run.rows}, reverse=True)
+    states, limits = profiles_of(run, speeds)
+    panels = [
+        _panel(style_label, limits, log=log)
+        for style_label, log in (("pressure p [MPa]", False), ("film thickness h [µm]", True))
+    ]
+    pairs = []
+    for stroke, found in states.items():
+        source = ColumnDataSource(found[0], name=f"film {stroke}")
+        pairs.append([source, found])
+        for panel, name in zip(panels, ("p", "h"), strict=True):
+            look = {"line_color": style.COLOURS[stroke], "line_dash": _DASHES[stroke]}
+            panel.line("x", name, source=source, legend_label=style.STROKES[stroke], **look)
+    for panel, place in zip(panels, ("bottom_center", "top_center"), strict=True):
+        panel.legend.location = place
+    titles = [f"{run.name}: |U| = {speed:g} mm/s" for speed in speeds]
+    both = row(*panels)
+    if len(speeds) == 1:
+        return both
+    slider = Slider(start=0, end=len(speeds) - 1, value=0, step=1, title=titles[0], name="speed")
+    slider.update(show_value=False, width=2 * _WIDTH)
+    slider.js_on_change("value", CustomJS(args={"pairs": pairs, "titles": titles}, code=_MOVE))
+    return column(slider, both)
+
+
+def profiles_of(run: FinishedRun, speeds: Sequence[float]) -> tuple[Profiles, dict[str, Any]]:
+    """Lines of each stroke, one for each speed (none where it has no state), and their limits."""
+    found: Profiles = {}
+    rows = {row.key: row for row in run.rows}
+    for stroke, sign in (("out", 1.0), ("in", -1.0)):
+        some = [rows.get(sign * speed) for speed in speeds]
+        if any(some):
+            found[stroke] = [_line(run, row) for row in some]
+    known = [row for row in rows.values() if np.isfinite(row.contact_start_mm)]
+    start, end = (
+        (min(r.contact_start_mm for r in known) - 0.3, max(r.contact_end_mm for r in known) + 0.3)
+        if known
+        else (-1.0, 1.0)
+    )
+    thickest = max(row.h_star_um for row in rows.values())
+    thinnest = min(row.h_min_um for row in rows.values())
+    top = max(row.p_max_MPa for row in rows.values())
+    limits = {
+        "x": (start, end),
+        "h": (0.7 * thinnest, 20.0 * thickest),
+        "p": (-0.05 * top, 1.1 * top),
+    }
+    return found, limits
+
+
+def _line(run: FinishedRun, row: FilmRow | None) -> dict[str, list[float]]:
+    if row is None:
+        return {"x": [], "p": [], "h": []}
+    profile = read_profile(run.folder, row)
+    every = slice(None, None, 1 + len(profile.x_mm) // _POINTS)
+    return {
+        name: [float(f"{v:.5g}") for v in values[every]]
+        for name, values in (("x", profile.x_mm), ("p", profile.p_MPa), ("h", profile.h_um))
+    }
+
+
+def _panel(label: str, limits: dict[str, Any], *, log: bool) -> Any:
+    from bokeh.plotting import figure
+
+    panel = figure(
+        width=_WIDTH,
+        height=_HEIGHT,
+        x_range=limits["x"],
+        y_range=limits["h" if log else "p"],
+        y_axis_type="log" if log else "linear",
+        x_axis_label="x [mm]   (sealed side left, air side right)",
+        y_axis_label=label,
+        tools="pan,box_zoom,wheel_zoom,reset,save",
+    )
+    panel.toolbar.logo = None
+    return panel
+
+
+def curve_plot(runs: Sequence[FinishedRun]) -> Any:
+    """h* over speed with error bars; what is not plainly `ok` is a hollow mark."""
+    panel = _over_speed(runs, _FILM)
+    for number, run in enumerate(runs):
+        for stroke in style.STROKES:
+            rows = _stroke(run, stroke)
+            if rows:
+                _draw(
+                    panel, rows, _look(runs, number, stroke), f"{run.name}, {style.STROKES[stroke]}"
+                )
+    panel.legend.location = "top_left"
+    return panel
+
+
+def _draw(panel: Any, rows: Sequence[FilmRow], look: dict[str, str], label: str) -> None:
+    from bokeh.models import ColumnDataSource
+    from bokeh.models.annotations import Whisker
+
+    h = np.array([row.h_star_um for row in rows])
+    error = np.nan_to_num(0.01 * np.abs([row.h_star_error_percent for row in rows])) * h
+    source = ColumnDataSource(
+        {
+            **{"x": [abs(row.rod_speed_mm_s) for row in rows], "y": h},
+            **{"low": h - error, "high": h + error},
+            "verdict": [row.verdict for row in rows],
+            "error": [row.h_star_error_percent for row in rows],
+            "fill": [look["color"] if row.verdict == OK else "white" for row in rows],
+        }
+    )
+    panel.line(
+        "x",
+        "y",
+        source=source,
+        legend_label=label,
+        line_dash=look["dash"],
+        line_color=look["color"],
+    )
+    panel.scatter("x", "y", source=source, size=7, line_color=look["color"], fill_color="fill")
+    panel.add_layout(
+        Whisker(base="x", lower="low", upper="high", source=source, line_color=look["color"])
+    )
+
+
+def friction_plot(runs: Sequence[FinishedRun]) -> Any:
+    """Magnitude of the friction on the rod over speed."""
+    panel = _over_speed(runs, "friction on the rod [N]")
+    for number, run in enumerate(runs):
+        for stroke in style.STROKES:
+            rows, look = _stroke(run, stroke), _look(runs, number, stroke)
+            if rows:
+                x = [abs(row.rod_speed_mm_s) for row in rows]
+                y: Array = np.abs([row.rod_friction_N for row in rows])
+                label = f"{run.name}, {style.STROKES[stroke]}"
+                panel.line(
+                    x, y, line_color=look["color"], line_dash=look["dash"], legend_label=label
+                )
+                panel.scatter(x, y, size=6, color=look["color"])
+    panel.legend.location = "top_left"
+    return panel
+
+
+def _over_speed(runs: Sequence[FinishedRun], label: str) -> Any:
+    from bokeh.models import HoverTool
+    from bokeh.plotting import figure
+
+    panel = figure(
+        width=int(1.4 * _WIDTH),
+        height=int(1.2 * _HEIGHT),
+        x_axis_type="log",
+        y_axis_type="log",
+        x_axis_label=_SPEED,
+        y_axis_label=label,
+        tools="pan,box_zoom,wheel_zoom,reset,save",
+    )
+    tips = [("|U|", "@x{0.###} mm/s"), (label, "@y{0.####}")]
+    if label == _FILM:
+        tips += [("error", "@error{0.##} %"), ("verdict", "@verdict")]
+    panel.add_tools(HoverTool(tooltips=tips))
+    panel.toolbar.logo = None
+    return panel
+
+
+def _stroke(run: FinishedRun, stroke: str) -> list[FilmRow]:
+    rows = [row for row in run.rows if row.stroke == stroke]
+    return sorted(rows, key=lambda row: abs(row.rod_speed_mm_s))
+
+
+def _look(runs: Sequence[FinishedRun], number: int, stroke: str) -> dict[str, str]:
+    """Colours are strokes for one run, runs for several."""
+    colour = style.COLOURS[stroke] if len(runs) == 1 else _COLOURS[number % len(_COLOURS)]
+    return {"color": colour, "dash": _DASHES[stroke]}

@@ -1,0 +1,166 @@
+"""What a report says of runs of a seal, part by part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
+from softehl.cases.seal import catalogue
+from softehl.cases.seal.leakage import LeakageRow, net_leakage
+from softehl.cases.seal.report import style
+from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
+from softehl.cases.seal.report.fit import fit_figure, fit_of
+from softehl.cases.seal.report.interactive import curve_plot, film_plot, friction_plot
+from softehl.cases.seal.report.section import View, section_figure
+from softehl.cases.seal.rubber import shore_band
+from softehl.cases.seal.telling import read_profile, read_section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from softehl.runtime.io import Cell
+
+
+def parts(runs: Sequence[FinishedRun]) -> list[Part]:
+    """Gland, deformed section, film, curve, friction, leakage, surfaces, tolerances."""
+    import matplotlib
+
+    with matplotlib.rc_context(style.STYLE):
+        found = [_gland(runs), *_rubber(runs), _section(runs)]
+    found += [_film(runs), _curve(runs), _friction(runs), *_leakage(runs), *_surfaces(runs)]
+    return [*found, _tolerances(runs)]
+
+
+def _gland(runs: Sequence[FinishedRun]) -> Part:
+    pictures = [Picture(run.name, _png(gland_figure(run.parameters))) for run in runs]
+    numbers = [fit_numbers(run.parameters) for run in runs]
+    rows: list[tuple[Cell, ...]] = [
+        (name, *(found[k][1] for found in numbers), unit)
+        for k, (name, _, unit) in enumerate(numbers[0])
+    ]
+    for run in runs:
+        contact = run.content.get("numbers") or {}
+        if contact.get("air_wall_N") is not None and len(runs) == 1:
+            rows.append(("force on the wall of the air side", -float(contact["air_wall_N"]), "N"))
+    table = Table("How the ring sits", ("", *(run.name for run in runs), "unit"), rows)
+    text = "The free section on the rod, and the gland it is pressed into; lengths in mm."
+    return Part("Gland and ring", text, pictures=pictures, tables=[table])
+
+
+def _rubber(runs: Sequence[FinishedRun]) -> list[Part]:
+    """The fit of a rubber, where a run has one."""
+    pictures = []
+    for run in runs:
+        try:
+            found = fit_of(run.parameters)
+        except ValueError:
+            continue  # the table of tests is elsewhere now
+        if found:
+            pictures.append(Picture(f"{run.name}: {run.parameters.fit}", _png(fit_figure([found]))))
+    return [Part("Rubber", "Tests and the material fitted to them.", pictures)] if pictures else []
+
+
+def _section(runs: Sequence[FinishedRun]) -> Part:
+    """The fastest state of each stroke."""
+    pictures = []
+    for run in runs:
+        views = []
+        for stroke in style.STROKES:
+            rows = [row for row in run.rows if row.stroke == stroke]
+            if rows:
+                row = max(rows, key=lambda r: abs(r.rod_speed_mm_s))
+                profile, section = read_profile(run.folder, row), read_section(run.folder, row)
+                views.append(View(row, profile, section))
+        views = [view for view in views if view.complete]
+        if views:
+            pictures.append(Picture(run.name, _png(section_figure(run.parameters, views))))
+    text = "Stress in the ring, film pressure on the rod, contact pressure on housing and walls."
+    return Part("Deformed section", text, pictures=pictures)
+
+
+def _film(runs: Sequence[FinishedRun]) -> Part:
+    text = "The slider chooses the rod speed."
+    return Part("Film and pressure", text, plots=[film_plot(run) for run in runs])
+
+
+def _curve(runs: Sequence[FinishedRun]) -> Part:
+    lines = [f"{run.name}: {note}" for run in runs for note in run.case.notes(run.rows)]
+    lines += [
+        f"{run.name}: rejected, no result: {run.case.named(run.rejected)}"
+        for run in runs
+        if run.rejected
+    ]
+    text = (
+        "h* over the rod speed; bars are the estimated error, a hollow mark is a state that is no "
+        "plain result. `ok` means right within the stated error, and within 2 %."
+    )
+    return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)
+
+
+def _friction(runs: Sequence[FinishedRun]) -> Part:
+    text = "Of the film on the rod, its magnitude."
+    return Part("Friction", text, plots=[friction_plot(runs)])
+
+
+def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
+    """What leaves in a cycle, and for a stroke of 100 mm."""
+    tables = []
+    for run in runs:
+        rows = net_leakage(run.rows)
+        if rows:
+            header = (*LeakageRow.header(), "mm3 in a cycle of 100 mm")
+            cells = [(*row.cells(), 100.0 * row.net_mm3_per_mm) for row in rows]
+            tables.append(Table(run.name, header, cells))
+    text = (
+        "Out minus in; negative: the instroke could take back more than there is, dry on balance."
+    )
+    return [Part("Leakage per cycle", text, tables=tables)] if tables else []
+
+
+def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
+    """Film thickness over roughness and the regime, where the runs have columns of it."""
+    tables = []
+    for run in runs:
+        names = [f.name for f in fields(run.rows[0])]
+        own = [n for n in names if n.startswith("lambda") or n == "regime"]
+        if own:
+            rows = [(row.rod_speed_mm_s, *(getattr(row, n) for n in own)) for row in run.rows]
+            tables.append(Table(run.name, ("rod_speed_mm_s", *own), rows))
+    text = "Lambda is the film thickness over the roughness of both surfaces."
+    return [Part("Surfaces", text, tables=tables)] if tables else []
+
+
+def _tolerances(runs: Sequence[FinishedRun]) -> Part:
+    """What of the input is known how well."""
+    rows: list[tuple[str, str, str]] = []
+    for run in runs:
+        p = run.parameters
+        if p.ring:
+            ring = catalogue.ring(p.ring)
+            rows += [
+                (run.name, f"{key} = {value:g} mm", f"+- {tolerance:g} mm")
+                for key, value, tolerance in (
+                    ("section_diameter", ring.section_diameter, ring.section_tolerance),
+                    ("inner_diameter", ring.inner_diameter, ring.inner_tolerance),
+                )
+                if tolerance is not None
+            ]
+        if p.shore_A is not None:
+            low, high = shore_band(p.shore_A)
+            rows.append(
+                (run.name, f"shore_A = {p.shore_A:g}", f"+- 5: modulus {low:+.0f} to {high:+.0f} %")
+            )
+        if p.oil and "VG" in p.oil.upper():
+            rows.append((run.name, f"oil = {p.oil}", "viscosity +- 10 % (ISO 3448)"))
+    text = "" if rows else "No key of these runs has a tolerance that is known here."
+    table = Table("Of what was given", ("run", "key", "tolerance"), rows)
+    return Part("Tolerances", text, tables=[table] if rows else [])
+
+
+def _png(figure: Figure) -> bytes:
+    found = BytesIO()
+    figure.savefig(found, format="png", dpi=130)
+    return found.getvalue()
