@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
@@ -149,7 +150,12 @@ def _asked(runs: Sequence[FinishedRun]) -> Part:
 def _side_by_side(runs: Sequence[FinishedRun]) -> Part:
     """Every shown column of the rows that all runs share, and differences from the first run."""
     first, *others = runs
-    columns = [c for c in first.case.row.columns() if c.head and c.kind is float]
+    heads = Counter(c.head for c in first.case.row.columns())  # two of one head are a range
+    columns = [
+        c
+        for c in first.case.row.columns()
+        if c.head and heads[c.head] == 1 and c.kind is float and c.unit != "%"
+    ]
     key = first.case.row.key_column()
     found = [{row.key: row for row in run.rows} for run in runs]
     common = [row.key for row in first.rows if all(row.key in rows for rows in found[1:])]
