@@ -56,9 +56,12 @@ not-a-number in *every* entry of its `values` and `tangent`; the other elements 
 
 Targets
 -------
-`simd` (the default): the functions above, four elements at once where the kernel has neither a
-loop nor a branch.  The lanes are the vector extensions of gcc >= 12 and clang; another compiler,
-or `-DSOFTEHL_LANES=1`, gets groups of one element from the same source.
+`simd` (the default): the functions above, several elements at once, one a lane of a vector: eight
+with AVX-512, else four; one after another where there is little to compute.  Where a batch is no
+multiple of the lanes, its last elements are computed and written twice.  A kernel of an
+interpolated field keeps 8 (ndof + ndof^2) bytes a lane on the stack.  The lanes are the vector
+extensions of gcc >= 12 and clang; another compiler, or `-DSOFTEHL_LANES=1`, gets groups of one
+element from the same source.
 `scalar`: the functions above, one element after another, plain C11.
 `ufcx`: one cell at a time for DOLFINx custom kernels.  The tasks `energy`, `residual`, `tangent`
 and `d_NAME` of a family become functions `softehl_NAME_TASK_ufcx` of UFCx's type,

@@ -5,11 +5,13 @@
     interfaces  the few linear forms through which the potential sees its unknowns
     invariants  the fewest quadratic values of these forms of which the energy is a function
     chain rule  the outputs of a task, differentiated in every way that may be the cheapest
-    passes      rewrites of each way that keep its values and lower its cost (`optimise`)
+    passes      rewrites of each way that keep its values and lower its cost (`optimise`), with
+                the loop over the points written out where it is short
     schedule    what is computed once, what at each point, what inside a branch
     choice      of all ways the one with fewest operations
-    order       straight-line code in the order of a small register file
-    print       one value, one line of C: element by element, or several at once
+    order       straight pieces in the order of a small register file
+    print       one value, one line of C: several elements at once, or where there is little to
+                compute one after another
     routines    local iterations and functions of stretches as C functions of their own
 
 `softehl generate --trace KERNEL` shows what each of them did.
@@ -17,33 +19,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from types import ModuleType
 
-from softehl.codegen.abi import AT_POINTS, DESIGN, ROLLED, Target
+from softehl.codegen.abi import DESIGN, ROLLED, Target
 from softehl.codegen.derive import structure, variants
 from softehl.codegen.derive.outputs import Entry, placed
 from softehl.codegen.derive.structure import Structure
 from softehl.codegen.derive.variants import Variant
 from softehl.codegen.emit import c as emit_c
+from softehl.codegen.emit import lane_routines as emit_lane_routines
+from softehl.codegen.emit import lanes as emit_lanes
 from softehl.codegen.emit import routines as emit_routines
 from softehl.codegen.emit import simd as emit_simd
 from softehl.codegen.emit import source as emit_source
 from softehl.codegen.emit import ufcx as emit_ufcx
 from softehl.codegen.emit.order import arranged
-from softehl.codegen.emit.schedule import Schedule, schedule, straight_line
+from softehl.codegen.emit.runs import arranged_plan
+from softehl.codegen.emit.schedule import Schedule, is_straight, schedule, straight_line
 from softehl.codegen.graph.graph import Routine
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
 
+SHORT = 3000
+"""Operations of one element up to which writing the loop over its points out is tried."""
+FEW = 64
+"""Operations of one element below which loading and storing in lanes costs more than it saves;
+what a routine does besides always pays."""
+
 
 @dataclass(frozen=True)
 class Attempt:
-    """One chain rule to its end: what each pass left, the plan, operations of one element."""
+    """One chain rule to its end: what each pass left, the plan, operations of one element.
+
+    `unrolled` is True where the loop over the points is written out.
+    """
 
     rule: str
+    unrolled: bool
     entries: list[Entry]
     passes: list[passes.TraceRow]
     plan: Schedule
@@ -96,56 +111,70 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     return KernelSource(definition, text, functions, more)
 
 
-def _file(definition: Definition, functions: Sequence[Function]) -> str:
-    """The C file of some functions, with what they call."""
-    texts = [f.text for f in functions]
-    called = dict.fromkeys(r for f in functions for r in f.routines)
-    before = emit_routines.texts(definition, called) + emit_simd.wrappers("".join(texts))
-    return emit_source.source(definition, texts, before)
+def _file(d: Definition, functions: Sequence[Function]) -> str:
+    """The C file of some functions, with the routines that they call."""
+    wide = dict.fromkeys(r for f in functions if f.printer == "simd" for r in f.routines)
+    narrow = dict.fromkeys(r for f in functions if f.printer != "simd" for r in f.routines)
+    routines = emit_routines.texts(d, narrow) + emit_lane_routines.texts(d, wide)
+    called = "".join([*routines, *(f.text for f in functions)])
+    before = emit_lanes.wrappers(called) + list(dict.fromkeys(routines))
+    return emit_source.source(d, [f.text for f in functions], before)
 
 
 def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Function:
     """One kernel, all stages in the order of this file's first lines."""
     forms = structure.linear_forms(d) if variants.differentiated(task) else None
     found = None if forms is None else structure.quadratic_values(d, forms)
-    rewrites = _passes(d, task)
-    ways = (_for_target(v, task, target) for v in variants.variants(d, task, found))
-    attempts = tuple(_attempt(d, way, rewrites) for way in ways)
+    ways = [_for_target(v, task, target) for v in variants.variants(d, task, found)]
+    attempts = tuple(_attempts(d, task, ways))
     chosen = min(attempts, key=lambda a: a.operations)
     entries, plan = chosen.entries, chosen.plan
-    printer = _printer(target, task, plan)
-    if printer is emit_simd:
+    called = tuple(emit_routines.called([x.node for x in entries]))
+    printer = _printer(target, FEW if called else chosen.operations)
+    if printer is emit_simd and is_straight(plan):
         roots, order = arranged(d.graph, [x.node for x in entries])
         entries, plan = placed(entries, roots), straight_line(order)
+    elif printer is emit_simd:
+        plan = arranged_plan(d.graph, plan, [x.node for x in entries])
     text, temporaries = printer.function(d, task, entries, plan)
-    called = tuple(emit_routines.called([x.node for x in entries]))
     name = printer.__name__.rpartition(".")[2]
     return Function(text, plan, temporaries, found, attempts, chosen, name, called)
 
 
-def _passes(d: Definition, task: str) -> Sequence[passes.Pass]:
-    """The loop over the points is written out where the model says so and the task allows it."""
-    if not d.unroll or task in ROLLED:
-        return passes.STANDARD
-    return passes.straight_line(_points(d), (len(d.data), len(d.point_data)))
+def _attempts(d: Definition, task: str, ways: Sequence[Variant]) -> Iterator[Attempt]:
+    """Every way with a loop over the points; of short ones also with the loop written out.
+
+    A page may have decided (`Definition.unroll`), or the task does.  A loop over shape functions
+    stands inside the one over the points, which stays.
+    """
+    fixed = False if task in ROLLED or d.interpolated else d.unroll
+    least = 0
+    if not fixed:
+        looped = [_attempt(d, way, unrolled=False) for way in ways]
+        yield from looped
+        least = min(a.operations for a in looped)
+    if fixed or (fixed is None and least <= SHORT):
+        yield from (_attempt(d, way, unrolled=True) for way in ways)
 
 
 def _for_target(v: Variant, task: str, target: Target) -> Variant:
     return Variant(v.rule, emit_ufcx.chosen(v.entries, task)) if target is Target.UFCX else v
 
 
-def _attempt(d: Definition, way: Variant, rewrites: Sequence[passes.Pass]) -> Attempt:
+def _attempt(d: Definition, way: Variant, *, unrolled: bool) -> Attempt:
+    straight = passes.straight_line(_points(d), (len(d.data), len(d.point_data)))
+    rewrites = straight if unrolled else passes.STANDARD
     roots, trace = passes.run(d.graph, [x.node for x in way.entries], rewrites)
     plan = schedule(roots)
     work = plan.operations_once + len(d.rule.points) * plan.operations_per_point
-    return Attempt(way.rule, placed(way.entries, roots), trace, plan, work)
+    return Attempt(way.rule, unrolled, placed(way.entries, roots), trace, plan, work)
 
 
-def _printer(target: Target, task: str, plan: Schedule) -> ModuleType:
-    """Several elements at once where wanted and fit; fields are stored point by point."""
+def _printer(target: Target, operations: int) -> ModuleType:
+    """Several elements at once where wanted, and where there is more to do than to fetch."""
     if target is Target.UFCX:
         return emit_ufcx
-    at_once = target is Target.SIMD and task not in AT_POINTS and emit_simd.suits(plan)
+    at_once = target is Target.SIMD and operations >= FEW
     return emit_simd if at_once else emit_c
 
 

@@ -15,11 +15,12 @@
 #include "softehl_kernels.h"
 
 static void softehl_axial_spring_energy_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -124,32 +125,32 @@ void softehl_axial_spring_energy(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_energy_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
-            values + 1 * e, 0);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_axial_spring_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_axial_spring_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs + 8 * e, 8, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_axial_spring_energy_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
+    softehl_pad(d, dofs, 8, n);
+    double R[SOFTEHL_LANES * 1];
+    softehl_axial_spring_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
+#endif
 }
 
 static void softehl_axial_spring_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -266,32 +267,32 @@ void softehl_axial_spring_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_residual_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
-            values + 8 * e, 0);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_axial_spring_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_axial_spring_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs + 8 * e, 8, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 8], K[SOFTEHL_LANES * 1];
-    softehl_axial_spring_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 8 * (n - e); ++i) values[8 * e + i] = R[i];
+    softehl_pad(d, dofs, 8, n);
+    double R[SOFTEHL_LANES * 8];
+    softehl_axial_spring_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
+#endif
 }
 
 static void softehl_axial_spring_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -467,23 +468,23 @@ void softehl_axial_spring_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_tangent_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
-            values + 8 * e, tangent + 64 * e);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_axial_spring_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_axial_spring_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs + 8 * e, 8, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 8], K[SOFTEHL_LANES * 64];
-    softehl_axial_spring_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 8 * (n - e); ++i) values[8 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 64 * (n - e); ++i) tangent[64 * e + i] = K[i];
+    softehl_pad(d, dofs, 8, n);
+    double R[SOFTEHL_LANES * 8];
+    double K[SOFTEHL_LANES * (8 * 8)];
+    softehl_axial_spring_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
+#endif
 }

@@ -101,6 +101,203 @@ void softehl_contact_friction_residual(
     }
 }
 
+static void softehl_contact_friction_tangent_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1);
+    (void)X0; (void)X1;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V a0, a1, a2, a3;
+    softehl_load4(a + 0, 7, &a0, &a1, &a2, &a3);
+    (void)a0; (void)a1; (void)a2; (void)a3;
+    V a4, a5, a6;
+    softehl_load3(a + 4, 7, &a4, &a5, &a6);
+    (void)a4; (void)a5; (void)a6;
+    const V v1 = a2 + parameters[0];
+    const V v2 = a0 * a4;
+    const V v3 = a1 * a4;
+    const V v4 = a1 * a3;
+    const V v5 = a0 * a3;
+    const V v6 = X1 * a1;
+    const V v7 = v1 - v6;
+    const V v8 = X0 * a0;
+    const V v9 = v7 - v8;
+    const V v10 = a4 * v9;
+    const V v11 = d0 * v2;
+    const V v12 = v10 - v11;
+    const V v13 = d1 * v3;
+    const V v14 = v12 - v13;
+    const V v15 = v14 - d2;
+    const M v16 = softehl_lt(softehl_splat(0.0), v15);
+    V v17 = softehl_splat(0.0);
+    V v18 = softehl_splat(0.0);
+    V v19 = softehl_splat(0.0);
+    V v20 = softehl_splat(0.0);
+    V v21 = softehl_splat(0.0);
+    V v22 = softehl_splat(0.0);
+    V v23 = softehl_splat(0.0);
+    V v24 = softehl_splat(0.0);
+    V v25 = softehl_splat(0.0);
+    V v26 = softehl_splat(0.0);
+    const M m27 = v16;
+    if (softehl_any(m27)) {
+        const V v28 = -a1;
+        const V v29 = a1 * v3;
+        const V v30 = a0 * v3;
+        const V v31 = a0 * v2;
+        const V v32 = -v30;
+        const V v33 = -v29;
+        v17 = softehl_blend(m27, v15, v17);
+        v18 = softehl_blend(m27, v31, v18);
+        v19 = softehl_blend(m27, v30, v19);
+        v20 = softehl_blend(m27, a0, v20);
+        v21 = softehl_blend(m27, v32, v21);
+        v22 = softehl_blend(m27, v33, v22);
+        v23 = softehl_blend(m27, v28, v23);
+        v24 = softehl_blend(m27, v5, v24);
+        v25 = softehl_blend(m27, v4, v25);
+        v26 = softehl_blend(m27, softehl_splat((-1.0)), v26);
+    }
+    const V v34 = parameters[1] * v17;
+    const V v35 = d0 - a5;
+    const V v36 = a6 - d1;
+    const V v37 = v35 * v3;
+    const V v38 = d3 + v37;
+    const V v39 = v2 * v36;
+    const V v40 = v39 + v38;
+    const M v41 = softehl_lt(v34, v40);
+    const V v42 = softehl_blend(v41, v34, v40);
+    const V v43 = -v34;
+    const M v44 = softehl_lt(v43, v42);
+    const V v45 = parameters[1] * v2;
+    const V v46 = parameters[1] * v3;
+    V v47 = softehl_splat(0.0);
+    V v48 = softehl_splat(0.0);
+    V v49 = softehl_splat(0.0);
+    V v50 = softehl_splat(0.0);
+    V v51 = softehl_splat(0.0);
+    V v52 = softehl_splat(0.0);
+    V v53 = softehl_splat(0.0);
+    const M m54 = v44;
+    if (softehl_any(m54)) {
+        V v55 = softehl_splat(0.0);
+        V v56 = softehl_splat(0.0);
+        V v57 = softehl_splat(0.0);
+        V v58 = softehl_splat(0.0);
+        V v59 = softehl_splat(0.0);
+        V v60 = softehl_splat(0.0);
+        const M m61 = v41 & m54;
+        if (softehl_any(m61)) {
+            V v62 = softehl_splat(0.0);
+            V v63 = softehl_splat(0.0);
+            V v64 = softehl_splat(0.0);
+            const M m65 = v16 & m61;
+            if (softehl_any(m65)) {
+                const V v66 = -v45;
+                const V v67 = -v46;
+                const double v68 = -parameters[1];
+                v62 = softehl_blend(m65, v66, v62);
+                v63 = softehl_blend(m65, v67, v63);
+                v64 = softehl_blend(m65, softehl_splat(v68), v64);
+            }
+            v55 = softehl_blend(m61, v62, v55);
+            v56 = softehl_blend(m61, v63, v56);
+            v57 = softehl_blend(m61, v64, v57);
+            v58 = softehl_blend(m61, softehl_splat(0.0), v58);
+            v59 = softehl_blend(m61, softehl_splat(0.0), v59);
+            v60 = softehl_blend(m61, softehl_splat(0.0), v60);
+        }
+        const M m69 = ~v41 & m54;
+        if (softehl_any(m69)) {
+            const V v70 = -v2;
+            const V v71 = -v5;
+            v55 = softehl_blend(m69, v3, v55);
+            v56 = softehl_blend(m69, v70, v56);
+            v57 = softehl_blend(m69, softehl_splat(0.0), v57);
+            v58 = softehl_blend(m69, v4, v58);
+            v59 = softehl_blend(m69, v71, v59);
+            v60 = softehl_blend(m69, softehl_splat(1.0), v60);
+        }
+        v47 = softehl_blend(m54, v42, v47);
+        v48 = softehl_blend(m54, v55, v48);
+        v49 = softehl_blend(m54, v56, v49);
+        v50 = softehl_blend(m54, v57, v50);
+        v51 = softehl_blend(m54, v58, v51);
+        v52 = softehl_blend(m54, v59, v52);
+        v53 = softehl_blend(m54, v60, v53);
+    }
+    const M m72 = ~v44;
+    if (softehl_any(m72)) {
+        const V v73 = softehl_blend(v16, v45, softehl_splat(0.0));
+        const V v74 = softehl_blend(v16, v46, softehl_splat(0.0));
+        const V v75 = softehl_blend(v16, softehl_splat(parameters[1]), softehl_splat(0.0));
+        v47 = softehl_blend(m72, v43, v47);
+        v48 = softehl_blend(m72, v73, v48);
+        v49 = softehl_blend(m72, v74, v49);
+        v50 = softehl_blend(m72, v75, v50);
+        v51 = softehl_blend(m72, softehl_splat(0.0), v51);
+        v52 = softehl_blend(m72, softehl_splat(0.0), v52);
+        v53 = softehl_blend(m72, softehl_splat(0.0), v53);
+    }
+    const V v76 = 1.0 / a4;
+    const V v77 = 1.0 + v26;
+    const V v78 = d2 + v17;
+    const V v79 = v53 - 1.0;
+    const V v80 = a1 * v47;
+    const V v81 = a1 * v17;
+    const V v82 = a1 * v48;
+    const V v83 = v82 + v18;
+    const V v84 = v47 - d3;
+    const V v85 = a0 * v17;
+    const V v86 = v80 - v85;
+    const V v87 = a0 * v47;
+    const V v88 = v81 + v87;
+    const V v89 = a0 * v48;
+    const V v90 = v89 + v21;
+    const V v91 = a1 * v49;
+    const V v92 = v91 + v19;
+    const V v93 = a1 * v50;
+    const V v94 = v93 + v20;
+    const V v95 = a0 * v49;
+    const V v96 = v22 + v95;
+    const V v97 = a0 * v50;
+    const V v98 = v23 + v97;
+    const V v99 = a3 * v86;
+    const V v100 = a3 * v88;
+    const V v101 = a3 * v83;
+    const V v102 = a3 * v90;
+    const V v103 = a3 * v92;
+    const V v104 = a3 * v94;
+    softehl_store4(K + 0, 16, v101, v103, v104, v51);
+    const V v105 = a3 * v96;
+    const V v106 = a3 * v98;
+    const V v107 = a3 * v76;
+    const V v108 = -v100;
+    const V v109 = -v102;
+    const V v110 = -v105;
+    const V v111 = v107 * v78;
+    const V v112 = v107 * v84;
+    const V v113 = -v106;
+    softehl_store4(K + 4, 16, v109, v110, v113, v52);
+    const V v114 = v107 * v48;
+    const V v115 = v107 * v49;
+    const V v116 = v107 * v50;
+    const V v117 = v107 * v77;
+    const V v118 = v107 * v79;
+    softehl_store4(K + 12, 16, v114, v115, v116, v118);
+    const V v119 = -v111;
+    softehl_store4(R + 0, 4, v99, v108, v119, v112);
+    const V v120 = -v117;
+    softehl_store4(K + 8, 16, v24, v25, v120, softehl_splat(0.0));
+}
+
 void softehl_contact_friction_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -109,205 +306,25 @@ void softehl_contact_friction_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points;
-    (void)modes;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 4 * e;
-        const double *restrict a = data + 7 * e;
-        double *restrict R = values + 4 * e;
-        double *restrict K = tangent + 4 * 4 * e;
-        (void)X; (void)d; (void)a;
-        const double v1 = X[1] * a[1];
-        const double v2 = a[2] + parameters[0];
-        const double v3 = v2 - v1;
-        const double v4 = X[0] * a[0];
-        const double v5 = v3 - v4;
-        const double v6 = a[4] * v5;
-        const double v7 = v6 - d[2];
-        const double v8 = a[0] * a[4];
-        const double v9 = d[0] * v8;
-        const double v10 = v7 - v9;
-        const double v11 = a[1] * a[4];
-        const double v12 = d[1] * v11;
-        const double v13 = v10 - v12;
-        const int v14 = 0.0 < v13;
-        const double v15 = a[0] * a[3];
-        const double v16 = a[1] * a[3];
-        double v17, v18, v19, v20, v21, v22, v23, v24, v25, v26;
-        if (v14) {
-            const double v27 = a[0] * v8;
-            const double v28 = a[0] * v11;
-            const double v29 = -v28;
-            const double v30 = a[1] * v11;
-            const double v31 = -v30;
-            const double v32 = -a[1];
-            v17 = v13;
-            v18 = v27;
-            v19 = v28;
-            v20 = a[0];
-            v21 = v29;
-            v22 = v31;
-            v23 = v32;
-            v24 = v15;
-            v25 = v16;
-            v26 = (-1.0);
-        } else {
-            v17 = 0.0;
-            v18 = 0.0;
-            v19 = 0.0;
-            v20 = 0.0;
-            v21 = 0.0;
-            v22 = 0.0;
-            v23 = 0.0;
-            v24 = 0.0;
-            v25 = 0.0;
-            v26 = 0.0;
-        }
-        const double v33 = parameters[1] * v17;
-        const double v34 = d[0] - a[5];
-        const double v35 = v34 * v11;
-        const double v36 = d[3] + v35;
-        const double v37 = a[6] - d[1];
-        const double v38 = v8 * v37;
-        const double v39 = v38 + v36;
-        const int v40 = v33 < v39;
-        double v41;
-        if (v40) {
-            v41 = v33;
-        } else {
-            v41 = v39;
-        }
-        const double v42 = -v33;
-        const int v43 = v42 < v41;
-        const double v44 = parameters[1] * v8;
-        const double v45 = parameters[1] * v11;
-        double v46, v47, v48, v49, v50, v51, v52;
-        if (v43) {
-            double v53, v54, v55, v56, v57, v58;
-            if (v40) {
-                double v59, v60, v61;
-                if (v14) {
-                    const double v62 = -v44;
-                    const double v63 = -v45;
-                    const double v64 = -parameters[1];
-                    v59 = v62;
-                    v60 = v63;
-                    v61 = v64;
-                } else {
-                    v59 = 0.0;
-                    v60 = 0.0;
-                    v61 = 0.0;
-                }
-                v53 = v59;
-                v54 = v60;
-                v55 = v61;
-                v56 = 0.0;
-                v57 = 0.0;
-                v58 = 0.0;
-            } else {
-                const double v65 = -v8;
-                const double v66 = -v15;
-                v53 = v11;
-                v54 = v65;
-                v55 = 0.0;
-                v56 = v16;
-                v57 = v66;
-                v58 = 1.0;
-            }
-            v46 = v41;
-            v47 = v53;
-            v48 = v54;
-            v49 = v55;
-            v50 = v56;
-            v51 = v57;
-            v52 = v58;
-        } else {
-            double v67, v68, v69;
-            if (v14) {
-                v67 = v44;
-                v68 = v45;
-                v69 = parameters[1];
-            } else {
-                v67 = 0.0;
-                v68 = 0.0;
-                v69 = 0.0;
-            }
-            v46 = v42;
-            v47 = v67;
-            v48 = v68;
-            v49 = v69;
-            v50 = 0.0;
-            v51 = 0.0;
-            v52 = 0.0;
-        }
-        const double v70 = a[1] * v46;
-        const double v71 = a[0] * v17;
-        const double v72 = v70 - v71;
-        const double v73 = a[3] * v72;
-        const double v74 = a[0] * v46;
-        const double v75 = a[1] * v17;
-        const double v76 = v75 + v74;
-        const double v77 = a[3] * v76;
-        const double v78 = -v77;
-        const double v79 = d[2] + v17;
-        const double v80 = 1.0 / a[4];
-        const double v81 = a[3] * v80;
-        const double v82 = v81 * v79;
-        const double v83 = -v82;
-        const double v84 = v46 - d[3];
-        const double v85 = v81 * v84;
-        const double v86 = a[1] * v47;
-        const double v87 = v86 + v18;
-        const double v88 = a[3] * v87;
-        const double v89 = a[1] * v48;
-        const double v90 = v89 + v19;
-        const double v91 = a[3] * v90;
-        const double v92 = a[1] * v49;
-        const double v93 = v92 + v20;
-        const double v94 = a[3] * v93;
-        const double v95 = a[0] * v47;
-        const double v96 = v95 + v21;
-        const double v97 = a[3] * v96;
-        const double v98 = -v97;
-        const double v99 = a[0] * v48;
-        const double v100 = v22 + v99;
-        const double v101 = a[3] * v100;
-        const double v102 = -v101;
-        const double v103 = a[0] * v49;
-        const double v104 = v23 + v103;
-        const double v105 = a[3] * v104;
-        const double v106 = -v105;
-        const double v107 = 1.0 + v26;
-        const double v108 = v81 * v107;
-        const double v109 = -v108;
-        const double v110 = v81 * v47;
-        const double v111 = v81 * v48;
-        const double v112 = v81 * v49;
-        const double v113 = v52 - 1.0;
-        const double v114 = v81 * v113;
-        R[0] = v73;
-        R[1] = v78;
-        R[2] = v83;
-        R[3] = v85;
-        K[0] = v88;
-        K[1] = v91;
-        K[2] = v94;
-        K[3] = v50;
-        K[4] = v98;
-        K[5] = v102;
-        K[6] = v106;
-        K[7] = v51;
-        K[8] = v24;
-        K[9] = v25;
-        K[10] = v109;
-        K[11] = 0.0;
-        K[12] = v110;
-        K[13] = v111;
-        K[14] = v112;
-        K[15] = v114;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_contact_friction_tangent_group(points, modes, coordinates + 2 * e, dofs + 4 * e, data + 7 * e, 0, parameters, rule, basis, values + 4 * e, tangent + (4 * 4) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_contact_friction_tangent_group(points, modes, coordinates + 2 * (n - SOFTEHL_LANES), dofs + 4 * (n - SOFTEHL_LANES), data + 7 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 4 * (n - SOFTEHL_LANES), tangent + (4 * 4) * (n - SOFTEHL_LANES));
+        return;
     }
+    double X[SOFTEHL_LANES * 2];
+    softehl_pad(X, coordinates, 2, n);
+    double d[SOFTEHL_LANES * 4];
+    softehl_pad(d, dofs, 4, n);
+    double a[SOFTEHL_LANES * 7];
+    softehl_pad(a, data, 7, n);
+    double R[SOFTEHL_LANES * 4];
+    double K[SOFTEHL_LANES * (4 * 4)];
+    softehl_contact_friction_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < 4 * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < (4 * 4) * n; ++i) tangent[i] = K[i];
+#endif
 }

@@ -25,6 +25,133 @@
  */
 #include "softehl_kernels.h"
 
+static void softehl_film_residual_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5];
+    const V v2 = X2 + d2;
+    const V v3 = X1 - parameters[0];
+    const V v4 = X3 - parameters[0];
+    const V v5 = d1 + v3;
+    const V v6 = X3 + d3;
+    const V v7 = d3 + v4;
+    const V v8 = v2 - X0;
+    const V v9 = v8 - d0;
+    const V v10 = 0.5 * v9;
+    const V v11 = v6 - X1;
+    const V v12 = v11 - d1;
+    const V v13 = 0.5 * v12;
+    const V v14 = v13 * v13;
+    const V v15 = 1.0 / v10;
+    const V v16 = parameters[4] * v10;
+    const V v17 = v10 * v10;
+    const V v18 = v14 + v17;
+    const V v19 = softehl_vsqrt(v18);
+    const V v20 = parameters[6] * v19;
+    V s21 = softehl_splat(0.0);
+    V s22 = softehl_splat(0.0);
+    V s23 = softehl_splat(0.0);
+    V s24 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i];
+            p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1;
+        const double v25 = 0.5 * w[0];
+        const V v26 = p1 * v15;
+        const double v27 = 0.5 - v25;
+        const double v28 = 0.5 + v25;
+        const V v29 = p0 * parameters[3];
+        const V v30 = -p0;
+        const V v31 = p0 * v10;
+        const V v32 = p0 * v13;
+        const V v33 = softehl_vexp(v29);
+        const M v34 = softehl_lt(softehl_splat(0.0), v30);
+        const V v35 = v27 * v5;
+        const V v36 = w[1] * v31;
+        const V v37 = v28 * v7;
+        const V v38 = v35 + v37;
+        const V v39 = parameters[0] + v38;
+        const V v40 = 0.5 * v38;
+        const V v41 = 1.0 / v38;
+        const V v42 = parameters[2] * v33;
+        const V v43 = parameters[1] * v42;
+        const V v44 = v43 * v41;
+        const V v45 = v40 * v26;
+        const V v46 = v44 - v45;
+        const V v47 = v39 * v1;
+        const V v48 = v46 * v20;
+        const V v49 = v32 - v48;
+        const V v50 = w[1] * v49;
+        const V v51 = v36 * v47;
+        const V v52 = v50 * v47;
+        const V v53 = v28 * v51;
+        s21 += v53;
+        const V v54 = v27 * v51;
+        s22 += v54;
+        const V v55 = v28 * v52;
+        s23 += v55;
+        const V v56 = v27 * v52;
+        s24 += v56;
+        const V v57 = softehl_blend(v34, v30, softehl_splat(0.0));
+        const V v58 = 1.0 / v42;
+        const V v59 = parameters[1] * v40;
+        const V v60 = v57 * v16;
+        const V v61 = 0.08333333333333333 * v38;
+        const V v62 = v38 * v61;
+        const V v63 = v38 * v62;
+        const V v64 = w[1] * v60;
+        const V v65 = v63 * v26;
+        const V v66 = v58 * v65;
+        const V v67 = v59 - v66;
+        const V v68 = w[1] * v67;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[2 * i], D = B[2 * i + 1];
+            (void)N, (void)D;
+            R_lanes[4 + i] += N * v64 + D * v68;
+        }
+    }
+    const V v69 = -s21;
+    const V v70 = -s22;
+    R_lanes[0] = s24;
+    R_lanes[1] = v70;
+    R_lanes[2] = s23;
+    R_lanes[3] = v69;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+}
+
 void softehl_film_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -33,115 +160,330 @@ void softehl_film_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = X[2] + d[2];
-        const double v4 = d[1] + v1;
-        const double v5 = d[3] + v2;
-        const double v6 = v3 - X[0];
-        const double v7 = v6 - d[0];
-        const double v8 = 0.5 * v7;
-        const double v9 = X[3] + d[3];
-        const double v10 = v9 - X[1];
-        const double v11 = v10 - d[1];
-        const double v12 = 0.5 * v11;
-        const double v13 = 1.0 / v8;
-        const double v14 = parameters[4] * v8;
-        const double v15 = v12 * v12;
-        const double v16 = v8 * v8;
-        const double v17 = v15 + v16;
-        const double v18 = sqrt(v17);
-        const double v19 = parameters[6] * v18;
-        const double v20 = 6.283185307179586 * parameters[5];
-        double s21 = 0.0;
-        double s22 = 0.0;
-        double s23 = 0.0;
-        double s24 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            const double v25 = 0.5 * w[0];
-            const double v26 = 0.5 + v25;
-            const double v27 = v26 * v5;
-            const double v28 = 0.5 - v25;
-            const double v29 = v28 * v4;
-            const double v30 = v29 + v27;
-            const double v31 = parameters[0] + v30;
-            const double v32 = v31 * v20;
-            const double v33 = p0 * v8;
-            const double v34 = w[1] * v33;
-            const double v35 = v34 * v32;
-            const double v36 = v26 * v35;
-            const double v37 = v28 * v35;
-            const double v38 = 0.5 * v30;
-            const double v39 = p1 * v13;
-            const double v40 = v38 * v39;
-            const double v41 = 1.0 / v30;
-            const double v42 = p0 * parameters[3];
-            const double v43 = exp(v42);
-            const double v44 = parameters[2] * v43;
-            const double v45 = parameters[1] * v44;
-            const double v46 = v45 * v41;
-            const double v47 = v46 - v40;
-            const double v48 = v47 * v19;
-            const double v49 = p0 * v12;
-            const double v50 = v49 - v48;
-            const double v51 = w[1] * v50;
-            const double v52 = v51 * v32;
-            const double v53 = v26 * v52;
-            const double v54 = v28 * v52;
-            const double v55 = -p0;
-            const int v56 = 0.0 < v55;
-            double v57;
-            if (v56) {
-                v57 = v55;
-            } else {
-                v57 = 0.0;
-            }
-            const double v58 = v57 * v14;
-            const double v59 = w[1] * v58;
-            const double v60 = 0.08333333333333333 * v30;
-            const double v61 = v30 * v60;
-            const double v62 = v30 * v61;
-            const double v63 = v62 * v39;
-            const double v64 = 1.0 / v44;
-            const double v65 = v64 * v63;
-            const double v66 = parameters[1] * v38;
-            const double v67 = v66 - v65;
-            const double v68 = w[1] * v67;
-            s21 += v36;
-            s22 += v37;
-            s23 += v53;
-            s24 += v54;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[2 * i], D = B[2 * i + 1];
-                (void)N, (void)D;
-                R[4 + i] += N * v59 + D * v68;
-            }
-        }
-        const double v69 = -s22;
-        const double v70 = -s21;
-        R[0] = s24;
-        R[1] = v69;
-        R[2] = s23;
-        R[3] = v70;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    softehl_film_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+#endif
+}
+
+static void softehl_film_tangent_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+#if SOFTEHL_LANES > 1
+    V K_lanes[((4 + modes) * (4 + modes))];
+#else
+    V *const K_lanes = K;
+#endif
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
+        K_lanes[i] = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5];
+    const double v2 = parameters[2] * parameters[3];
+    const V v3 = X2 + d2;
+    const V v4 = X3 + d3;
+    const V v5 = X1 - parameters[0];
+    const V v6 = X3 - parameters[0];
+    const V v7 = d1 + v5;
+    const V v8 = d3 + v6;
+    const V v9 = v3 - X0;
+    const double v10 = 0.5 * parameters[4];
+    const V v11 = v9 - d0;
+    const V v12 = v4 - X1;
+    const V v13 = v12 - d1;
+    const V v14 = 0.5 * v11;
+    const V v15 = 0.5 * v13;
+    const double v16 = 0.5 * parameters[1];
+    const V v17 = parameters[4] * v14;
+    const V v18 = v14 * v1;
+    const V v19 = 1.0 / v14;
+    const V v20 = v14 * v14;
+    const V v21 = parameters[6] * v14;
+    const V v22 = parameters[6] * v15;
+    const V v23 = v15 * v15;
+    const V v24 = v23 + v20;
+    const V v25 = softehl_vsqrt(v24);
+    const V v26 = parameters[6] * v25;
+    const V v27 = 1.0 / v24;
+    const V v28 = softehl_vsqrt(v27);
+    const V v29 = 0.5 * v28;
+    const V v30 = parameters[1] * v26;
+    const V v31 = v29 * v21;
+    const V v32 = v29 * v22;
+    const V v33 = 0.08333333333333333 * v19;
+    const V v34 = 0.5 * v19;
+    const V v35 = v19 * v34;
+    const V v36 = v19 * v26;
+    const V v37 = v26 * v35;
+    const V v38 = 0.08333333333333333 * v35;
+    V s39 = softehl_splat(0.0);
+    V s40 = softehl_splat(0.0);
+    V s41 = softehl_splat(0.0);
+    V s42 = softehl_splat(0.0);
+    V s43 = softehl_splat(0.0);
+    V s44 = softehl_splat(0.0);
+    V s45 = softehl_splat(0.0);
+    V s46 = softehl_splat(0.0);
+    V s47 = softehl_splat(0.0);
+    V s48 = softehl_splat(0.0);
+    V s49 = softehl_splat(0.0);
+    V s50 = softehl_splat(0.0);
+    V s51 = softehl_splat(0.0);
+    V s52 = softehl_splat(0.0);
+    V s53 = softehl_splat(0.0);
+    V s54 = softehl_splat(0.0);
+    V s55 = softehl_splat(0.0);
+    V s56 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i];
+            p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1;
+        const double v57 = 0.5 * w[0];
+        const V v58 = p0 * parameters[3];
+        const V v59 = -p0;
+        const V v60 = p0 * v15;
+        const double v61 = 0.5 - v57;
+        const double v62 = 0.5 + v57;
+        const V v63 = softehl_vexp(v58);
+        const M v64 = softehl_lt(softehl_splat(0.0), v59);
+        const V v65 = p0 * v18;
+        const V v66 = p1 * v19;
+        const V v67 = p1 * v37;
+        const V v68 = v61 * v7;
+        const V v69 = w[1] * v14;
+        const double v70 = v61 * w[1];
+        const double v71 = v62 * w[1];
+        const V v72 = v61 * v65;
+        const V v73 = v62 * v65;
+        const V v74 = 0.5 * v66;
+        const V v75 = v62 * v8;
+        const V v76 = v68 + v75;
+        const V v77 = v70 * v72;
+        s45 += v77;
+        const V v78 = v71 * v72;
+        s47 += v78;
+        const V v79 = v70 * v73;
+        s46 += v79;
+        const V v80 = v71 * v73;
+        s48 += v80;
+        const V v81 = 0.5 * v76;
+        const V v82 = 1.0 / v76;
+        const V v83 = parameters[0] + v76;
+        const V v84 = v81 * v66;
+        const V v85 = v81 * v67;
+        const V v86 = v83 * v1;
+        const V v87 = v86 * v85;
+        const V v88 = parameters[2] * v63;
+        const V v89 = parameters[1] * v88;
+        const V v90 = v89 * v82;
+        const V v91 = v82 * v90;
+        const V v92 = v91 + v74;
+        const V v93 = p0 * v86;
+        const V v94 = v84 - v90;
+        const V v95 = v90 - v84;
+        const V v96 = v26 * v86;
+        const V v97 = v95 * v26;
+        const V v98 = v60 - v97;
+        const V v99 = v92 * v96;
+        const V v100 = v98 * v1;
+        const V v101 = v100 + v99;
+        const V v102 = 0.5 * v93;
+        const V v103 = v69 * v93;
+        const V v104 = w[1] * v98;
+        const V v105 = v104 * v86;
+        const V v106 = v86 * v94;
+        const V v107 = v70 * v102;
+        s41 += v107;
+        const V v108 = v71 * v102;
+        s42 += v108;
+        const V v109 = v62 * v103;
+        s43 += v109;
+        const V v110 = v61 * v103;
+        s44 += v110;
+        const V v111 = v62 * v105;
+        s39 += v111;
+        const V v112 = v61 * v105;
+        s40 += v112;
+        const V v113 = v62 * v101;
+        const V v114 = v102 + v113;
+        const V v115 = v61 * v101;
+        const V v116 = v115 - v102;
+        const V v117 = v31 * v106;
+        const V v118 = v32 * v106;
+        const V v119 = v87 - v117;
+        const V v120 = v117 - v87;
+        const V v121 = v70 * v120;
+        s50 += v121;
+        const V v122 = v71 * v120;
+        s52 += v122;
+        const V v123 = v116 - v118;
+        const V v124 = v118 + v114;
+        const V v125 = v70 * v119;
+        s49 += v125;
+        const V v126 = v71 * v119;
+        s51 += v126;
+        const V v127 = v70 * v123;
+        s53 += v127;
+        const V v128 = v70 * v124;
+        s54 += v128;
+        const V v129 = v71 * v123;
+        s55 += v129;
+        const V v130 = v71 * v124;
+        s56 += v130;
+        V v131 = softehl_splat(0.0);
+        V v132 = softehl_splat(0.0);
+        V v133 = softehl_splat(0.0);
+        V v134 = softehl_splat(0.0);
+        const M m135 = v64;
+        if (softehl_any(m135)) {
+            const V v136 = p0 * v10;
+            const V v137 = w[1] * v17;
+            const V v138 = w[1] * v136;
+            const V v139 = -v137;
+            const V v140 = -v138;
+            v131 = softehl_blend(m135, v59, v131);
+            v132 = softehl_blend(m135, v138, v132);
+            v133 = softehl_blend(m135, v140, v133);
+            v134 = softehl_blend(m135, v139, v134);
+        }
+        const V v141 = 1.0 / v88;
+        const V v142 = v131 * v17;
+        const V v143 = v63 * v2;
+        const V v144 = v82 * v30;
+        const V v145 = p1 * v38;
+        const V v146 = v143 * v144;
+        const V v147 = v15 - v146;
+        const V v148 = w[1] * v142;
+        const V v149 = w[1] * v33;
+        const V v150 = w[1] * v145;
+        const V v151 = v76 * v76;
+        const V v152 = v76 * v151;
+        const V v153 = 0.08333333333333333 * v66;
+        const V v154 = 0.25 * v66;
+        const V v155 = parameters[1] * v81;
+        const V v156 = v81 * v36;
+        const V v157 = v86 * v147;
+        const V v158 = v14 * v86;
+        const V v159 = v86 * v156;
+        const V v160 = v141 * v154;
+        const V v161 = v141 * v150;
+        const V v162 = v152 * v153;
+        const V v163 = v141 * v149;
+        const V v164 = w[1] * v141;
+        const V v165 = v151 * v160;
+        const V v166 = v16 - v165;
+        const V v167 = v141 * v164;
+        const V v168 = v141 * v162;
+        const V v169 = v155 - v168;
+        const V v170 = v152 * v161;
+        const V v171 = v152 * v163;
+        const V v172 = v70 * v158;
+        const V v173 = v71 * v158;
+        const V v174 = v70 * v157;
+        const V v175 = v71 * v157;
+        const V v176 = v70 * v159;
+        const V v177 = v71 * v159;
+        const V v178 = -v172;
+        const V v179 = w[1] * v169;
+        const V v180 = v167 * v162;
+        const V v181 = -v173;
+        const V v182 = -v170;
+        const V v183 = v70 * v166;
+        const V v184 = v71 * v166;
+        const V v185 = -v171;
+        const V v186 = v143 * v180;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[2 * i], D = B[2 * i + 1];
+            (void)N, (void)D;
+            R_lanes[4 + i] += N * v148 + D * v179;
+            K_lanes[(4 + i) * (4 + modes) + 0] += N * v132 + D * v182;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v174 + D * v176;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D * v183;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v178;
+            K_lanes[(4 + i) * (4 + modes) + 2] += N * v133 + D * v170;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v175 + D * v177;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D * v184;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v181;
+            const V r0 = N * v134 + D * v186;
+            const V r1 = D * v185;
+            for (ptrdiff_t j = 0; j < modes; ++j)
+                K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[2 * j] + r1 * B[2 * j + 1];
+        }
+    }
+    const V v187 = -s41;
+    const V v188 = -s42;
+    const V v189 = -s43;
+    const V v190 = -s44;
+    const V v191 = -s45;
+    const V v192 = -s46;
+    const V v193 = -s47;
+    const V v194 = -s48;
+    R_lanes[0] = s40;
+    R_lanes[1] = v190;
+    R_lanes[2] = s39;
+    R_lanes[3] = v189;
+    K_lanes[0 * (4 + modes) + 0] = s49;
+    K_lanes[0 * (4 + modes) + 1] = s53;
+    K_lanes[0 * (4 + modes) + 2] = s50;
+    K_lanes[0 * (4 + modes) + 3] = s54;
+    K_lanes[1 * (4 + modes) + 0] = s41;
+    K_lanes[1 * (4 + modes) + 1] = v191;
+    K_lanes[1 * (4 + modes) + 2] = v187;
+    K_lanes[1 * (4 + modes) + 3] = v192;
+    K_lanes[2 * (4 + modes) + 0] = s51;
+    K_lanes[2 * (4 + modes) + 1] = s55;
+    K_lanes[2 * (4 + modes) + 2] = s52;
+    K_lanes[2 * (4 + modes) + 3] = s56;
+    K_lanes[3 * (4 + modes) + 0] = s42;
+    K_lanes[3 * (4 + modes) + 1] = v193;
+    K_lanes[3 * (4 + modes) + 2] = v188;
+    K_lanes[3 * (4 + modes) + 3] = v194;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+    softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
+#endif
 }
 
 void softehl_film_tangent(
@@ -152,283 +494,99 @@ void softehl_film_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)direction;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        double *restrict R = values + (4 + modes) * e;
-        double *restrict K = tangent + (4 + modes) * (4 + modes) * e;
-        (void)X; (void)d;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        for (ptrdiff_t i = 0; i < (4 + modes) * (4 + modes); ++i) K[i] = 0.0;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = X[2] + d[2];
-        const double v4 = d[1] + v1;
-        const double v5 = d[3] + v2;
-        const double v6 = v3 - X[0];
-        const double v7 = v6 - d[0];
-        const double v8 = 0.5 * v7;
-        const double v9 = X[3] + d[3];
-        const double v10 = v9 - X[1];
-        const double v11 = v10 - d[1];
-        const double v12 = 0.5 * v11;
-        const double v13 = 1.0 / v8;
-        const double v14 = parameters[4] * v8;
-        const double v15 = v12 * v12;
-        const double v16 = v8 * v8;
-        const double v17 = v15 + v16;
-        const double v18 = sqrt(v17);
-        const double v19 = parameters[6] * v18;
-        const double v20 = 6.283185307179586 * parameters[5];
-        const double v21 = 0.5 * parameters[4];
-        const double v22 = 0.5 * parameters[1];
-        const double v23 = parameters[2] * parameters[3];
-        const double v24 = 0.08333333333333333 * v13;
-        const double v25 = 1.0 / v17;
-        const double v26 = sqrt(v25);
-        const double v27 = 0.5 * v26;
-        const double v28 = 0.5 * v13;
-        const double v29 = v13 * v28;
-        const double v30 = parameters[1] * v19;
-        const double v31 = v13 * v19;
-        const double v32 = parameters[6] * v8;
-        const double v33 = v27 * v32;
-        const double v34 = v19 * v29;
-        const double v35 = parameters[6] * v12;
-        const double v36 = v27 * v35;
-        const double v37 = 0.08333333333333333 * v29;
-        const double v38 = v8 * v20;
-        double s39 = 0.0;
-        double s40 = 0.0;
-        double s41 = 0.0;
-        double s42 = 0.0;
-        double s43 = 0.0;
-        double s44 = 0.0;
-        double s45 = 0.0;
-        double s46 = 0.0;
-        double s47 = 0.0;
-        double s48 = 0.0;
-        double s49 = 0.0;
-        double s50 = 0.0;
-        double s51 = 0.0;
-        double s52 = 0.0;
-        double s53 = 0.0;
-        double s54 = 0.0;
-        double s55 = 0.0;
-        double s56 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            const double v57 = 0.5 * w[0];
-            const double v58 = 0.5 + v57;
-            const double v59 = v58 * v5;
-            const double v60 = 0.5 - v57;
-            const double v61 = v60 * v4;
-            const double v62 = v61 + v59;
-            const double v63 = 0.5 * v62;
-            const double v64 = p1 * v13;
-            const double v65 = v63 * v64;
-            const double v66 = 1.0 / v62;
-            const double v67 = p0 * parameters[3];
-            const double v68 = exp(v67);
-            const double v69 = parameters[2] * v68;
-            const double v70 = parameters[1] * v69;
-            const double v71 = v70 * v66;
-            const double v72 = v71 - v65;
-            const double v73 = v72 * v19;
-            const double v74 = p0 * v12;
-            const double v75 = v74 - v73;
-            const double v76 = w[1] * v75;
-            const double v77 = parameters[0] + v62;
-            const double v78 = v77 * v20;
-            const double v79 = v76 * v78;
-            const double v80 = v58 * v79;
-            const double v81 = v60 * v79;
-            const double v82 = p0 * v78;
-            const double v83 = 0.5 * v82;
-            const double v84 = v60 * w[1];
-            const double v85 = v84 * v83;
-            const double v86 = v58 * w[1];
-            const double v87 = v86 * v83;
-            const double v88 = w[1] * v8;
-            const double v89 = v88 * v82;
-            const double v90 = v58 * v89;
-            const double v91 = v60 * v89;
-            const double v92 = p0 * v38;
-            const double v93 = v60 * v92;
-            const double v94 = v84 * v93;
-            const double v95 = v58 * v92;
-            const double v96 = v84 * v95;
-            const double v97 = v86 * v93;
-            const double v98 = v86 * v95;
-            const double v99 = p1 * v34;
-            const double v100 = v63 * v99;
-            const double v101 = v78 * v100;
-            const double v102 = v65 - v71;
-            const double v103 = v78 * v102;
-            const double v104 = v33 * v103;
-            const double v105 = v101 - v104;
-            const double v106 = v84 * v105;
-            const double v107 = v104 - v101;
-            const double v108 = v84 * v107;
-            const double v109 = v86 * v105;
-            const double v110 = v86 * v107;
-            const double v111 = v66 * v71;
-            const double v112 = 0.5 * v64;
-            const double v113 = v111 + v112;
-            const double v114 = v19 * v78;
-            const double v115 = v113 * v114;
-            const double v116 = v75 * v20;
-            const double v117 = v116 + v115;
-            const double v118 = v60 * v117;
-            const double v119 = v36 * v103;
-            const double v120 = v118 - v119;
-            const double v121 = v120 - v83;
-            const double v122 = v84 * v121;
-            const double v123 = v58 * v117;
-            const double v124 = v119 + v123;
-            const double v125 = v83 + v124;
-            const double v126 = v84 * v125;
-            const double v127 = v86 * v121;
-            const double v128 = v86 * v125;
-            const double v129 = -p0;
-            const int v130 = 0.0 < v129;
-            double v131, v132, v133, v134;
-            if (v130) {
-                const double v135 = p0 * v21;
-                const double v136 = w[1] * v135;
-                const double v137 = -v136;
-                const double v138 = w[1] * v14;
-                const double v139 = -v138;
-                v131 = v129;
-                v132 = v136;
-                v133 = v137;
-                v134 = v139;
-            } else {
-                v131 = 0.0;
-                v132 = 0.0;
-                v133 = 0.0;
-                v134 = 0.0;
-            }
-            const double v140 = v131 * v14;
-            const double v141 = w[1] * v140;
-            const double v142 = v62 * v62;
-            const double v143 = v62 * v142;
-            const double v144 = 0.08333333333333333 * v64;
-            const double v145 = v143 * v144;
-            const double v146 = 1.0 / v69;
-            const double v147 = v146 * v145;
-            const double v148 = parameters[1] * v63;
-            const double v149 = v148 - v147;
-            const double v150 = w[1] * v149;
-            const double v151 = v66 * v30;
-            const double v152 = v68 * v23;
-            const double v153 = v152 * v151;
-            const double v154 = v12 - v153;
-            const double v155 = v78 * v154;
-            const double v156 = v84 * v155;
-            const double v157 = v63 * v31;
-            const double v158 = v78 * v157;
-            const double v159 = v84 * v158;
-            const double v160 = v8 * v78;
-            const double v161 = v84 * v160;
-            const double v162 = -v161;
-            const double v163 = v86 * v155;
-            const double v164 = v86 * v158;
-            const double v165 = v86 * v160;
-            const double v166 = -v165;
-            const double v167 = p1 * v37;
-            const double v168 = w[1] * v167;
-            const double v169 = v146 * v168;
-            const double v170 = v143 * v169;
-            const double v171 = -v170;
-            const double v172 = 0.25 * v64;
-            const double v173 = v146 * v172;
-            const double v174 = v142 * v173;
-            const double v175 = v22 - v174;
-            const double v176 = v84 * v175;
-            const double v177 = v86 * v175;
-            const double v178 = w[1] * v146;
-            const double v179 = v146 * v178;
-            const double v180 = v179 * v145;
-            const double v181 = v152 * v180;
-            const double v182 = w[1] * v24;
-            const double v183 = v146 * v182;
-            const double v184 = v143 * v183;
-            const double v185 = -v184;
-            s39 += v80;
-            s40 += v81;
-            s41 += v85;
-            s42 += v87;
-            s43 += v90;
-            s44 += v91;
-            s45 += v94;
-            s46 += v96;
-            s47 += v97;
-            s48 += v98;
-            s49 += v106;
-            s50 += v108;
-            s51 += v109;
-            s52 += v110;
-            s53 += v122;
-            s54 += v126;
-            s55 += v127;
-            s56 += v128;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[2 * i], D = B[2 * i + 1];
-                (void)N, (void)D;
-                R[4 + i] += N * v141 + D * v150;
-                K[(4 + i) * (4 + modes) + 0] += N * v132 + D * v171;
-                K[0 * (4 + modes) + 4 + i] += N * v156 + D * v159;
-                K[(4 + i) * (4 + modes) + 1] += D * v176;
-                K[1 * (4 + modes) + 4 + i] += N * v162;
-                K[(4 + i) * (4 + modes) + 2] += N * v133 + D * v170;
-                K[2 * (4 + modes) + 4 + i] += N * v163 + D * v164;
-                K[(4 + i) * (4 + modes) + 3] += D * v177;
-                K[3 * (4 + modes) + 4 + i] += N * v166;
-                const double r0 = N * v134 + D * v181;
-                const double r1 = D * v185;
-                for (ptrdiff_t j = 0; j < modes; ++j)
-                    K[(4 + i) * (4 + modes) + 4 + j] += r0 * B[2 * j] + r1 * B[2 * j + 1];
-            }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
+        return;
+    }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
+    softehl_film_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
+#endif
+}
+
+static void softehl_film_fields_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+    const V v1 = X2 + d2;
+    const V v2 = X1 - parameters[0];
+    const V v3 = X3 - parameters[0];
+    const V v4 = d1 + v2;
+    const V v5 = d3 + v3;
+    const V v6 = X0 + d0;
+    const V v7 = v1 - X0;
+    const V v8 = v7 - d0;
+    const V v9 = 0.5 * v8;
+    const V v10 = 1.0 / v9;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i];
+            p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        const double v186 = -s44;
-        const double v187 = -s43;
-        const double v188 = -s45;
-        const double v189 = -s41;
-        const double v190 = -s46;
-        const double v191 = -s47;
-        const double v192 = -s42;
-        const double v193 = -s48;
-        R[0] = s40;
-        R[1] = v186;
-        R[2] = s39;
-        R[3] = v187;
-        K[0 * (4 + modes) + 0] = s49;
-        K[0 * (4 + modes) + 1] = s53;
-        K[0 * (4 + modes) + 2] = s50;
-        K[0 * (4 + modes) + 3] = s54;
-        K[1 * (4 + modes) + 0] = s41;
-        K[1 * (4 + modes) + 1] = v188;
-        K[1 * (4 + modes) + 2] = v189;
-        K[1 * (4 + modes) + 3] = v190;
-        K[2 * (4 + modes) + 0] = s51;
-        K[2 * (4 + modes) + 1] = s55;
-        K[2 * (4 + modes) + 2] = s52;
-        K[2 * (4 + modes) + 3] = s56;
-        K[3 * (4 + modes) + 0] = s42;
-        K[3 * (4 + modes) + 1] = v191;
-        K[3 * (4 + modes) + 2] = v192;
-        K[3 * (4 + modes) + 3] = v193;
+        (void)p0, (void)p1;
+        const double v11 = 0.5 * w[0];
+        const V v12 = p0 * parameters[3];
+        const V v13 = softehl_vexp(v12);
+        const V v14 = p1 * v10;
+        const double v15 = 0.5 - v11;
+        const double v16 = 0.5 + v11;
+        const V v17 = w[1] * v9;
+        const V v18 = v16 * v1;
+        const V v19 = v16 * v5;
+        const V v20 = parameters[2] * v13;
+        const V v21 = v15 * v6;
+        const V v22 = v18 + v21;
+        const V v23 = v15 * v4;
+        const V v24 = v23 + v19;
+        const V v25 = 0.5 * v24;
+        const V v26 = 1.0 / v24;
+        const V v27 = 0.08333333333333333 * v24;
+        const V v28 = v24 * v27;
+        const V v29 = v24 * v28;
+        const V v30 = v29 * v14;
+        const V v31 = v25 * v14;
+        const V v32 = parameters[1] * v25;
+        const V v33 = parameters[1] * v20;
+        const V v34 = v33 * v26;
+        const V v35 = 1.0 / v20;
+        const V v36 = v35 * v30;
+        const V v37 = v32 - v36;
+        const V v38 = v34 - v31;
+        const V v39 = v34 + v31;
+        softehl_store4(R + 8 * q + 0, (8 * points), v22, v17, v24, p0);
+        softehl_store4(R + 8 * q + 4, (8 * points), v38, v37, v39, v20);
     }
 }
 
@@ -440,71 +598,21 @@ void softehl_film_fields(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        (void)X; (void)d;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = X[2] + d[2];
-        const double v4 = X[0] + d[0];
-        const double v5 = d[1] + v1;
-        const double v6 = d[3] + v2;
-        const double v7 = v3 - X[0];
-        const double v8 = v7 - d[0];
-        const double v9 = 0.5 * v8;
-        const double v10 = 1.0 / v9;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            const double v11 = 0.5 * w[0];
-            const double v12 = 0.5 - v11;
-            const double v13 = v12 * v4;
-            const double v14 = 0.5 + v11;
-            const double v15 = v14 * v3;
-            const double v16 = v15 + v13;
-            const double v17 = w[1] * v9;
-            const double v18 = v14 * v6;
-            const double v19 = v12 * v5;
-            const double v20 = v19 + v18;
-            const double v21 = 0.5 * v20;
-            const double v22 = p1 * v10;
-            const double v23 = v21 * v22;
-            const double v24 = 1.0 / v20;
-            const double v25 = p0 * parameters[3];
-            const double v26 = exp(v25);
-            const double v27 = parameters[2] * v26;
-            const double v28 = parameters[1] * v27;
-            const double v29 = v28 * v24;
-            const double v30 = v29 - v23;
-            const double v31 = 0.08333333333333333 * v20;
-            const double v32 = v20 * v31;
-            const double v33 = v20 * v32;
-            const double v34 = v33 * v22;
-            const double v35 = 1.0 / v27;
-            const double v36 = v35 * v34;
-            const double v37 = parameters[1] * v21;
-            const double v38 = v37 - v36;
-            const double v39 = v29 + v23;
-            double *restrict out = values + 8 * (points * e + q);
-            out[0] = v16;
-            out[1] = v17;
-            out[2] = v20;
-            out[3] = p0;
-            out[4] = v30;
-            out[5] = v38;
-            out[6] = v39;
-            out[7] = v27;
-        }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (8 * points) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (8 * points) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double R[SOFTEHL_LANES * (8 * points)];
+    softehl_film_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (8 * points) * n; ++i) values[i] = R[i];
+#endif
 }

@@ -32,6 +32,148 @@
  */
 #include "softehl_kernels.h"
 
+static void softehl_film_conserving_residual_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    (void)a0; (void)a1;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[4];
+    const V v2 = X2 + d2;
+    const V v3 = X1 - parameters[0];
+    const V v4 = X3 - parameters[0];
+    const V v5 = d1 + v3;
+    const V v6 = d2 * parameters[6];
+    const V v7 = a1 + v6;
+    const V v8 = d0 * parameters[6];
+    const V v9 = a0 + v8;
+    const V v10 = d3 + v4;
+    const V v11 = v2 - d0;
+    const V v12 = v11 - X0;
+    const V v13 = 0.5 * v12;
+    const V v14 = v10 - v5;
+    const V v15 = 0.5 * v14;
+    const V v16 = v15 * v15;
+    const V v17 = 1.0 / v13;
+    const V v18 = v13 * v13;
+    const V v19 = v16 + v18;
+    const V v20 = softehl_vsqrt(v19);
+    const V v21 = parameters[5] * v20;
+    V s22 = softehl_splat(0.0);
+    V s23 = softehl_splat(0.0);
+    V s24 = softehl_splat(0.0);
+    V s25 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 6 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[6 * i] * d_lanes[4 + i];
+            p1 += B[6 * i + 1] * d_lanes[4 + i];
+            p2 += B[6 * i + 2] * d_lanes[4 + i];
+            p3 += B[6 * i + 3] * d_lanes[4 + i];
+            p4 += B[6 * i + 4] * d_lanes[4 + i];
+            p5 += B[6 * i + 5] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
+        const double v26 = 0.5 * w[0];
+        const V v27 = p0 * v13;
+        const double v28 = 0.5 + v26;
+        const double v29 = 0.5 - v26;
+        const V v30 = w[1] * v27;
+        const V v31 = v28 * v7;
+        const V v32 = parameters[1] - v31;
+        const V v33 = v29 * v5;
+        const V v34 = v29 * v9;
+        const V v35 = v32 - v34;
+        const M v36 = softehl_lt(softehl_splat(0.0), v35);
+        const V v37 = v28 * v10;
+        const V v38 = v33 + v37;
+        const V v39 = parameters[0] + v38;
+        const V v40 = v39 * v1;
+        const V v41 = v30 * v40;
+        const V v42 = v28 * v41;
+        s22 += v42;
+        const V v43 = v29 * v41;
+        s23 += v43;
+        const V v44 = softehl_blend(v36, v35, softehl_splat(0.0));
+        const V v45 = softehl_blend(v36, softehl_splat(0.0), v35);
+        const V v46 = p1 * v17;
+        const V v47 = 1.0 - p4;
+        const V v48 = 1.0 - p2;
+        const V v49 = p0 * parameters[3];
+        const V v50 = p0 * v15;
+        const V v51 = softehl_vexp(v49);
+        const V v52 = v47 * v45;
+        const V v53 = 1.0 / v38;
+        const V v54 = 0.5 * v38;
+        const V v55 = 0.08333333333333333 * v38;
+        const V v56 = v48 * v44;
+        const V v57 = v52 + v56;
+        const V v58 = v38 * v55;
+        const V v59 = v38 * v58;
+        const V v60 = v54 * v57;
+        const V v61 = parameters[2] * v51;
+        const V v62 = v59 * v46;
+        const V v63 = v61 * v57;
+        const V v64 = v53 * v63;
+        const V v65 = v54 * v46;
+        const V v66 = v64 - v65;
+        const V v67 = v21 * v66;
+        const V v68 = v50 - v67;
+        const V v69 = 1.0 / v61;
+        const V v70 = v69 * v62;
+        const V v71 = v60 - v70;
+        const V v72 = w[1] * v71;
+        const V v73 = w[1] * v68;
+        const V v74 = v73 * v40;
+        const V v75 = v28 * v74;
+        s24 += v75;
+        const V v76 = v29 * v74;
+        s25 += v76;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[6 * i], D = B[6 * i + 1], N1 = B[6 * i + 2], D1 = B[6 * i + 3], N2 = B[6 * i + 4], D2 = B[6 * i + 5];
+            (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2;
+            R_lanes[4 + i] += D * v72;
+        }
+    }
+    const V v77 = -s22;
+    const V v78 = -s23;
+    R_lanes[0] = s25;
+    R_lanes[1] = v78;
+    R_lanes[2] = s24;
+    R_lanes[3] = v77;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+}
+
 void softehl_film_conserving_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -40,128 +182,409 @@ void softehl_film_conserving_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + 2 * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d; (void)a;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = d[2] * parameters[6];
-        const double v2 = a[1] + v1;
-        const double v3 = d[0] * parameters[6];
-        const double v4 = a[0] + v3;
-        const double v5 = X[1] - parameters[0];
-        const double v6 = X[3] - parameters[0];
-        const double v7 = X[2] + d[2];
-        const double v8 = d[1] + v5;
-        const double v9 = d[3] + v6;
-        const double v10 = v7 - X[0];
-        const double v11 = v10 - d[0];
-        const double v12 = 0.5 * v11;
-        const double v13 = v9 - v8;
-        const double v14 = 0.5 * v13;
-        const double v15 = 1.0 / v12;
-        const double v16 = v14 * v14;
-        const double v17 = v12 * v12;
-        const double v18 = v16 + v17;
-        const double v19 = sqrt(v18);
-        const double v20 = parameters[5] * v19;
-        const double v21 = 6.283185307179586 * parameters[4];
-        double s22 = 0.0;
-        double s23 = 0.0;
-        double s24 = 0.0;
-        double s25 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 6 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0, p4 = 0.0, p5 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[6 * i] * d[4 + i];
-                p1 += B[6 * i + 1] * d[4 + i];
-                p2 += B[6 * i + 2] * d[4 + i];
-                p3 += B[6 * i + 3] * d[4 + i];
-                p4 += B[6 * i + 4] * d[4 + i];
-                p5 += B[6 * i + 5] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
-            const double v26 = 0.5 * w[0];
-            const double v27 = 0.5 + v26;
-            const double v28 = v27 * v9;
-            const double v29 = 0.5 - v26;
-            const double v30 = v29 * v8;
-            const double v31 = v30 + v28;
-            const double v32 = parameters[0] + v31;
-            const double v33 = v32 * v21;
-            const double v34 = p0 * v12;
-            const double v35 = w[1] * v34;
-            const double v36 = v35 * v33;
-            const double v37 = v27 * v36;
-            const double v38 = v29 * v36;
-            const double v39 = v27 * v2;
-            const double v40 = parameters[1] - v39;
-            const double v41 = v29 * v4;
-            const double v42 = v40 - v41;
-            const int v43 = 0.0 < v42;
-            double v44, v45;
-            if (v43) {
-                v44 = v42;
-                v45 = 0.0;
-            } else {
-                v44 = 0.0;
-                v45 = v42;
-            }
-            const double v46 = 1.0 - p2;
-            const double v47 = v46 * v44;
-            const double v48 = 1.0 - p4;
-            const double v49 = v48 * v45;
-            const double v50 = v49 + v47;
-            const double v51 = p0 * parameters[3];
-            const double v52 = exp(v51);
-            const double v53 = parameters[2] * v52;
-            const double v54 = v53 * v50;
-            const double v55 = 1.0 / v31;
-            const double v56 = v55 * v54;
-            const double v57 = 0.5 * v31;
-            const double v58 = p1 * v15;
-            const double v59 = v57 * v58;
-            const double v60 = v56 - v59;
-            const double v61 = v20 * v60;
-            const double v62 = p0 * v14;
-            const double v63 = v62 - v61;
-            const double v64 = w[1] * v63;
-            const double v65 = v64 * v33;
-            const double v66 = v27 * v65;
-            const double v67 = v29 * v65;
-            const double v68 = v57 * v50;
-            const double v69 = 0.08333333333333333 * v31;
-            const double v70 = v31 * v69;
-            const double v71 = v31 * v70;
-            const double v72 = v71 * v58;
-            const double v73 = 1.0 / v53;
-            const double v74 = v73 * v72;
-            const double v75 = v68 - v74;
-            const double v76 = w[1] * v75;
-            s22 += v37;
-            s23 += v38;
-            s24 += v66;
-            s25 += v67;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[6 * i], D = B[6 * i + 1], N1 = B[6 * i + 2], D1 = B[6 * i + 3], N2 = B[6 * i + 4], D2 = B[6 * i + 5];
-                (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2;
-                R[4 + i] += D * v76;
-            }
-        }
-        const double v77 = -s23;
-        const double v78 = -s22;
-        R[0] = s25;
-        R[1] = v77;
-        R[2] = s24;
-        R[3] = v78;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_conserving_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_conserving_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double a[SOFTEHL_LANES * 2];
+    softehl_pad(a, data, 2, n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    softehl_film_conserving_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+#endif
+}
+
+static void softehl_film_conserving_tangent_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    (void)a0; (void)a1;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+#if SOFTEHL_LANES > 1
+    V K_lanes[((4 + modes) * (4 + modes))];
+#else
+    V *const K_lanes = K;
+#endif
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
+        K_lanes[i] = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[4];
+    const double v2 = parameters[2] * parameters[3];
+    const V v3 = X2 + d2;
+    const V v4 = X1 - parameters[0];
+    const V v5 = X3 - parameters[0];
+    const V v6 = d2 * parameters[6];
+    const V v7 = a1 + v6;
+    const V v8 = d1 + v4;
+    const V v9 = d3 + v5;
+    const double v10 = 0.5 * parameters[6];
+    const V v11 = d0 * parameters[6];
+    const V v12 = a0 + v11;
+    const V v13 = v3 - d0;
+    const V v14 = v13 - X0;
+    const V v15 = 0.5 * v14;
+    const V v16 = v9 - v8;
+    const V v17 = 0.5 * v16;
+    const V v18 = v1 * v15;
+    const V v19 = 1.0 / v15;
+    const V v20 = v15 * v15;
+    const V v21 = parameters[5] * v15;
+    const V v22 = v17 * v17;
+    const V v23 = v22 + v20;
+    const V v24 = parameters[5] * v17;
+    const V v25 = softehl_vsqrt(v23);
+    const V v26 = parameters[5] * v25;
+    const V v27 = 1.0 / v23;
+    const V v28 = softehl_vsqrt(v27);
+    const V v29 = 0.5 * v28;
+    const V v30 = v21 * v29;
+    const V v31 = v24 * v29;
+    const V v32 = parameters[6] * v26;
+    const V v33 = 0.08333333333333333 * v19;
+    const V v34 = 0.5 * v19;
+    const V v35 = v19 * v34;
+    const V v36 = v19 * v26;
+    const V v37 = v26 * v35;
+    const V v38 = 0.08333333333333333 * v35;
+    V s39 = softehl_splat(0.0);
+    V s40 = softehl_splat(0.0);
+    V s41 = softehl_splat(0.0);
+    V s42 = softehl_splat(0.0);
+    V s43 = softehl_splat(0.0);
+    V s44 = softehl_splat(0.0);
+    V s45 = softehl_splat(0.0);
+    V s46 = softehl_splat(0.0);
+    V s47 = softehl_splat(0.0);
+    V s48 = softehl_splat(0.0);
+    V s49 = softehl_splat(0.0);
+    V s50 = softehl_splat(0.0);
+    V s51 = softehl_splat(0.0);
+    V s52 = softehl_splat(0.0);
+    V s53 = softehl_splat(0.0);
+    V s54 = softehl_splat(0.0);
+    V s55 = softehl_splat(0.0);
+    V s56 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 6 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[6 * i] * d_lanes[4 + i];
+            p1 += B[6 * i + 1] * d_lanes[4 + i];
+            p2 += B[6 * i + 2] * d_lanes[4 + i];
+            p3 += B[6 * i + 3] * d_lanes[4 + i];
+            p4 += B[6 * i + 4] * d_lanes[4 + i];
+            p5 += B[6 * i + 5] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
+        const double v57 = 0.5 * w[0];
+        const V v58 = p0 * parameters[3];
+        const V v59 = 1.0 - p4;
+        const V v60 = 1.0 - p2;
+        const V v61 = softehl_vexp(v58);
+        const double v62 = 0.5 + v57;
+        const double v63 = 0.5 - v57;
+        const double v64 = v57 - 0.5;
+        const double v65 = 0.5 * w[1];
+        const V v66 = v62 * v7;
+        const V v67 = parameters[1] - v66;
+        const double v68 = v62 * w[1];
+        const V v69 = v62 * v9;
+        const double v70 = v63 * w[1];
+        const V v71 = v63 * v12;
+        const V v72 = v67 - v71;
+        const V v73 = v63 * v8;
+        const V v74 = v73 + v69;
+        const V v75 = v74 * v65;
+        const V v76 = parameters[0] + v74;
+        const V v77 = 1.0 / v74;
+        const M v78 = softehl_lt(softehl_splat(0.0), v72);
+        const V v79 = v76 * v1;
+        const V v80 = v72 * v75;
+        const V v81 = parameters[2] * v61;
+        const V v82 = v81 * v26;
+        const V v83 = v72 * v82;
+        const V v84 = v77 * v83;
+        const V v85 = v79 * v84;
+        const V v86 = -v80;
+        const V v87 = v70 * v85;
+        const V v88 = v68 * v85;
+        V v89 = softehl_splat(0.0);
+        V v90 = softehl_splat(0.0);
+        V v91 = softehl_splat(0.0);
+        V v92 = softehl_splat(0.0);
+        V v93 = softehl_splat(0.0);
+        V v94 = softehl_splat(0.0);
+        V v95 = softehl_splat(0.0);
+        V v96 = softehl_splat(0.0);
+        V v97 = softehl_splat(0.0);
+        V v98 = softehl_splat(0.0);
+        V v99 = softehl_splat(0.0);
+        V v100 = softehl_splat(0.0);
+        const M m101 = v78;
+        if (softehl_any(m101)) {
+            const V v102 = v62 * v60;
+            const V v103 = v60 * v64;
+            const V v104 = -v102;
+            v89 = softehl_blend(m101, v72, v89);
+            v90 = softehl_blend(m101, softehl_splat(0.0), v90);
+            v91 = softehl_blend(m101, v103, v91);
+            v92 = softehl_blend(m101, softehl_splat(0.0), v92);
+            v93 = softehl_blend(m101, v104, v93);
+            v94 = softehl_blend(m101, softehl_splat(0.0), v94);
+            v95 = softehl_blend(m101, v87, v95);
+            v96 = softehl_blend(m101, softehl_splat(0.0), v96);
+            v97 = softehl_blend(m101, v88, v97);
+            v98 = softehl_blend(m101, softehl_splat(0.0), v98);
+            v99 = softehl_blend(m101, v86, v99);
+            v100 = softehl_blend(m101, softehl_splat(0.0), v100);
+        }
+        const M m105 = ~v78;
+        if (softehl_any(m105)) {
+            const V v106 = v62 * v59;
+            const V v107 = v59 * v64;
+            const V v108 = -v106;
+            v89 = softehl_blend(m105, softehl_splat(0.0), v89);
+            v90 = softehl_blend(m105, v72, v90);
+            v91 = softehl_blend(m105, softehl_splat(0.0), v91);
+            v92 = softehl_blend(m105, v107, v92);
+            v93 = softehl_blend(m105, softehl_splat(0.0), v93);
+            v94 = softehl_blend(m105, v108, v94);
+            v95 = softehl_blend(m105, softehl_splat(0.0), v95);
+            v96 = softehl_blend(m105, v87, v96);
+            v97 = softehl_blend(m105, softehl_splat(0.0), v97);
+            v98 = softehl_blend(m105, v88, v98);
+            v99 = softehl_blend(m105, softehl_splat(0.0), v99);
+            v100 = softehl_blend(m105, v86, v100);
+        }
+        const V v109 = v61 * v2;
+        const V v110 = v59 * v90;
+        const V v111 = 1.0 / v81;
+        const V v112 = v81 * v32;
+        const V v113 = v60 * v89;
+        const V v114 = v110 + v113;
+        const V v115 = v94 + v93;
+        const V v116 = v92 + v91;
+        const V v117 = v81 * v114;
+        const V v118 = 0.5 * v74;
+        const V v119 = v74 * v74;
+        const V v120 = v74 * v10;
+        const V v121 = v77 * v112;
+        const V v122 = 0.5 * v114;
+        const V v123 = v26 * v114;
+        const V v124 = v118 * v36;
+        const V v125 = v77 * v117;
+        const V v126 = v74 * v119;
+        const V v127 = v74 * v122;
+        const V v128 = v77 * v123;
+        const V v129 = v79 * v121;
+        const V v130 = v79 * v124;
+        const V v131 = v26 * v79;
+        const V v132 = v120 * v116;
+        const V v133 = v120 * v115;
+        const V v134 = v77 * v125;
+        const V v135 = v115 * v129;
+        const V v136 = p1 * v19;
+        const V v137 = p1 * v37;
+        const V v138 = p1 * v38;
+        const V v139 = 0.5 * v136;
+        const V v140 = v139 + v134;
+        const V v141 = p0 * v17;
+        const V v142 = p0 * v79;
+        const V v143 = p0 * v18;
+        const V v144 = 0.08333333333333333 * v136;
+        const V v145 = v118 * v137;
+        const V v146 = v118 * v136;
+        const V v147 = 0.25 * v136;
+        const V v148 = v111 * v138;
+        const V v149 = 0.5 * v142;
+        const V v150 = v140 * v131;
+        const V v151 = v125 - v146;
+        const V v152 = v111 * v147;
+        const V v153 = v79 * v145;
+        const V v154 = v126 * v144;
+        const V v155 = v126 * v148;
+        const V v156 = v146 - v125;
+        const V v157 = v26 * v151;
+        const V v158 = v141 - v157;
+        const V v159 = v109 * v128;
+        const V v160 = v17 - v159;
+        const V v161 = v119 * v152;
+        const V v162 = v122 - v161;
+        const V v163 = v79 * v156;
+        const V v164 = w[1] * v111;
+        const V v165 = w[1] * v33;
+        const V v166 = v79 * v160;
+        const V v167 = v111 * v164;
+        const V v168 = v111 * v165;
+        const V v169 = v111 * v154;
+        const V v170 = v127 - v169;
+        const V v171 = w[1] * v158;
+        const V v172 = v158 * v1;
+        const V v173 = v150 + v172;
+        const V v174 = v167 * v154;
+        const V v175 = w[1] * v170;
+        const V v176 = v126 * v168;
+        const V v177 = v171 * v79;
+        const V v178 = v15 * v79;
+        const V v179 = w[1] * v15;
+        const V v180 = v31 * v163;
+        const V v181 = v30 * v163;
+        const V v182 = v153 - v181;
+        const V v183 = v109 * v174;
+        const V v184 = v179 * v142;
+        const V v185 = -v176;
+        const V v186 = v70 * v162;
+        const V v187 = v68 * v162;
+        const V v188 = v70 * v178;
+        const V v189 = v68 * v178;
+        const V v190 = v70 * v166;
+        const V v191 = v68 * v166;
+        const V v192 = -v188;
+        const V v193 = -v189;
+        const V v194 = v62 * v177;
+        s39 += v194;
+        const V v195 = v63 * v177;
+        s40 += v195;
+        const V v196 = v62 * v184;
+        s43 += v196;
+        const V v197 = v63 * v184;
+        s44 += v197;
+        const V v198 = v70 * v149;
+        s41 += v198;
+        const V v199 = v68 * v149;
+        s42 += v199;
+        const V v200 = v63 * v143;
+        const V v201 = v62 * v143;
+        const V v202 = v63 * v173;
+        const V v203 = v62 * v173;
+        const V v204 = v149 + v203;
+        const V v205 = v202 - v149;
+        const V v206 = v70 * v200;
+        s45 += v206;
+        const V v207 = v68 * v200;
+        s47 += v207;
+        const V v208 = v70 * v201;
+        s46 += v208;
+        const V v209 = v68 * v201;
+        s48 += v209;
+        const V v210 = v70 * v130;
+        const V v211 = v68 * v130;
+        const V v212 = v180 + v204;
+        const V v213 = v205 - v180;
+        const V v214 = v135 + v182;
+        const V v215 = v116 * v129;
+        const V v216 = v182 - v215;
+        const V v217 = v70 * v212;
+        s54 += v217;
+        const V v218 = v68 * v212;
+        s56 += v218;
+        const V v219 = v70 * v213;
+        s53 += v219;
+        const V v220 = v68 * v213;
+        s55 += v220;
+        const V v221 = v70 * v214;
+        s50 += v221;
+        const V v222 = v68 * v214;
+        s52 += v222;
+        const V v223 = v70 * v216;
+        s49 += v223;
+        const V v224 = v68 * v216;
+        s51 += v224;
+        const V v225 = v132 - v155;
+        const V v226 = v155 + v133;
+        const V v227 = w[1] * v225;
+        const V v228 = w[1] * v226;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[6 * i], D = B[6 * i + 1], N1 = B[6 * i + 2], D1 = B[6 * i + 3], N2 = B[6 * i + 4], D2 = B[6 * i + 5];
+            (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2;
+            R_lanes[4 + i] += D * v175;
+            K_lanes[(4 + i) * (4 + modes) + 0] += D * v227;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v190 + D * v210 + N1 * v95 + N2 * v96;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D * v186;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v192;
+            K_lanes[(4 + i) * (4 + modes) + 2] += D * v228;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v191 + D * v211 + N1 * v97 + N2 * v98;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D * v187;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v193;
+            const V r0 = D * v183;
+            const V r1 = D * v185;
+            const V r2 = D * v99;
+            const V r3 = softehl_splat(0.0);
+            const V r4 = D * v100;
+            const V r5 = softehl_splat(0.0);
+            for (ptrdiff_t j = 0; j < modes; ++j)
+                K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[6 * j] + r1 * B[6 * j + 1] + r2 * B[6 * j + 2] + r3 * B[6 * j + 3] + r4 * B[6 * j + 4] + r5 * B[6 * j + 5];
+        }
+    }
+    const V v229 = -s41;
+    const V v230 = -s42;
+    const V v231 = -s43;
+    const V v232 = -s44;
+    const V v233 = -s45;
+    const V v234 = -s46;
+    const V v235 = -s47;
+    const V v236 = -s48;
+    const V v237 = -s50;
+    const V v238 = -s52;
+    R_lanes[0] = s40;
+    R_lanes[1] = v232;
+    R_lanes[2] = s39;
+    R_lanes[3] = v231;
+    K_lanes[0 * (4 + modes) + 0] = s49;
+    K_lanes[0 * (4 + modes) + 1] = s53;
+    K_lanes[0 * (4 + modes) + 2] = v237;
+    K_lanes[0 * (4 + modes) + 3] = s54;
+    K_lanes[1 * (4 + modes) + 0] = s41;
+    K_lanes[1 * (4 + modes) + 1] = v233;
+    K_lanes[1 * (4 + modes) + 2] = v229;
+    K_lanes[1 * (4 + modes) + 3] = v234;
+    K_lanes[2 * (4 + modes) + 0] = s51;
+    K_lanes[2 * (4 + modes) + 1] = s55;
+    K_lanes[2 * (4 + modes) + 2] = v238;
+    K_lanes[2 * (4 + modes) + 3] = s56;
+    K_lanes[3 * (4 + modes) + 0] = s42;
+    K_lanes[3 * (4 + modes) + 1] = v235;
+    K_lanes[3 * (4 + modes) + 2] = v230;
+    K_lanes[3 * (4 + modes) + 3] = v236;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+    softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
+#endif
 }
 
 void softehl_film_conserving_tangent(
@@ -172,342 +595,129 @@ void softehl_film_conserving_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)direction;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + 2 * e;
-        double *restrict R = values + (4 + modes) * e;
-        double *restrict K = tangent + (4 + modes) * (4 + modes) * e;
-        (void)X; (void)d; (void)a;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        for (ptrdiff_t i = 0; i < (4 + modes) * (4 + modes); ++i) K[i] = 0.0;
-        const double v1 = d[2] * parameters[6];
-        const double v2 = a[1] + v1;
-        const double v3 = d[0] * parameters[6];
-        const double v4 = a[0] + v3;
-        const double v5 = X[1] - parameters[0];
-        const double v6 = X[3] - parameters[0];
-        const double v7 = X[2] + d[2];
-        const double v8 = d[1] + v5;
-        const double v9 = d[3] + v6;
-        const double v10 = v7 - X[0];
-        const double v11 = v10 - d[0];
-        const double v12 = 0.5 * v11;
-        const double v13 = v9 - v8;
-        const double v14 = 0.5 * v13;
-        const double v15 = 1.0 / v12;
-        const double v16 = v14 * v14;
-        const double v17 = v12 * v12;
-        const double v18 = v16 + v17;
-        const double v19 = sqrt(v18);
-        const double v20 = parameters[5] * v19;
-        const double v21 = 6.283185307179586 * parameters[4];
-        const double v22 = parameters[2] * parameters[3];
-        const double v23 = 0.5 * parameters[6];
-        const double v24 = 0.08333333333333333 * v15;
-        const double v25 = 1.0 / v18;
-        const double v26 = sqrt(v25);
-        const double v27 = 0.5 * v26;
-        const double v28 = 0.5 * v15;
-        const double v29 = v15 * v28;
-        const double v30 = v15 * v20;
-        const double v31 = parameters[5] * v12;
-        const double v32 = v27 * v31;
-        const double v33 = parameters[6] * v20;
-        const double v34 = v20 * v29;
-        const double v35 = parameters[5] * v14;
-        const double v36 = v27 * v35;
-        const double v37 = 0.08333333333333333 * v29;
-        const double v38 = v12 * v21;
-        double s39 = 0.0;
-        double s40 = 0.0;
-        double s41 = 0.0;
-        double s42 = 0.0;
-        double s43 = 0.0;
-        double s44 = 0.0;
-        double s45 = 0.0;
-        double s46 = 0.0;
-        double s47 = 0.0;
-        double s48 = 0.0;
-        double s49 = 0.0;
-        double s50 = 0.0;
-        double s51 = 0.0;
-        double s52 = 0.0;
-        double s53 = 0.0;
-        double s54 = 0.0;
-        double s55 = 0.0;
-        double s56 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 6 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0, p4 = 0.0, p5 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[6 * i] * d[4 + i];
-                p1 += B[6 * i + 1] * d[4 + i];
-                p2 += B[6 * i + 2] * d[4 + i];
-                p3 += B[6 * i + 3] * d[4 + i];
-                p4 += B[6 * i + 4] * d[4 + i];
-                p5 += B[6 * i + 5] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
-            const double v57 = 0.5 * w[0];
-            const double v58 = 0.5 + v57;
-            const double v59 = v58 * v2;
-            const double v60 = parameters[1] - v59;
-            const double v61 = 0.5 - v57;
-            const double v62 = v61 * v4;
-            const double v63 = v60 - v62;
-            const int v64 = 0.0 < v63;
-            const double v65 = 1.0 - p2;
-            const double v66 = v57 - 0.5;
-            const double v67 = 1.0 - p4;
-            const double v68 = v61 * w[1];
-            const double v69 = v61 * v8;
-            const double v70 = v58 * v9;
-            const double v71 = v69 + v70;
-            const double v72 = parameters[0] + v71;
-            const double v73 = v72 * v21;
-            const double v74 = 1.0 / v71;
-            const double v75 = p0 * parameters[3];
-            const double v76 = exp(v75);
-            const double v77 = parameters[2] * v76;
-            const double v78 = v77 * v20;
-            const double v79 = v63 * v78;
-            const double v80 = v74 * v79;
-            const double v81 = v73 * v80;
-            const double v82 = v68 * v81;
-            const double v83 = v58 * w[1];
-            const double v84 = v83 * v81;
-            const double v85 = 0.5 * w[1];
-            const double v86 = v71 * v85;
-            const double v87 = v63 * v86;
-            const double v88 = -v87;
-            double v89, v90, v91, v92, v93, v94, v95, v96, v97, v98, v99, v100;
-            if (v64) {
-                const double v101 = v65 * v66;
-                const double v102 = v58 * v65;
-                const double v103 = -v102;
-                v89 = v63;
-                v90 = 0.0;
-                v91 = v101;
-                v92 = 0.0;
-                v93 = v103;
-                v94 = 0.0;
-                v95 = v82;
-                v96 = 0.0;
-                v97 = v84;
-                v98 = 0.0;
-                v99 = v88;
-                v100 = 0.0;
-            } else {
-                const double v104 = v67 * v66;
-                const double v105 = v58 * v67;
-                const double v106 = -v105;
-                v89 = 0.0;
-                v90 = v63;
-                v91 = 0.0;
-                v92 = v104;
-                v93 = 0.0;
-                v94 = v106;
-                v95 = 0.0;
-                v96 = v82;
-                v97 = 0.0;
-                v98 = v84;
-                v99 = 0.0;
-                v100 = v88;
-            }
-            const double v107 = v65 * v89;
-            const double v108 = v67 * v90;
-            const double v109 = v108 + v107;
-            const double v110 = v77 * v109;
-            const double v111 = v74 * v110;
-            const double v112 = 0.5 * v71;
-            const double v113 = p1 * v15;
-            const double v114 = v112 * v113;
-            const double v115 = v111 - v114;
-            const double v116 = v20 * v115;
-            const double v117 = p0 * v14;
-            const double v118 = v117 - v116;
-            const double v119 = w[1] * v118;
-            const double v120 = v119 * v73;
-            const double v121 = v58 * v120;
-            const double v122 = v61 * v120;
-            const double v123 = p0 * v73;
-            const double v124 = 0.5 * v123;
-            const double v125 = v68 * v124;
-            const double v126 = v83 * v124;
-            const double v127 = w[1] * v12;
-            const double v128 = v127 * v123;
-            const double v129 = v58 * v128;
-            const double v130 = v61 * v128;
-            const double v131 = p0 * v38;
-            const double v132 = v61 * v131;
-            const double v133 = v68 * v132;
-            const double v134 = v58 * v131;
-            const double v135 = v68 * v134;
-            const double v136 = v83 * v132;
-            const double v137 = v83 * v134;
-            const double v138 = v114 - v111;
-            const double v139 = v73 * v138;
-            const double v140 = v32 * v139;
-            const double v141 = p1 * v34;
-            const double v142 = v112 * v141;
-            const double v143 = v73 * v142;
-            const double v144 = v143 - v140;
-            const double v145 = v92 + v91;
-            const double v146 = v77 * v33;
-            const double v147 = v74 * v146;
-            const double v148 = v73 * v147;
-            const double v149 = v145 * v148;
-            const double v150 = v144 - v149;
-            const double v151 = v68 * v150;
-            const double v152 = v94 + v93;
-            const double v153 = v152 * v148;
-            const double v154 = v153 + v144;
-            const double v155 = v68 * v154;
-            const double v156 = v83 * v150;
-            const double v157 = v83 * v154;
-            const double v158 = v118 * v21;
-            const double v159 = v74 * v111;
-            const double v160 = 0.5 * v113;
-            const double v161 = v160 + v159;
-            const double v162 = v20 * v73;
-            const double v163 = v161 * v162;
-            const double v164 = v163 + v158;
-            const double v165 = v61 * v164;
-            const double v166 = v36 * v139;
-            const double v167 = v165 - v166;
-            const double v168 = v167 - v124;
-            const double v169 = v68 * v168;
-            const double v170 = v58 * v164;
-            const double v171 = v166 + v170;
-            const double v172 = v124 + v171;
-            const double v173 = v68 * v172;
-            const double v174 = v83 * v168;
-            const double v175 = v83 * v172;
-            const double v176 = 0.5 * v109;
-            const double v177 = v71 * v176;
-            const double v178 = v71 * v71;
-            const double v179 = v71 * v178;
-            const double v180 = 0.08333333333333333 * v113;
-            const double v181 = v179 * v180;
-            const double v182 = 1.0 / v77;
-            const double v183 = v182 * v181;
-            const double v184 = v177 - v183;
-            const double v185 = w[1] * v184;
-            const double v186 = v20 * v109;
-            const double v187 = v74 * v186;
-            const double v188 = v76 * v22;
-            const double v189 = v188 * v187;
-            const double v190 = v14 - v189;
-            const double v191 = v73 * v190;
-            const double v192 = v68 * v191;
-            const double v193 = v112 * v30;
-            const double v194 = v73 * v193;
-            const double v195 = v68 * v194;
-            const double v196 = v12 * v73;
-            const double v197 = v68 * v196;
-            const double v198 = -v197;
-            const double v199 = v83 * v191;
-            const double v200 = v83 * v194;
-            const double v201 = v83 * v196;
-            const double v202 = -v201;
-            const double v203 = v71 * v23;
-            const double v204 = v203 * v145;
-            const double v205 = p1 * v37;
-            const double v206 = v182 * v205;
-            const double v207 = v179 * v206;
-            const double v208 = v204 - v207;
-            const double v209 = w[1] * v208;
-            const double v210 = 0.25 * v113;
-            const double v211 = v182 * v210;
-            const double v212 = v178 * v211;
-            const double v213 = v176 - v212;
-            const double v214 = v68 * v213;
-            const double v215 = v203 * v152;
-            const double v216 = v207 + v215;
-            const double v217 = w[1] * v216;
-            const double v218 = v83 * v213;
-            const double v219 = w[1] * v182;
-            const double v220 = v182 * v219;
-            const double v221 = v220 * v181;
-            const double v222 = v188 * v221;
-            const double v223 = w[1] * v24;
-            const double v224 = v182 * v223;
-            const double v225 = v179 * v224;
-            const double v226 = -v225;
-            s39 += v121;
-            s40 += v122;
-            s41 += v125;
-            s42 += v126;
-            s43 += v129;
-            s44 += v130;
-            s45 += v133;
-            s46 += v135;
-            s47 += v136;
-            s48 += v137;
-            s49 += v151;
-            s50 += v155;
-            s51 += v156;
-            s52 += v157;
-            s53 += v169;
-            s54 += v173;
-            s55 += v174;
-            s56 += v175;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[6 * i], D = B[6 * i + 1], N1 = B[6 * i + 2], D1 = B[6 * i + 3], N2 = B[6 * i + 4], D2 = B[6 * i + 5];
-                (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2;
-                R[4 + i] += D * v185;
-                K[(4 + i) * (4 + modes) + 0] += D * v209;
-                K[0 * (4 + modes) + 4 + i] += N * v192 + D * v195 + N1 * v95 + N2 * v96;
-                K[(4 + i) * (4 + modes) + 1] += D * v214;
-                K[1 * (4 + modes) + 4 + i] += N * v198;
-                K[(4 + i) * (4 + modes) + 2] += D * v217;
-                K[2 * (4 + modes) + 4 + i] += N * v199 + D * v200 + N1 * v97 + N2 * v98;
-                K[(4 + i) * (4 + modes) + 3] += D * v218;
-                K[3 * (4 + modes) + 4 + i] += N * v202;
-                const double r0 = D * v222;
-                const double r1 = D * v226;
-                const double r2 = D * v99;
-                const double r3 = 0.0;
-                const double r4 = D * v100;
-                const double r5 = 0.0;
-                for (ptrdiff_t j = 0; j < modes; ++j)
-                    K[(4 + i) * (4 + modes) + 4 + j] += r0 * B[6 * j] + r1 * B[6 * j + 1] + r2 * B[6 * j + 2] + r3 * B[6 * j + 3] + r4 * B[6 * j + 4] + r5 * B[6 * j + 5];
-            }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_conserving_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_conserving_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
+        return;
+    }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double a[SOFTEHL_LANES * 2];
+    softehl_pad(a, data, 2, n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
+    softehl_film_conserving_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
+#endif
+}
+
+static void softehl_film_conserving_fields_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    (void)a0; (void)a1;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+    const V v1 = X2 + d2;
+    const V v2 = X1 - parameters[0];
+    const V v3 = X3 - parameters[0];
+    const V v4 = d1 + v2;
+    const V v5 = d2 * parameters[6];
+    const V v6 = a1 + v5;
+    const V v7 = d0 * parameters[6];
+    const V v8 = a0 + v7;
+    const V v9 = d3 + v3;
+    const V v10 = v1 - d0;
+    const V v11 = X0 + d0;
+    const V v12 = v10 - X0;
+    const V v13 = 0.5 * v12;
+    const V v14 = 1.0 / v13;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 6 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[6 * i] * d_lanes[4 + i];
+            p1 += B[6 * i + 1] * d_lanes[4 + i];
+            p2 += B[6 * i + 2] * d_lanes[4 + i];
+            p3 += B[6 * i + 3] * d_lanes[4 + i];
+            p4 += B[6 * i + 4] * d_lanes[4 + i];
+            p5 += B[6 * i + 5] * d_lanes[4 + i];
         }
-        const double v227 = -s44;
-        const double v228 = -s43;
-        const double v229 = -s50;
-        const double v230 = -s45;
-        const double v231 = -s41;
-        const double v232 = -s46;
-        const double v233 = -s52;
-        const double v234 = -s47;
-        const double v235 = -s42;
-        const double v236 = -s48;
-        R[0] = s40;
-        R[1] = v227;
-        R[2] = s39;
-        R[3] = v228;
-        K[0 * (4 + modes) + 0] = s49;
-        K[0 * (4 + modes) + 1] = s53;
-        K[0 * (4 + modes) + 2] = v229;
-        K[0 * (4 + modes) + 3] = s54;
-        K[1 * (4 + modes) + 0] = s41;
-        K[1 * (4 + modes) + 1] = v230;
-        K[1 * (4 + modes) + 2] = v231;
-        K[1 * (4 + modes) + 3] = v232;
-        K[2 * (4 + modes) + 0] = s51;
-        K[2 * (4 + modes) + 1] = s55;
-        K[2 * (4 + modes) + 2] = v233;
-        K[2 * (4 + modes) + 3] = s56;
-        K[3 * (4 + modes) + 0] = s42;
-        K[3 * (4 + modes) + 1] = v234;
-        K[3 * (4 + modes) + 2] = v235;
-        K[3 * (4 + modes) + 3] = v236;
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
+        const double v15 = 0.5 * w[0];
+        const V v16 = w[1] * v13;
+        const double v17 = 0.5 + v15;
+        const double v18 = 0.5 - v15;
+        const V v19 = v17 * v6;
+        const V v20 = parameters[1] - v19;
+        const V v21 = v17 * v1;
+        const V v22 = v17 * v9;
+        const V v23 = v18 * v8;
+        const V v24 = v20 - v23;
+        const M v25 = softehl_lt(softehl_splat(0.0), v24);
+        const V v26 = v18 * v11;
+        const V v27 = v21 + v26;
+        const V v28 = v18 * v4;
+        const V v29 = v28 + v22;
+        const V v30 = softehl_blend(v25, v24, softehl_splat(0.0));
+        const V v31 = softehl_blend(v25, softehl_splat(0.0), v24);
+        const V v32 = p0 * parameters[3];
+        const V v33 = p1 * v14;
+        const V v34 = softehl_vexp(v32);
+        const V v35 = 1.0 - p4;
+        const V v36 = 1.0 - p2;
+        const V v37 = 1.0 / v29;
+        const V v38 = 0.5 * v29;
+        const V v39 = 0.08333333333333333 * v29;
+        const V v40 = v35 * v31;
+        const V v41 = v29 * v39;
+        const V v42 = v38 * v33;
+        const V v43 = v36 * v30;
+        const V v44 = v40 + v43;
+        const V v45 = v29 * v41;
+        const V v46 = v45 * v33;
+        const V v47 = v38 * v44;
+        const V v48 = parameters[2] * v34;
+        const V v49 = v48 * v44;
+        const V v50 = v37 * v49;
+        const V v51 = 1.0 / v48;
+        const V v52 = v51 * v46;
+        const V v53 = v47 - v52;
+        const V v54 = v42 + v50;
+        const V v55 = v50 - v42;
+        softehl_store4(R + 13 * q + 0, (13 * points), v27, v16, v29, p0);
+        softehl_store4(R + 13 * q + 4, (13 * points), v55, v53, v54, v48);
+        softehl_store1(R + 13 * q + 8, (13 * points), v29);
+        softehl_store2(R + 13 * q + 11, (13 * points), p2, p4);
+    }
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        softehl_store2(R + 13 * q + 9, (13 * points), softehl_splat(0.0), softehl_splat(0.0));
     }
 }
 
@@ -519,105 +729,23 @@ void softehl_film_conserving_fields(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + 2 * e;
-        (void)X; (void)d; (void)a;
-        const double v1 = d[2] * parameters[6];
-        const double v2 = a[1] + v1;
-        const double v3 = d[0] * parameters[6];
-        const double v4 = a[0] + v3;
-        const double v5 = X[1] - parameters[0];
-        const double v6 = X[3] - parameters[0];
-        const double v7 = X[2] + d[2];
-        const double v8 = X[0] + d[0];
-        const double v9 = d[1] + v5;
-        const double v10 = d[3] + v6;
-        const double v11 = v7 - X[0];
-        const double v12 = v11 - d[0];
-        const double v13 = 0.5 * v12;
-        const double v14 = 1.0 / v13;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 6 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0, p4 = 0.0, p5 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[6 * i] * d[4 + i];
-                p1 += B[6 * i + 1] * d[4 + i];
-                p2 += B[6 * i + 2] * d[4 + i];
-                p3 += B[6 * i + 3] * d[4 + i];
-                p4 += B[6 * i + 4] * d[4 + i];
-                p5 += B[6 * i + 5] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
-            const double v15 = 0.5 * w[0];
-            const double v16 = 0.5 - v15;
-            const double v17 = v16 * v8;
-            const double v18 = 0.5 + v15;
-            const double v19 = v18 * v7;
-            const double v20 = v19 + v17;
-            const double v21 = w[1] * v13;
-            const double v22 = v18 * v10;
-            const double v23 = v16 * v9;
-            const double v24 = v23 + v22;
-            const double v25 = v18 * v2;
-            const double v26 = parameters[1] - v25;
-            const double v27 = v16 * v4;
-            const double v28 = v26 - v27;
-            const int v29 = 0.0 < v28;
-            double v30, v31;
-            if (v29) {
-                v30 = v28;
-                v31 = 0.0;
-            } else {
-                v30 = 0.0;
-                v31 = v28;
-            }
-            const double v32 = 1.0 - p2;
-            const double v33 = v32 * v30;
-            const double v34 = 1.0 - p4;
-            const double v35 = v34 * v31;
-            const double v36 = v35 + v33;
-            const double v37 = p0 * parameters[3];
-            const double v38 = exp(v37);
-            const double v39 = parameters[2] * v38;
-            const double v40 = v39 * v36;
-            const double v41 = 1.0 / v24;
-            const double v42 = v41 * v40;
-            const double v43 = 0.5 * v24;
-            const double v44 = p1 * v14;
-            const double v45 = v43 * v44;
-            const double v46 = v42 - v45;
-            const double v47 = v43 * v36;
-            const double v48 = 0.08333333333333333 * v24;
-            const double v49 = v24 * v48;
-            const double v50 = v24 * v49;
-            const double v51 = v50 * v44;
-            const double v52 = 1.0 / v39;
-            const double v53 = v52 * v51;
-            const double v54 = v47 - v53;
-            const double v55 = v45 + v42;
-            double *restrict out = values + 13 * (points * e + q);
-            out[0] = v20;
-            out[1] = v21;
-            out[2] = v24;
-            out[3] = p0;
-            out[4] = v46;
-            out[5] = v54;
-            out[6] = v55;
-            out[7] = v39;
-            out[8] = v24;
-            out[11] = p2;
-            out[12] = p4;
-        }
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            double *restrict out = values + 13 * (points * e + q);
-            out[9] = 0.0;
-            out[10] = 0.0;
-        }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_conserving_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (13 * points) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_conserving_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (13 * points) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double a[SOFTEHL_LANES * 2];
+    softehl_pad(a, data, 2, n);
+    double R[SOFTEHL_LANES * (13 * points)];
+    softehl_film_conserving_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (13 * points) * n; ++i) values[i] = R[i];
+#endif
 }

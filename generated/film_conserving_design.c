@@ -32,6 +32,249 @@
  */
 #include "softehl_kernels.h"
 
+static void softehl_film_conserving_pseudo_load_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    (void)a0; (void)a1;
+    V t0, t1, t2, t3;
+    softehl_load4(t + 0, 13, &t0, &t1, &t2, &t3);
+    (void)t0; (void)t1; (void)t2; (void)t3;
+    V t4, t5, t6, t7;
+    softehl_load4(t + 4, 13, &t4, &t5, &t6, &t7);
+    (void)t4; (void)t5; (void)t6; (void)t7;
+    V t8, t9, t10, t11;
+    softehl_load4(t + 8, 13, &t8, &t9, &t10, &t11);
+    (void)t8; (void)t9; (void)t10; (void)t11;
+    V t12;
+    softehl_load1(t + 12, 13, &t12);
+    (void)t12;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[4];
+    const V v2 = X2 + d2;
+    const V v3 = X1 - parameters[0];
+    const V v4 = X3 - parameters[0];
+    const V v5 = d1 + v3;
+    const V v6 = d3 + v4;
+    const V v7 = parameters[2] * t9;
+    const V v8 = d2 * parameters[6];
+    const V v9 = a1 + v8;
+    const V v10 = d0 * parameters[6];
+    const V v11 = a0 + v10;
+    const V v12 = v2 - X0;
+    const V v13 = t2 - t0;
+    const V v14 = v12 - d0;
+    const V v15 = d0 * t12;
+    const V v16 = t4 + v15;
+    const V v17 = d2 * t12;
+    const V v18 = t5 + v17;
+    const V v19 = v6 - v5;
+    const V v20 = 0.5 * v14;
+    const V v21 = 0.5 * v13;
+    const V v22 = 0.5 * v19;
+    const V v23 = 6.283185307179586 * t10;
+    const V v24 = t1 - t6;
+    const V v25 = t3 - t6;
+    const double v26 = 0.5 * parameters[5];
+    const V v27 = 1.0 / v20;
+    const V v28 = v20 * v20;
+    const V v29 = v20 * v21;
+    const V v30 = v25 - v24;
+    const V v31 = 0.5 * v30;
+    const V v32 = v22 * v22;
+    const V v33 = v32 + v28;
+    const V v34 = v22 * v31;
+    const V v35 = v34 + v29;
+    const V v36 = softehl_vsqrt(v33);
+    const V v37 = 1.0 / v33;
+    const V v38 = parameters[5] * v36;
+    const V v39 = softehl_vsqrt(v37);
+    const V v40 = v39 * v26;
+    const V v41 = v27 * v27;
+    const V v42 = v41 * v21;
+    const V v43 = 2.0 * v35;
+    const V v44 = v43 * v40;
+    const V v45 = v36 * t11;
+    const V v46 = v45 + v44;
+    V s47 = softehl_splat(0.0);
+    V s48 = softehl_splat(0.0);
+    V s49 = softehl_splat(0.0);
+    V s50 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 6 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[6 * i] * d_lanes[4 + i];
+            p1 += B[6 * i + 1] * d_lanes[4 + i];
+            p2 += B[6 * i + 2] * d_lanes[4 + i];
+            p3 += B[6 * i + 3] * d_lanes[4 + i];
+            p4 += B[6 * i + 4] * d_lanes[4 + i];
+            p5 += B[6 * i + 5] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
+        const double v51 = 0.5 * w[0];
+        const V v52 = 1.0 - p4;
+        const V v53 = 1.0 - p2;
+        const double v54 = 0.5 + v51;
+        const double v55 = 0.5 - v51;
+        const V v56 = v54 * v9;
+        const V v57 = parameters[1] - v56;
+        const V v58 = v54 * v6;
+        const V v59 = v54 * v25;
+        const V v60 = v54 * v18;
+        const V v61 = t7 - v60;
+        const V v62 = v55 * v11;
+        const V v63 = v57 - v62;
+        const M v64 = softehl_lt(softehl_splat(0.0), v63);
+        const V v65 = v55 * v5;
+        const V v66 = v65 + v58;
+        const V v67 = parameters[0] + v66;
+        const V v68 = v55 * v16;
+        const V v69 = v61 - v68;
+        const V v70 = v55 * v24;
+        const V v71 = v70 + v59;
+        const V v72 = t6 + v71;
+        const V v73 = v67 * v23;
+        const V v74 = v67 * v1;
+        const V v75 = v1 * v72;
+        const V v76 = v75 + v73;
+        const V v77 = v74 * v21;
+        const V v78 = v20 * v76;
+        const V v79 = v77 + v78;
+        const V v80 = p0 * v79;
+        const V v81 = w[1] * v80;
+        const V v82 = v54 * v81;
+        s47 += v82;
+        const V v83 = v55 * v81;
+        s48 += v83;
+        V v84 = softehl_splat(0.0);
+        V v85 = softehl_splat(0.0);
+        V v86 = softehl_splat(0.0);
+        V v87 = softehl_splat(0.0);
+        const M m88 = v64;
+        if (softehl_any(m88)) {
+            const V v89 = v53 * v69;
+            v84 = softehl_blend(m88, v63, v84);
+            v85 = softehl_blend(m88, softehl_splat(0.0), v85);
+            v86 = softehl_blend(m88, v89, v86);
+            v87 = softehl_blend(m88, softehl_splat(0.0), v87);
+        }
+        const M m90 = ~v64;
+        if (softehl_any(m90)) {
+            const V v91 = v52 * v69;
+            v84 = softehl_blend(m90, softehl_splat(0.0), v84);
+            v85 = softehl_blend(m90, v63, v85);
+            v86 = softehl_blend(m90, softehl_splat(0.0), v86);
+            v87 = softehl_blend(m90, v91, v87);
+        }
+        const V v92 = v52 * v85;
+        const V v93 = p0 * parameters[3];
+        const V v94 = p0 * v22;
+        const V v95 = v53 * v84;
+        const V v96 = v92 + v95;
+        const V v97 = softehl_vexp(v93);
+        const V v98 = p0 * v7;
+        const V v99 = t8 + v98;
+        const V v100 = p0 * v31;
+        const V v101 = v87 + v86;
+        const V v102 = 1.0 / v66;
+        const V v103 = 0.5 * v66;
+        const V v104 = v66 * v66;
+        const V v105 = 0.5 * v96;
+        const V v106 = v66 * v104;
+        const V v107 = p1 * v27;
+        const V v108 = p1 * v42;
+        const V v109 = 0.25 * v104;
+        const V v110 = v103 * v101;
+        const V v111 = 0.5 * v107;
+        const V v112 = v103 * v108;
+        const V v113 = v107 * v109;
+        const V v114 = v105 * v71;
+        const V v115 = v114 + v110;
+        const V v116 = v111 * v71;
+        const V v117 = v112 - v116;
+        const V v118 = v97 * v99;
+        const V v119 = parameters[2] * v97;
+        const V v120 = v119 * v101;
+        const V v121 = 1.0 / v119;
+        const V v122 = v119 * v96;
+        const V v123 = v102 * v122;
+        const V v124 = v96 * v118;
+        const V v125 = v120 + v124;
+        const V v126 = v123 * v71;
+        const V v127 = v125 - v126;
+        const V v128 = v102 * v127;
+        const V v129 = v117 + v128;
+        const V v130 = v103 * v107;
+        const V v131 = v123 - v130;
+        const V v132 = v131 * v46;
+        const V v133 = v100 - v132;
+        const V v134 = v38 * v131;
+        const V v135 = v94 - v134;
+        const V v136 = v38 * v129;
+        const V v137 = v133 - v136;
+        const V v138 = v121 * v107;
+        const V v139 = v118 * v138;
+        const V v140 = v108 + v139;
+        const V v141 = v106 * v140;
+        const V v142 = v135 * v76;
+        const V v143 = v74 * v137;
+        const V v144 = v142 + v143;
+        const V v145 = 0.08333333333333333 * v141;
+        const V v146 = v71 * v113;
+        const V v147 = v145 - v146;
+        const V v148 = v121 * v147;
+        const V v149 = v115 + v148;
+        const V v150 = w[1] * v149;
+        const V v151 = w[1] * v144;
+        const V v152 = v54 * v151;
+        s49 += v152;
+        const V v153 = v55 * v151;
+        s50 += v153;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[6 * i], D = B[6 * i + 1], N1 = B[6 * i + 2], D1 = B[6 * i + 3], N2 = B[6 * i + 4], D2 = B[6 * i + 5];
+            (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2;
+            R_lanes[4 + i] += D * v150;
+        }
+    }
+    const V v154 = -s47;
+    const V v155 = -s48;
+    R_lanes[0] = s50;
+    R_lanes[1] = v155;
+    R_lanes[2] = s49;
+    R_lanes[3] = v154;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+}
+
 void softehl_film_conserving_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -40,204 +283,236 @@ void softehl_film_conserving_pseudo_load(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + 2 * e;
-        const double *restrict t = direction + 13 * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d; (void)a; (void)t;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = d[2] * parameters[6];
-        const double v2 = a[1] + v1;
-        const double v3 = d[0] * parameters[6];
-        const double v4 = a[0] + v3;
-        const double v5 = X[1] - parameters[0];
-        const double v6 = X[3] - parameters[0];
-        const double v7 = X[2] + d[2];
-        const double v8 = d[1] + v5;
-        const double v9 = d[3] + v6;
-        const double v10 = v7 - X[0];
-        const double v11 = v10 - d[0];
-        const double v12 = 0.5 * v11;
-        const double v13 = v9 - v8;
-        const double v14 = 0.5 * v13;
-        const double v15 = 1.0 / v12;
-        const double v16 = v14 * v14;
-        const double v17 = v12 * v12;
-        const double v18 = v16 + v17;
-        const double v19 = sqrt(v18);
-        const double v20 = parameters[5] * v19;
-        const double v21 = 6.283185307179586 * parameters[4];
-        const double v22 = 1.0 / v18;
-        const double v23 = sqrt(v22);
-        const double v24 = d[2] * t[12];
-        const double v25 = t[5] + v24;
-        const double v26 = d[0] * t[12];
-        const double v27 = t[4] + v26;
-        const double v28 = t[1] - t[6];
-        const double v29 = t[3] - t[6];
-        const double v30 = parameters[2] * t[9];
-        const double v31 = 0.5 * parameters[5];
-        const double v32 = v15 * v15;
-        const double v33 = t[2] - t[0];
-        const double v34 = 0.5 * v33;
-        const double v35 = v29 - v28;
-        const double v36 = 0.5 * v35;
-        const double v37 = v14 * v36;
-        const double v38 = v12 * v34;
-        const double v39 = v37 + v38;
-        const double v40 = 2.0 * v39;
-        const double v41 = v32 * v34;
-        const double v42 = v19 * t[11];
-        const double v43 = v23 * v31;
-        const double v44 = v40 * v43;
-        const double v45 = v42 + v44;
-        const double v46 = 6.283185307179586 * t[10];
-        double s47 = 0.0;
-        double s48 = 0.0;
-        double s49 = 0.0;
-        double s50 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 6 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0, p4 = 0.0, p5 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[6 * i] * d[4 + i];
-                p1 += B[6 * i + 1] * d[4 + i];
-                p2 += B[6 * i + 2] * d[4 + i];
-                p3 += B[6 * i + 3] * d[4 + i];
-                p4 += B[6 * i + 4] * d[4 + i];
-                p5 += B[6 * i + 5] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
-            const double v51 = 0.5 * w[0];
-            const double v52 = 0.5 + v51;
-            const double v53 = v52 * v9;
-            const double v54 = 0.5 - v51;
-            const double v55 = v54 * v8;
-            const double v56 = v55 + v53;
-            const double v57 = parameters[0] + v56;
-            const double v58 = v57 * v46;
-            const double v59 = v52 * v29;
-            const double v60 = v54 * v28;
-            const double v61 = v60 + v59;
-            const double v62 = t[6] + v61;
-            const double v63 = v21 * v62;
-            const double v64 = v63 + v58;
-            const double v65 = v12 * v64;
-            const double v66 = v57 * v21;
-            const double v67 = v66 * v34;
-            const double v68 = v67 + v65;
-            const double v69 = p0 * v68;
-            const double v70 = w[1] * v69;
-            const double v71 = v52 * v70;
-            const double v72 = v54 * v70;
-            const double v73 = v52 * v2;
-            const double v74 = parameters[1] - v73;
-            const double v75 = v54 * v4;
-            const double v76 = v74 - v75;
-            const int v77 = 0.0 < v76;
-            const double v78 = 1.0 - p2;
-            const double v79 = v52 * v25;
-            const double v80 = t[7] - v79;
-            const double v81 = v54 * v27;
-            const double v82 = v80 - v81;
-            const double v83 = 1.0 - p4;
-            double v84, v85, v86, v87;
-            if (v77) {
-                const double v88 = v78 * v82;
-                v84 = v76;
-                v85 = 0.0;
-                v86 = v88;
-                v87 = 0.0;
-            } else {
-                const double v89 = v83 * v82;
-                v84 = 0.0;
-                v85 = v76;
-                v86 = 0.0;
-                v87 = v89;
-            }
-            const double v90 = v78 * v84;
-            const double v91 = v83 * v85;
-            const double v92 = v91 + v90;
-            const double v93 = p0 * v30;
-            const double v94 = t[8] + v93;
-            const double v95 = p0 * parameters[3];
-            const double v96 = exp(v95);
-            const double v97 = v96 * v94;
-            const double v98 = v92 * v97;
-            const double v99 = v87 + v86;
-            const double v100 = parameters[2] * v96;
-            const double v101 = v100 * v99;
-            const double v102 = v101 + v98;
-            const double v103 = v100 * v92;
-            const double v104 = 1.0 / v56;
-            const double v105 = v104 * v103;
-            const double v106 = v105 * v61;
-            const double v107 = v102 - v106;
-            const double v108 = v104 * v107;
-            const double v109 = 0.5 * v56;
-            const double v110 = p1 * v41;
-            const double v111 = v109 * v110;
-            const double v112 = v111 + v108;
-            const double v113 = p1 * v15;
-            const double v114 = 0.5 * v113;
-            const double v115 = v114 * v61;
-            const double v116 = v112 - v115;
-            const double v117 = v20 * v116;
-            const double v118 = v109 * v113;
-            const double v119 = v105 - v118;
-            const double v120 = v119 * v45;
-            const double v121 = p0 * v36;
-            const double v122 = v121 - v120;
-            const double v123 = v122 - v117;
-            const double v124 = v66 * v123;
-            const double v125 = v20 * v119;
-            const double v126 = p0 * v14;
-            const double v127 = v126 - v125;
-            const double v128 = v127 * v64;
-            const double v129 = v128 + v124;
-            const double v130 = w[1] * v129;
-            const double v131 = v52 * v130;
-            const double v132 = v54 * v130;
-            const double v133 = v109 * v99;
-            const double v134 = 0.5 * v92;
-            const double v135 = v134 * v61;
-            const double v136 = v135 + v133;
-            const double v137 = 1.0 / v100;
-            const double v138 = v137 * v113;
-            const double v139 = v97 * v138;
-            const double v140 = v110 + v139;
-            const double v141 = v56 * v56;
-            const double v142 = v56 * v141;
-            const double v143 = v142 * v140;
-            const double v144 = 0.08333333333333333 * v143;
-            const double v145 = 0.25 * v141;
-            const double v146 = v113 * v145;
-            const double v147 = v61 * v146;
-            const double v148 = v144 - v147;
-            const double v149 = v137 * v148;
-            const double v150 = v136 + v149;
-            const double v151 = w[1] * v150;
-            s47 += v71;
-            s48 += v72;
-            s49 += v131;
-            s50 += v132;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[6 * i], D = B[6 * i + 1], N1 = B[6 * i + 2], D1 = B[6 * i + 3], N2 = B[6 * i + 4], D2 = B[6 * i + 5];
-                (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2;
-                R[4 + i] += D * v151;
-            }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_conserving_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + 13 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_conserving_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + 13 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
+        return;
+    }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double a[SOFTEHL_LANES * 2];
+    softehl_pad(a, data, 2, n);
+    double t[SOFTEHL_LANES * 13];
+    softehl_pad(t, direction, 13, n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    softehl_film_conserving_pseudo_load(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+#endif
+}
+
+static void softehl_film_conserving_fields_rate_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    (void)a0; (void)a1;
+    V t0, t1, t2, t3;
+    softehl_load4(t + 0, (13 + (4 + modes)), &t0, &t1, &t2, &t3);
+    (void)t0; (void)t1; (void)t2; (void)t3;
+    V t4, t5, t6, t7;
+    softehl_load4(t + 4, (13 + (4 + modes)), &t4, &t5, &t6, &t7);
+    (void)t4; (void)t5; (void)t6; (void)t7;
+    V t8, t9, t10, t11;
+    softehl_load4(t + 8, (13 + (4 + modes)), &t8, &t9, &t10, &t11);
+    (void)t8; (void)t9; (void)t10; (void)t11;
+    V t12, t13, t14, t15;
+    softehl_load4(t + 12, (13 + (4 + modes)), &t12, &t13, &t14, &t15);
+    (void)t12; (void)t13; (void)t14; (void)t15;
+    V t16;
+    softehl_load1(t + 16, (13 + (4 + modes)), &t16);
+    (void)t16;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V t_lanes[(13 + (4 + modes))];
+#else
+    const V *const t_lanes = t;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(t_lanes, t, (13 + (4 + modes)));
+#endif
+    const V v1 = X2 + d2;
+    const V v2 = X1 - parameters[0];
+    const V v3 = X3 - parameters[0];
+    const V v4 = d1 + v2;
+    const V v5 = d3 + v3;
+    const V v6 = d2 * parameters[6];
+    const V v7 = a1 + v6;
+    const V v8 = t1 + t14;
+    const V v9 = d0 * parameters[6];
+    const V v10 = a0 + v9;
+    const V v11 = v1 - X0;
+    const V v12 = v8 - t6;
+    const V v13 = t3 - t6;
+    const V v14 = v11 - d0;
+    const V v15 = d0 * t12;
+    const V v16 = t4 + v15;
+    const V v17 = d2 * t12;
+    const V v18 = t5 + v17;
+    const V v19 = 0.5 * v14;
+    const V v20 = v13 + t16;
+    const V v21 = t2 + t15;
+    const V v22 = parameters[6] * t15;
+    const V v23 = v18 + v22;
+    const V v24 = parameters[6] * t13;
+    const V v25 = v16 + v24;
+    const V v26 = 1.0 / v19;
+    const V v27 = t0 + t13;
+    const V v28 = v21 - t0;
+    const V v29 = v28 - t13;
+    const V v30 = 0.5 * v29;
+    const V v31 = v26 * v30;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 6 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[6 * i] * d_lanes[4 + i];
+            p1 += B[6 * i + 1] * d_lanes[4 + i];
+            p2 += B[6 * i + 2] * d_lanes[4 + i];
+            p3 += B[6 * i + 3] * d_lanes[4 + i];
+            p4 += B[6 * i + 4] * d_lanes[4 + i];
+            p5 += B[6 * i + 5] * d_lanes[4 + i];
         }
-        const double v152 = -s48;
-        const double v153 = -s47;
-        R[0] = s50;
-        R[1] = v152;
-        R[2] = s49;
-        R[3] = v153;
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
+        V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0), tp4 = softehl_splat(0.0), tp5 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            tp0 += B[6 * i] * t_lanes[17 + i];
+            tp1 += B[6 * i + 1] * t_lanes[17 + i];
+            tp2 += B[6 * i + 2] * t_lanes[17 + i];
+            tp3 += B[6 * i + 3] * t_lanes[17 + i];
+            tp4 += B[6 * i + 4] * t_lanes[17 + i];
+            tp5 += B[6 * i + 5] * t_lanes[17 + i];
+        }
+        (void)tp0, (void)tp1, (void)tp2, (void)tp3, (void)tp4, (void)tp5;
+        const double v32 = 0.5 * w[0];
+        const V v33 = 1.0 - p4;
+        const V v34 = 1.0 - p2;
+        const V v35 = w[1] * v30;
+        const double v36 = 0.5 + v32;
+        const double v37 = 0.5 - v32;
+        const V v38 = v36 * v7;
+        const V v39 = parameters[1] - v38;
+        const V v40 = v36 * v21;
+        const V v41 = v36 * v20;
+        const V v42 = v36 * v23;
+        const V v43 = t7 - v42;
+        const V v44 = v37 * v10;
+        const V v45 = v39 - v44;
+        const M v46 = softehl_lt(softehl_splat(0.0), v45);
+        const V v47 = v37 * v27;
+        const V v48 = v40 + v47;
+        const V v49 = v37 * v25;
+        const V v50 = v43 - v49;
+        const V v51 = v37 * v12;
+        const V v52 = v51 + v41;
+        V v53 = softehl_splat(0.0);
+        V v54 = softehl_splat(0.0);
+        V v55 = softehl_splat(0.0);
+        V v56 = softehl_splat(0.0);
+        const M m57 = v46;
+        if (softehl_any(m57)) {
+            const V v58 = v34 * v50;
+            const V v59 = v45 * tp2;
+            const V v60 = v58 - v59;
+            v53 = softehl_blend(m57, v45, v53);
+            v54 = softehl_blend(m57, softehl_splat(0.0), v54);
+            v55 = softehl_blend(m57, v60, v55);
+            v56 = softehl_blend(m57, softehl_splat(0.0), v56);
+        }
+        const M m61 = ~v46;
+        if (softehl_any(m61)) {
+            const V v62 = v33 * v50;
+            const V v63 = v45 * tp4;
+            const V v64 = v62 - v63;
+            v53 = softehl_blend(m61, softehl_splat(0.0), v53);
+            v54 = softehl_blend(m61, v45, v54);
+            v55 = softehl_blend(m61, softehl_splat(0.0), v55);
+            v56 = softehl_blend(m61, v64, v56);
+        }
+        const V v65 = v37 * v4;
+        const V v66 = v33 * v54;
+        const V v67 = v36 * v5;
+        const V v68 = v65 + v67;
+        const V v69 = v34 * v53;
+        const V v70 = v66 + v69;
+        const V v71 = v56 + v55;
+        const V v72 = p0 * t9;
+        const V v73 = p0 * parameters[3];
+        const V v74 = parameters[3] * tp0;
+        const V v75 = v72 + v74;
+        const V v76 = 1.0 / v68;
+        const V v77 = 0.5 * v68;
+        const V v78 = v68 * v68;
+        const V v79 = softehl_vexp(v73);
+        const V v80 = 0.5 * v70;
+        const V v81 = v68 * v78;
+        const V v82 = 0.25 * v78;
+        const V v83 = v77 * v71;
+        const V v84 = p1 * v31;
+        const V v85 = tp1 - v84;
+        const V v86 = p1 * v26;
+        const V v87 = v26 * v85;
+        const V v88 = v86 * v82;
+        const V v89 = 0.5 * v86;
+        const V v90 = v80 * v52;
+        const V v91 = v90 + v83;
+        const V v92 = v77 * v87;
+        const V v93 = v89 * v52;
+        const V v94 = v92 + v93;
+        const V v95 = parameters[2] * v79;
+        const V v96 = v79 * t8;
+        const V v97 = v95 * v75;
+        const V v98 = v96 + v97;
+        const V v99 = v76 * v70;
+        const V v100 = v52 * v99;
+        const V v101 = v71 - v100;
+        const V v102 = v70 * v98;
+        const V v103 = v95 * v101;
+        const V v104 = v102 + v103;
+        const V v105 = v76 * v104;
+        const V v106 = 1.0 / v95;
+        const V v107 = v106 * v86;
+        const V v108 = v107 * v98;
+        const V v109 = v108 - v87;
+        const V v110 = v81 * v109;
+        const V v111 = 0.08333333333333333 * v110;
+        const V v112 = v88 * v52;
+        const V v113 = v111 - v112;
+        const V v114 = v106 * v113;
+        const V v115 = v91 + v114;
+        const V v116 = v94 + v105;
+        const V v117 = v105 - v94;
+        softehl_store4(R + 13 * q + 0, (13 * points), v48, v35, v52, tp0);
+        softehl_store4(R + 13 * q + 4, (13 * points), v117, v115, v116, v98);
+        softehl_store1(R + 13 * q + 8, (13 * points), v52);
+        softehl_store2(R + 13 * q + 11, (13 * points), tp2, tp4);
+    }
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        softehl_store2(R + 13 * q + 9, (13 * points), softehl_splat(0.0), softehl_splat(0.0));
     }
 }
 
@@ -249,177 +524,25 @@ void softehl_film_conserving_fields_rate(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + 2 * e;
-        const double *restrict t = direction + (13 + (4 + modes)) * e;
-        (void)X; (void)d; (void)a; (void)t;
-        const double v1 = d[2] * parameters[6];
-        const double v2 = a[1] + v1;
-        const double v3 = d[0] * parameters[6];
-        const double v4 = a[0] + v3;
-        const double v5 = X[1] - parameters[0];
-        const double v6 = X[3] - parameters[0];
-        const double v7 = X[2] + d[2];
-        const double v8 = d[1] + v5;
-        const double v9 = d[3] + v6;
-        const double v10 = v7 - X[0];
-        const double v11 = v10 - d[0];
-        const double v12 = 0.5 * v11;
-        const double v13 = 1.0 / v12;
-        const double v14 = d[2] * t[12];
-        const double v15 = t[5] + v14;
-        const double v16 = d[0] * t[12];
-        const double v17 = t[4] + v16;
-        const double v18 = parameters[6] * t[15];
-        const double v19 = parameters[6] * t[13];
-        const double v20 = t[2] + t[15];
-        const double v21 = t[0] + t[13];
-        const double v22 = v20 - t[0];
-        const double v23 = v22 - t[13];
-        const double v24 = 0.5 * v23;
-        const double v25 = v13 * v24;
-        const double v26 = v15 + v18;
-        const double v27 = v17 + v19;
-        const double v28 = t[1] + t[14];
-        const double v29 = v28 - t[6];
-        const double v30 = t[3] + t[16];
-        const double v31 = v30 - t[6];
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 6 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0, p4 = 0.0, p5 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[6 * i] * d[4 + i];
-                p1 += B[6 * i + 1] * d[4 + i];
-                p2 += B[6 * i + 2] * d[4 + i];
-                p3 += B[6 * i + 3] * d[4 + i];
-                p4 += B[6 * i + 4] * d[4 + i];
-                p5 += B[6 * i + 5] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5;
-            double t0 = 0.0, t1 = 0.0, t2 = 0.0, t3 = 0.0, t4 = 0.0, t5 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                t0 += B[6 * i] * t[17 + i];
-                t1 += B[6 * i + 1] * t[17 + i];
-                t2 += B[6 * i + 2] * t[17 + i];
-                t3 += B[6 * i + 3] * t[17 + i];
-                t4 += B[6 * i + 4] * t[17 + i];
-                t5 += B[6 * i + 5] * t[17 + i];
-            }
-            (void)t0, (void)t1, (void)t2, (void)t3, (void)t4, (void)t5;
-            const double v32 = 0.5 * w[0];
-            const double v33 = 0.5 - v32;
-            const double v34 = v33 * v21;
-            const double v35 = 0.5 + v32;
-            const double v36 = v35 * v20;
-            const double v37 = v36 + v34;
-            const double v38 = w[1] * v24;
-            const double v39 = v35 * v31;
-            const double v40 = v33 * v29;
-            const double v41 = v40 + v39;
-            const double v42 = v35 * v2;
-            const double v43 = parameters[1] - v42;
-            const double v44 = v33 * v4;
-            const double v45 = v43 - v44;
-            const int v46 = 0.0 < v45;
-            const double v47 = 1.0 - p2;
-            const double v48 = v35 * v26;
-            const double v49 = t[7] - v48;
-            const double v50 = v33 * v27;
-            const double v51 = v49 - v50;
-            const double v52 = 1.0 - p4;
-            double v53, v54, v55, v56;
-            if (v46) {
-                const double v57 = v45 * t2;
-                const double v58 = v47 * v51;
-                const double v59 = v58 - v57;
-                v53 = v45;
-                v54 = 0.0;
-                v55 = v59;
-                v56 = 0.0;
-            } else {
-                const double v60 = v45 * t4;
-                const double v61 = v52 * v51;
-                const double v62 = v61 - v60;
-                v53 = 0.0;
-                v54 = v45;
-                v55 = 0.0;
-                v56 = v62;
-            }
-            const double v63 = v47 * v53;
-            const double v64 = v52 * v54;
-            const double v65 = v64 + v63;
-            const double v66 = v35 * v9;
-            const double v67 = v33 * v8;
-            const double v68 = v67 + v66;
-            const double v69 = 1.0 / v68;
-            const double v70 = v69 * v65;
-            const double v71 = v41 * v70;
-            const double v72 = v56 + v55;
-            const double v73 = v72 - v71;
-            const double v74 = p0 * parameters[3];
-            const double v75 = exp(v74);
-            const double v76 = parameters[2] * v75;
-            const double v77 = v76 * v73;
-            const double v78 = parameters[3] * t0;
-            const double v79 = p0 * t[9];
-            const double v80 = v79 + v78;
-            const double v81 = v76 * v80;
-            const double v82 = v75 * t[8];
-            const double v83 = v82 + v81;
-            const double v84 = v65 * v83;
-            const double v85 = v84 + v77;
-            const double v86 = v69 * v85;
-            const double v87 = p1 * v13;
-            const double v88 = 0.5 * v87;
-            const double v89 = v88 * v41;
-            const double v90 = 0.5 * v68;
-            const double v91 = p1 * v25;
-            const double v92 = t1 - v91;
-            const double v93 = v13 * v92;
-            const double v94 = v90 * v93;
-            const double v95 = v94 + v89;
-            const double v96 = v86 - v95;
-            const double v97 = v90 * v72;
-            const double v98 = 0.5 * v65;
-            const double v99 = v98 * v41;
-            const double v100 = v99 + v97;
-            const double v101 = 1.0 / v76;
-            const double v102 = v101 * v87;
-            const double v103 = v102 * v83;
-            const double v104 = v103 - v93;
-            const double v105 = v68 * v68;
-            const double v106 = v68 * v105;
-            const double v107 = v106 * v104;
-            const double v108 = 0.08333333333333333 * v107;
-            const double v109 = 0.25 * v105;
-            const double v110 = v87 * v109;
-            const double v111 = v110 * v41;
-            const double v112 = v108 - v111;
-            const double v113 = v101 * v112;
-            const double v114 = v100 + v113;
-            const double v115 = v95 + v86;
-            double *restrict out = values + 13 * (points * e + q);
-            out[0] = v37;
-            out[1] = v38;
-            out[2] = v41;
-            out[3] = t0;
-            out[4] = v96;
-            out[5] = v114;
-            out[6] = v115;
-            out[7] = v83;
-            out[8] = v41;
-            out[11] = t2;
-            out[12] = t4;
-        }
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            double *restrict out = values + 13 * (points * e + q);
-            out[9] = 0.0;
-            out[10] = 0.0;
-        }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_conserving_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + (13 + (4 + modes)) * e, parameters, rule, basis, values + (13 * points) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_conserving_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + (13 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (13 * points) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double a[SOFTEHL_LANES * 2];
+    softehl_pad(a, data, 2, n);
+    double t[SOFTEHL_LANES * (13 + (4 + modes))];
+    softehl_pad(t, direction, (13 + (4 + modes)), n);
+    double R[SOFTEHL_LANES * (13 * points)];
+    softehl_film_conserving_fields_rate(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (13 * points) * n; ++i) values[i] = R[i];
+#endif
 }

@@ -25,6 +25,210 @@
  */
 #include "softehl_kernels.h"
 
+static void softehl_film_pseudo_load_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V t0, t1, t2, t3;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
+    (void)t0; (void)t1; (void)t2; (void)t3;
+    V t4, t5, t6, t7;
+    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
+    (void)t4; (void)t5; (void)t6; (void)t7;
+    V t8, t9, t10;
+    softehl_load3(t + 8, 11, &t8, &t9, &t10);
+    (void)t8; (void)t9; (void)t10;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5];
+    const V v2 = parameters[2] * t7;
+    const V v3 = X2 + d2;
+    const V v4 = 6.283185307179586 * t9;
+    const V v5 = t2 - t0;
+    const V v6 = 0.5 * v5;
+    const V v7 = X1 - parameters[0];
+    const V v8 = X3 - parameters[0];
+    const V v9 = v3 - X0;
+    const V v10 = X3 + d3;
+    const V v11 = v9 - d0;
+    const V v12 = 0.5 * v11;
+    const V v13 = d3 + v8;
+    const V v14 = parameters[4] * v6;
+    const double v15 = 0.5 * parameters[6];
+    const V v16 = v10 - X1;
+    const V v17 = d1 + v7;
+    const V v18 = v16 - d1;
+    const V v19 = 0.5 * v18;
+    const V v20 = 1.0 / v12;
+    const V v21 = v12 * t8;
+    const V v22 = v14 + v21;
+    const V v23 = v12 * v12;
+    const V v24 = v12 * v6;
+    const V v25 = t3 - t1;
+    const V v26 = t1 - t4;
+    const V v27 = t3 - t4;
+    const V v28 = v19 * v19;
+    const V v29 = v28 + v23;
+    const V v30 = 0.5 * v25;
+    const V v31 = v19 * v30;
+    const V v32 = v31 + v24;
+    const V v33 = softehl_vsqrt(v29);
+    const V v34 = 1.0 / v29;
+    const V v35 = parameters[6] * v33;
+    const V v36 = softehl_vsqrt(v34);
+    const V v37 = v36 * v15;
+    const V v38 = v20 * v20;
+    const V v39 = v38 * v6;
+    const V v40 = 2.0 * v32;
+    const V v41 = v40 * v37;
+    const V v42 = v33 * t10;
+    const V v43 = v42 + v41;
+    V s44 = softehl_splat(0.0);
+    V s45 = softehl_splat(0.0);
+    V s46 = softehl_splat(0.0);
+    V s47 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i];
+            p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1;
+        const double v48 = 0.5 * w[0];
+        const double v49 = 0.5 - v48;
+        const double v50 = 0.5 + v48;
+        const V v51 = p0 * parameters[3];
+        const V v52 = -p0;
+        const V v53 = p0 * v19;
+        const V v54 = softehl_vexp(v51);
+        const V v55 = p0 * v2;
+        const V v56 = t6 + v55;
+        const M v57 = softehl_lt(softehl_splat(0.0), v52);
+        const V v58 = p0 * v30;
+        const V v59 = v49 * v17;
+        const V v60 = v49 * v26;
+        const V v61 = p1 * v20;
+        const V v62 = p1 * v39;
+        const V v63 = v50 * v13;
+        const V v64 = v59 + v63;
+        const V v65 = v50 * v27;
+        const V v66 = v60 + v65;
+        const V v67 = parameters[0] + v64;
+        const V v68 = 0.5 * v64;
+        const V v69 = 1.0 / v64;
+        const V v70 = t4 + v66;
+        const V v71 = 0.5 * v66;
+        const V v72 = v68 * v62;
+        const V v73 = v61 * v71;
+        const V v74 = v72 - v73;
+        const V v75 = v67 * v4;
+        const V v76 = v67 * v1;
+        const V v77 = v1 * v70;
+        const V v78 = v77 + v75;
+        const V v79 = v54 * v56;
+        const V v80 = parameters[2] * v54;
+        const V v81 = v76 * v6;
+        const V v82 = v12 * v78;
+        const V v83 = v81 + v82;
+        const V v84 = p0 * v83;
+        const V v85 = v80 * t5;
+        const V v86 = parameters[1] * v80;
+        const V v87 = parameters[1] * v79;
+        const V v88 = v85 + v87;
+        const V v89 = v86 * v69;
+        const V v90 = v89 * v66;
+        const V v91 = v88 - v90;
+        const V v92 = v69 * v91;
+        const V v93 = v74 + v92;
+        const V v94 = v68 * v61;
+        const V v95 = v89 - v94;
+        const V v96 = v95 * v43;
+        const V v97 = v58 - v96;
+        const V v98 = v95 * v35;
+        const V v99 = v53 - v98;
+        const V v100 = v35 * v93;
+        const V v101 = v97 - v100;
+        const V v102 = v99 * v78;
+        const V v103 = v76 * v101;
+        const V v104 = v102 + v103;
+        const V v105 = w[1] * v84;
+        const V v106 = w[1] * v104;
+        const V v107 = v50 * v105;
+        s44 += v107;
+        const V v108 = v49 * v105;
+        s45 += v108;
+        const V v109 = v50 * v106;
+        s46 += v109;
+        const V v110 = v49 * v106;
+        s47 += v110;
+        V v111 = softehl_splat(0.0);
+        const M m112 = v57;
+        if (softehl_any(m112)) {
+            const V v113 = p0 * v22;
+            const V v114 = w[1] * v113;
+            const V v115 = -v114;
+            v111 = softehl_blend(m112, v115, v111);
+        }
+        const V v116 = 1.0 / v80;
+        const V v117 = parameters[1] * v71;
+        const V v118 = v64 * v64;
+        const V v119 = v64 * v118;
+        const V v120 = 0.25 * v118;
+        const V v121 = v68 * t5;
+        const V v122 = v117 + v121;
+        const V v123 = v61 * v120;
+        const V v124 = v116 * v61;
+        const V v125 = v79 * v124;
+        const V v126 = v62 + v125;
+        const V v127 = v119 * v126;
+        const V v128 = 0.08333333333333333 * v127;
+        const V v129 = v66 * v123;
+        const V v130 = v128 - v129;
+        const V v131 = v116 * v130;
+        const V v132 = v122 + v131;
+        const V v133 = w[1] * v132;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[2 * i], D = B[2 * i + 1];
+            (void)N, (void)D;
+            R_lanes[4 + i] += N * v111 + D * v133;
+        }
+    }
+    const V v134 = -s44;
+    const V v135 = -s45;
+    R_lanes[0] = s47;
+    R_lanes[1] = v135;
+    R_lanes[2] = s46;
+    R_lanes[3] = v134;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+}
+
 void softehl_film_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -33,178 +237,163 @@ void softehl_film_pseudo_load(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict t = direction + 11 * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d; (void)t;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = X[2] + d[2];
-        const double v4 = d[1] + v1;
-        const double v5 = d[3] + v2;
-        const double v6 = v3 - X[0];
-        const double v7 = v6 - d[0];
-        const double v8 = 0.5 * v7;
-        const double v9 = X[3] + d[3];
-        const double v10 = v9 - X[1];
-        const double v11 = v10 - d[1];
-        const double v12 = 0.5 * v11;
-        const double v13 = 1.0 / v8;
-        const double v14 = v12 * v12;
-        const double v15 = v8 * v8;
-        const double v16 = v14 + v15;
-        const double v17 = sqrt(v16);
-        const double v18 = parameters[6] * v17;
-        const double v19 = 6.283185307179586 * parameters[5];
-        const double v20 = 1.0 / v16;
-        const double v21 = sqrt(v20);
-        const double v22 = t[1] - t[4];
-        const double v23 = t[3] - t[4];
-        const double v24 = parameters[2] * t[7];
-        const double v25 = 0.5 * parameters[6];
-        const double v26 = v13 * v13;
-        const double v27 = t[2] - t[0];
-        const double v28 = 0.5 * v27;
-        const double v29 = t[3] - t[1];
-        const double v30 = 0.5 * v29;
-        const double v31 = parameters[4] * v28;
-        const double v32 = v12 * v30;
-        const double v33 = v8 * v28;
-        const double v34 = v32 + v33;
-        const double v35 = 2.0 * v34;
-        const double v36 = v26 * v28;
-        const double v37 = v8 * t[8];
-        const double v38 = v31 + v37;
-        const double v39 = v17 * t[10];
-        const double v40 = v21 * v25;
-        const double v41 = v35 * v40;
-        const double v42 = v39 + v41;
-        const double v43 = 6.283185307179586 * t[9];
-        double s44 = 0.0;
-        double s45 = 0.0;
-        double s46 = 0.0;
-        double s47 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            const double v48 = 0.5 * w[0];
-            const double v49 = 0.5 + v48;
-            const double v50 = v49 * v5;
-            const double v51 = 0.5 - v48;
-            const double v52 = v51 * v4;
-            const double v53 = v52 + v50;
-            const double v54 = parameters[0] + v53;
-            const double v55 = v54 * v43;
-            const double v56 = v49 * v23;
-            const double v57 = v51 * v22;
-            const double v58 = v57 + v56;
-            const double v59 = t[4] + v58;
-            const double v60 = v19 * v59;
-            const double v61 = v60 + v55;
-            const double v62 = v8 * v61;
-            const double v63 = v54 * v19;
-            const double v64 = v63 * v28;
-            const double v65 = v64 + v62;
-            const double v66 = p0 * v65;
-            const double v67 = w[1] * v66;
-            const double v68 = v49 * v67;
-            const double v69 = v51 * v67;
-            const double v70 = 0.5 * v53;
-            const double v71 = p1 * v13;
-            const double v72 = v70 * v71;
-            const double v73 = 1.0 / v53;
-            const double v74 = p0 * parameters[3];
-            const double v75 = exp(v74);
-            const double v76 = parameters[2] * v75;
-            const double v77 = parameters[1] * v76;
-            const double v78 = v77 * v73;
-            const double v79 = v78 - v72;
-            const double v80 = v79 * v42;
-            const double v81 = p0 * v30;
-            const double v82 = v81 - v80;
-            const double v83 = v78 * v58;
-            const double v84 = p0 * v24;
-            const double v85 = t[6] + v84;
-            const double v86 = v75 * v85;
-            const double v87 = parameters[1] * v86;
-            const double v88 = v76 * t[5];
-            const double v89 = v88 + v87;
-            const double v90 = v89 - v83;
-            const double v91 = v73 * v90;
-            const double v92 = p1 * v36;
-            const double v93 = v70 * v92;
-            const double v94 = v93 + v91;
-            const double v95 = 0.5 * v58;
-            const double v96 = v71 * v95;
-            const double v97 = v94 - v96;
-            const double v98 = v18 * v97;
-            const double v99 = v82 - v98;
-            const double v100 = v63 * v99;
-            const double v101 = v79 * v18;
-            const double v102 = p0 * v12;
-            const double v103 = v102 - v101;
-            const double v104 = v103 * v61;
-            const double v105 = v104 + v100;
-            const double v106 = w[1] * v105;
-            const double v107 = v49 * v106;
-            const double v108 = v51 * v106;
-            const double v109 = -p0;
-            const int v110 = 0.0 < v109;
-            double v111;
-            if (v110) {
-                const double v112 = p0 * v38;
-                const double v113 = w[1] * v112;
-                const double v114 = -v113;
-                v111 = v114;
-            } else {
-                v111 = 0.0;
-            }
-            const double v115 = 1.0 / v76;
-            const double v116 = v115 * v71;
-            const double v117 = v86 * v116;
-            const double v118 = v92 + v117;
-            const double v119 = v53 * v53;
-            const double v120 = v53 * v119;
-            const double v121 = v120 * v118;
-            const double v122 = 0.08333333333333333 * v121;
-            const double v123 = 0.25 * v119;
-            const double v124 = v71 * v123;
-            const double v125 = v58 * v124;
-            const double v126 = v122 - v125;
-            const double v127 = v115 * v126;
-            const double v128 = v70 * t[5];
-            const double v129 = parameters[1] * v95;
-            const double v130 = v129 + v128;
-            const double v131 = v130 + v127;
-            const double v132 = w[1] * v131;
-            s44 += v68;
-            s45 += v69;
-            s46 += v107;
-            s47 += v108;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[2 * i], D = B[2 * i + 1];
-                (void)N, (void)D;
-                R[4 + i] += N * v111 + D * v132;
-            }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + 11 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
+        return;
+    }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double t[SOFTEHL_LANES * 11];
+    softehl_pad(t, direction, 11, n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    softehl_film_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+#endif
+}
+
+static void softehl_film_fields_rate_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V t0, t1, t2, t3;
+    softehl_load4(t + 0, (11 + (4 + modes)), &t0, &t1, &t2, &t3);
+    (void)t0; (void)t1; (void)t2; (void)t3;
+    V t4, t5, t6, t7;
+    softehl_load4(t + 4, (11 + (4 + modes)), &t4, &t5, &t6, &t7);
+    (void)t4; (void)t5; (void)t6; (void)t7;
+    V t8, t9, t10, t11;
+    softehl_load4(t + 8, (11 + (4 + modes)), &t8, &t9, &t10, &t11);
+    (void)t8; (void)t9; (void)t10; (void)t11;
+    V t12, t13, t14;
+    softehl_load3(t + 12, (11 + (4 + modes)), &t12, &t13, &t14);
+    (void)t12; (void)t13; (void)t14;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V t_lanes[(11 + (4 + modes))];
+#else
+    const V *const t_lanes = t;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(t_lanes, t, (11 + (4 + modes)));
+#endif
+    const V v1 = X2 + d2;
+    const V v2 = X1 - parameters[0];
+    const V v3 = X3 - parameters[0];
+    const V v4 = d1 + v2;
+    const V v5 = d3 + v3;
+    const V v6 = t2 + t13;
+    const V v7 = t1 + t12;
+    const V v8 = t3 + t14;
+    const V v9 = v1 - X0;
+    const V v10 = v9 - d0;
+    const V v11 = 0.5 * v10;
+    const V v12 = v7 - t4;
+    const V v13 = v8 - t4;
+    const V v14 = v6 - t0;
+    const V v15 = 1.0 / v11;
+    const V v16 = t0 + t11;
+    const V v17 = v14 - t11;
+    const V v18 = 0.5 * v17;
+    const V v19 = v15 * v18;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i];
+            p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        const double v133 = -s45;
-        const double v134 = -s44;
-        R[0] = s47;
-        R[1] = v133;
-        R[2] = s46;
-        R[3] = v134;
+        (void)p0, (void)p1;
+        V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            tp0 += B[2 * i] * t_lanes[15 + i];
+            tp1 += B[2 * i + 1] * t_lanes[15 + i];
+        }
+        (void)tp0, (void)tp1;
+        const double v20 = 0.5 * w[0];
+        const V v21 = w[1] * v18;
+        const double v22 = 0.5 - v20;
+        const double v23 = 0.5 + v20;
+        const V v24 = p0 * t7;
+        const V v25 = p0 * parameters[3];
+        const V v26 = parameters[3] * tp0;
+        const V v27 = v24 + v26;
+        const V v28 = softehl_vexp(v25);
+        const V v29 = p1 * v19;
+        const V v30 = tp1 - v29;
+        const V v31 = p1 * v15;
+        const V v32 = v15 * v30;
+        const V v33 = v22 * v4;
+        const V v34 = v23 * v6;
+        const V v35 = v22 * v12;
+        const V v36 = v22 * v16;
+        const V v37 = v34 + v36;
+        const V v38 = v23 * v5;
+        const V v39 = v33 + v38;
+        const V v40 = v23 * v13;
+        const V v41 = v35 + v40;
+        const V v42 = 0.5 * v39;
+        const V v43 = 1.0 / v39;
+        const V v44 = v39 * v39;
+        const V v45 = 0.5 * v41;
+        const V v46 = v39 * v44;
+        const V v47 = 0.25 * v44;
+        const V v48 = v31 * v47;
+        const V v49 = v42 * v32;
+        const V v50 = v42 * t5;
+        const V v51 = parameters[2] * v28;
+        const V v52 = v28 * t6;
+        const V v53 = v51 * v27;
+        const V v54 = v52 + v53;
+        const V v55 = v31 * v45;
+        const V v56 = v49 + v55;
+        const V v57 = v51 * t5;
+        const V v58 = parameters[1] * v45;
+        const V v59 = v50 + v58;
+        const V v60 = 1.0 / v51;
+        const V v61 = v60 * v31;
+        const V v62 = v51 * v43;
+        const V v63 = v61 * v54;
+        const V v64 = v63 - v32;
+        const V v65 = v46 * v64;
+        const V v66 = v41 * v62;
+        const V v67 = v54 - v66;
+        const V v68 = parameters[1] * v67;
+        const V v69 = v57 + v68;
+        const V v70 = v43 * v69;
+        const V v71 = 0.08333333333333333 * v65;
+        const V v72 = v48 * v41;
+        const V v73 = v71 - v72;
+        const V v74 = v60 * v73;
+        const V v75 = v59 + v74;
+        const V v76 = v56 + v70;
+        const V v77 = v70 - v56;
+        softehl_store4(R + 8 * q + 0, (8 * points), v37, v21, v41, tp0);
+        softehl_store4(R + 8 * q + 4, (8 * points), v77, v75, v76, v54);
     }
 }
 
@@ -216,115 +405,23 @@ void softehl_film_fields_rate(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict t = direction + (11 + (4 + modes)) * e;
-        (void)X; (void)d; (void)t;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = X[2] + d[2];
-        const double v4 = d[1] + v1;
-        const double v5 = d[3] + v2;
-        const double v6 = v3 - X[0];
-        const double v7 = v6 - d[0];
-        const double v8 = 0.5 * v7;
-        const double v9 = 1.0 / v8;
-        const double v10 = t[2] + t[13];
-        const double v11 = t[0] + t[11];
-        const double v12 = v10 - t[0];
-        const double v13 = v12 - t[11];
-        const double v14 = 0.5 * v13;
-        const double v15 = v9 * v14;
-        const double v16 = t[1] + t[12];
-        const double v17 = v16 - t[4];
-        const double v18 = t[3] + t[14];
-        const double v19 = v18 - t[4];
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            double t0 = 0.0, t1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                t0 += B[2 * i] * t[15 + i];
-                t1 += B[2 * i + 1] * t[15 + i];
-            }
-            (void)t0, (void)t1;
-            const double v20 = 0.5 * w[0];
-            const double v21 = 0.5 - v20;
-            const double v22 = v21 * v11;
-            const double v23 = 0.5 + v20;
-            const double v24 = v23 * v10;
-            const double v25 = v24 + v22;
-            const double v26 = w[1] * v14;
-            const double v27 = v23 * v19;
-            const double v28 = v21 * v17;
-            const double v29 = v28 + v27;
-            const double v30 = v23 * v5;
-            const double v31 = v21 * v4;
-            const double v32 = v31 + v30;
-            const double v33 = 1.0 / v32;
-            const double v34 = p0 * parameters[3];
-            const double v35 = exp(v34);
-            const double v36 = parameters[2] * v35;
-            const double v37 = v36 * v33;
-            const double v38 = v29 * v37;
-            const double v39 = parameters[3] * t0;
-            const double v40 = p0 * t[7];
-            const double v41 = v40 + v39;
-            const double v42 = v36 * v41;
-            const double v43 = v35 * t[6];
-            const double v44 = v43 + v42;
-            const double v45 = v44 - v38;
-            const double v46 = parameters[1] * v45;
-            const double v47 = v36 * t[5];
-            const double v48 = v47 + v46;
-            const double v49 = v33 * v48;
-            const double v50 = 0.5 * v29;
-            const double v51 = p1 * v9;
-            const double v52 = v51 * v50;
-            const double v53 = 0.5 * v32;
-            const double v54 = p1 * v15;
-            const double v55 = t1 - v54;
-            const double v56 = v9 * v55;
-            const double v57 = v53 * v56;
-            const double v58 = v57 + v52;
-            const double v59 = v49 - v58;
-            const double v60 = 1.0 / v36;
-            const double v61 = v60 * v51;
-            const double v62 = v61 * v44;
-            const double v63 = v62 - v56;
-            const double v64 = v32 * v32;
-            const double v65 = v32 * v64;
-            const double v66 = v65 * v63;
-            const double v67 = 0.08333333333333333 * v66;
-            const double v68 = 0.25 * v64;
-            const double v69 = v51 * v68;
-            const double v70 = v69 * v29;
-            const double v71 = v67 - v70;
-            const double v72 = v60 * v71;
-            const double v73 = parameters[1] * v50;
-            const double v74 = v53 * t[5];
-            const double v75 = v74 + v73;
-            const double v76 = v75 + v72;
-            const double v77 = v58 + v49;
-            double *restrict out = values + 8 * (points * e + q);
-            out[0] = v25;
-            out[1] = v26;
-            out[2] = v29;
-            out[3] = t0;
-            out[4] = v59;
-            out[5] = v76;
-            out[6] = v77;
-            out[7] = v44;
-        }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + (11 + (4 + modes)) * e, parameters, rule, basis, values + (8 * points) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + (11 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (8 * points) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double t[SOFTEHL_LANES * (11 + (4 + modes))];
+    softehl_pad(t, direction, (11 + (4 + modes)), n);
+    double R[SOFTEHL_LANES * (8 * points)];
+    softehl_film_fields_rate(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (8 * points) * n; ++i) values[i] = R[i];
+#endif
 }

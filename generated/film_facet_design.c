@@ -21,6 +21,137 @@
  */
 #include "softehl_kernels.h"
 
+static void softehl_film_facet_pseudo_load_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V X4, X5;
+    softehl_load2(X + 4, 6, &X4, &X5);
+    (void)X4; (void)X5;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (6 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V d4, d5;
+    softehl_load2(d + 4, (6 + modes), &d4, &d5);
+    (void)d4; (void)d5;
+    V t0, t1, t2, t3;
+    softehl_load4(t + 0, 10, &t0, &t1, &t2, &t3);
+    (void)t0; (void)t1; (void)t2; (void)t3;
+    V t4, t5, t6, t7;
+    softehl_load4(t + 4, 10, &t4, &t5, &t6, &t7);
+    (void)t4; (void)t5; (void)t6; (void)t7;
+    V t8, t9;
+    softehl_load2(t + 8, 10, &t8, &t9);
+    (void)t8; (void)t9;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(6 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (6 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(6 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (6 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const V v1 = X0 + d0;
+    const V v2 = X2 + d2;
+    const V v3 = X4 + d4;
+    const V v4 = X3 - parameters[0];
+    const V v5 = parameters[2] * t9;
+    const V v6 = d3 + v4;
+    const V v7 = v2 - v1;
+    const V v8 = v3 - v2;
+    const V v9 = t3 - t6;
+    const V v10 = 0.5 * v7;
+    const V v11 = 0.5 * v8;
+    const V v12 = v6 * v6;
+    const V v13 = 0.08333333333333333 * v6;
+    const V v14 = v6 * t7;
+    const V v15 = t4 - t2;
+    const V v16 = v12 * v13;
+    const V v17 = 0.25 * v12;
+    const V v18 = 0.5 * v15;
+    const V v19 = t2 - t0;
+    const V v20 = parameters[1] * v9;
+    const V v21 = v14 + v20;
+    const V v22 = 0.5 * v19;
+    const V v23 = v17 * v9;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 1 * q;
+        (void)w;
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[6 + i];
+            p1 += B[4 * i + 1] * d_lanes[6 + i];
+            p2 += B[4 * i + 2] * d_lanes[6 + i];
+            p3 += B[4 * i + 3] * d_lanes[6 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3;
+        const V v24 = p0 * parameters[3];
+        const V v25 = p2 * parameters[3];
+        const V v26 = p0 * v5;
+        const V v27 = p2 * v5;
+        const V v28 = p0 - p2;
+        const V v29 = softehl_vexp(v24);
+        const V v30 = softehl_vexp(v25);
+        const V v31 = 0.5 * v28;
+        const V v32 = t8 + v26;
+        const V v33 = t8 + v27;
+        const V v34 = v29 * v32;
+        const V v35 = w[0] * v31;
+        const V v36 = v30 * v33;
+        const V v37 = parameters[2] * v29;
+        const V v38 = parameters[2] * v30;
+        const V v39 = v37 * v22;
+        const V v40 = v10 * v34;
+        const V v41 = v39 + v40;
+        const V v42 = v37 * v10;
+        const V v43 = 1.0 / v42;
+        const V v44 = v38 * v18;
+        const V v45 = v11 * v36;
+        const V v46 = v44 + v45;
+        const V v47 = v38 * v11;
+        const V v48 = 1.0 / v47;
+        const V v49 = v16 * v43;
+        const V v50 = v49 * v41;
+        const V v51 = v16 * v48;
+        const V v52 = v51 * v46;
+        const V v53 = v50 - v23;
+        const V v54 = v43 * v53;
+        const V v55 = v52 - v23;
+        const V v56 = v48 * v55;
+        const V v57 = p1 * v54;
+        const V v58 = v21 + v57;
+        const V v59 = v35 * v54;
+        const V v60 = v35 * v56;
+        const V v61 = p3 * v56;
+        const V v62 = v61 + v58;
+        const V v63 = 0.5 * v62;
+        const V v64 = w[0] * v63;
+        const V v65 = -v64;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
+            (void)N, (void)D, (void)N1, (void)D1;
+            R_lanes[6 + i] += N * v65 + D * v59 + N1 * v64 + D1 * v60;
+        }
+    }
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (6 + modes));
+#endif
+}
+
 void softehl_film_facet_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -29,104 +160,173 @@ void softehl_film_facet_pseudo_load(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 6 * e;
-        const double *restrict d = dofs + (6 + modes) * e;
-        const double *restrict t = direction + 10 * e;
-        double *restrict R = values + (6 + modes) * e;
-        (void)X; (void)d; (void)t;
-        for (ptrdiff_t i = 0; i < (6 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[3] - parameters[0];
-        const double v2 = X[2] + d[2];
-        const double v3 = d[3] + v1;
-        const double v4 = v3 * v3;
-        const double v5 = 0.08333333333333333 * v3;
-        const double v6 = X[0] + d[0];
-        const double v7 = X[4] + d[4];
-        const double v8 = v2 - v6;
-        const double v9 = v7 - v2;
-        const double v10 = 0.5 * v8;
-        const double v11 = 0.5 * v9;
-        const double v12 = 0.25 * v4;
-        const double v13 = v4 * v5;
-        const double v14 = t[3] - t[6];
-        const double v15 = parameters[2] * t[9];
-        const double v16 = v12 * v14;
-        const double v17 = v3 * t[7];
-        const double v18 = parameters[1] * v14;
-        const double v19 = v17 + v18;
-        const double v20 = t[2] - t[0];
-        const double v21 = t[4] - t[2];
-        const double v22 = 0.5 * v20;
-        const double v23 = 0.5 * v21;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q;
-            (void)w;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[6 + i];
-                p1 += B[4 * i + 1] * d[6 + i];
-                p2 += B[4 * i + 2] * d[6 + i];
-                p3 += B[4 * i + 3] * d[6 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v24 = p0 * v15;
-            const double v25 = t[8] + v24;
-            const double v26 = p0 * parameters[3];
-            const double v27 = exp(v26);
-            const double v28 = v27 * v25;
-            const double v29 = v10 * v28;
-            const double v30 = parameters[2] * v27;
-            const double v31 = v30 * v22;
-            const double v32 = v31 + v29;
-            const double v33 = v30 * v10;
-            const double v34 = 1.0 / v33;
-            const double v35 = v13 * v34;
-            const double v36 = v35 * v32;
-            const double v37 = v36 - v16;
-            const double v38 = v34 * v37;
-            const double v39 = p1 * v38;
-            const double v40 = v19 + v39;
-            const double v41 = p2 * v15;
-            const double v42 = t[8] + v41;
-            const double v43 = p2 * parameters[3];
-            const double v44 = exp(v43);
-            const double v45 = v44 * v42;
-            const double v46 = v11 * v45;
-            const double v47 = parameters[2] * v44;
-            const double v48 = v47 * v23;
-            const double v49 = v48 + v46;
-            const double v50 = v47 * v11;
-            const double v51 = 1.0 / v50;
-            const double v52 = v13 * v51;
-            const double v53 = v52 * v49;
-            const double v54 = v53 - v16;
-            const double v55 = v51 * v54;
-            const double v56 = p3 * v55;
-            const double v57 = v56 + v40;
-            const double v58 = 0.5 * v57;
-            const double v59 = w[0] * v58;
-            const double v60 = -v59;
-            const double v61 = p0 - p2;
-            const double v62 = 0.5 * v61;
-            const double v63 = w[0] * v62;
-            const double v64 = v63 * v38;
-            const double v65 = v63 * v55;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1;
-                R[6 + i] += N * v60 + D * v64 + N1 * v59 + D1 * v65;
-            }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_facet_pseudo_load_group(points, modes, coordinates + 6 * e, dofs + (6 + modes) * e, 0, direction + 10 * e, parameters, rule, basis, values + (6 + modes) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_facet_pseudo_load_group(points, modes, coordinates + 6 * (n - SOFTEHL_LANES), dofs + (6 + modes) * (n - SOFTEHL_LANES), 0, direction + 10 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (6 + modes) * (n - SOFTEHL_LANES), 0);
+        return;
+    }
+    double X[SOFTEHL_LANES * 6];
+    softehl_pad(X, coordinates, 6, n);
+    double d[SOFTEHL_LANES * (6 + modes)];
+    softehl_pad(d, dofs, (6 + modes), n);
+    double t[SOFTEHL_LANES * 10];
+    softehl_pad(t, direction, 10, n);
+    double R[SOFTEHL_LANES * (6 + modes)];
+    softehl_film_facet_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (6 + modes) * n; ++i) values[i] = R[i];
+#endif
+}
+
+static void softehl_film_facet_fields_rate_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V X4, X5;
+    softehl_load2(X + 4, 6, &X4, &X5);
+    (void)X4; (void)X5;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (6 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V d4, d5;
+    softehl_load2(d + 4, (6 + modes), &d4, &d5);
+    (void)d4; (void)d5;
+    V t0, t1, t2, t3;
+    softehl_load4(t + 0, (10 + (6 + modes)), &t0, &t1, &t2, &t3);
+    (void)t0; (void)t1; (void)t2; (void)t3;
+    V t4, t5, t6, t7;
+    softehl_load4(t + 4, (10 + (6 + modes)), &t4, &t5, &t6, &t7);
+    (void)t4; (void)t5; (void)t6; (void)t7;
+    V t8, t9, t10, t11;
+    softehl_load4(t + 8, (10 + (6 + modes)), &t8, &t9, &t10, &t11);
+    (void)t8; (void)t9; (void)t10; (void)t11;
+    V t12, t13, t14, t15;
+    softehl_load4(t + 12, (10 + (6 + modes)), &t12, &t13, &t14, &t15);
+    (void)t12; (void)t13; (void)t14; (void)t15;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(6 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (6 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V t_lanes[(10 + (6 + modes))];
+#else
+    const V *const t_lanes = t;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(t_lanes, t, (10 + (6 + modes)));
+#endif
+    const V v1 = X0 + d0;
+    const V v2 = X2 + d2;
+    const V v3 = X4 + d4;
+    const V v4 = X3 - parameters[0];
+    const V v5 = d3 + v4;
+    const V v6 = v2 - v1;
+    const V v7 = t2 + t12;
+    const V v8 = v3 - v2;
+    const V v9 = 0.5 * v6;
+    const V v10 = t3 - t6;
+    const V v11 = 0.5 * v8;
+    const V v12 = t4 + t14;
+    const V v13 = v5 * v5;
+    const V v14 = 0.08333333333333333 * v5;
+    const V v15 = v5 * t7;
+    const V v16 = v10 + t13;
+    const V v17 = v12 - v7;
+    const V v18 = v13 * v14;
+    const V v19 = 0.25 * v13;
+    const V v20 = parameters[1] * v16;
+    const V v21 = v15 + v20;
+    const V v22 = 0.5 * v17;
+    const V v23 = v7 - t0;
+    const V v24 = v19 * v16;
+    const V v25 = v23 - t10;
+    const V v26 = 0.5 * v21;
+    const V v27 = 0.5 * v25;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 1 * q;
+        (void)w;
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[6 + i];
+            p1 += B[4 * i + 1] * d_lanes[6 + i];
+            p2 += B[4 * i + 2] * d_lanes[6 + i];
+            p3 += B[4 * i + 3] * d_lanes[6 + i];
         }
-        R[0] = 0.0;
-        R[1] = 0.0;
-        R[2] = 0.0;
-        R[3] = 0.0;
-        R[4] = 0.0;
-        R[5] = 0.0;
+        (void)p0, (void)p1, (void)p2, (void)p3;
+        V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            tp0 += B[4 * i] * t_lanes[16 + i];
+            tp1 += B[4 * i + 1] * t_lanes[16 + i];
+            tp2 += B[4 * i + 2] * t_lanes[16 + i];
+            tp3 += B[4 * i + 3] * t_lanes[16 + i];
+        }
+        (void)tp0, (void)tp1, (void)tp2, (void)tp3;
+        const V v28 = parameters[3] * tp0;
+        const V v29 = p0 * parameters[3];
+        const V v30 = p2 * parameters[3];
+        const V v31 = p2 * t9;
+        const V v32 = p0 * t9;
+        const V v33 = v32 + v28;
+        const V v34 = softehl_vexp(v29);
+        const V v35 = softehl_vexp(v30);
+        const V v36 = tp0 - tp2;
+        const V v37 = parameters[3] * tp2;
+        const V v38 = v31 + v37;
+        const V v39 = parameters[2] * v34;
+        const V v40 = parameters[2] * v35;
+        const V v41 = v39 * v33;
+        const V v42 = v40 * v38;
+        const V v43 = v34 * t8;
+        const V v44 = v43 + v41;
+        const V v45 = v35 * t8;
+        const V v46 = v45 + v42;
+        const V v47 = v39 * v27;
+        const V v48 = v9 * v44;
+        const V v49 = v47 + v48;
+        const V v50 = v39 * v9;
+        const V v51 = 1.0 / v50;
+        const V v52 = v40 * v22;
+        const V v53 = v11 * v46;
+        const V v54 = v52 + v53;
+        const V v55 = v40 * v11;
+        const V v56 = 1.0 / v55;
+        const V v57 = v18 * v51;
+        const V v58 = v18 * v56;
+        const V v59 = v57 * v49;
+        const V v60 = v57 * tp1;
+        const V v61 = v26 - v60;
+        const V v62 = v58 * v54;
+        const V v63 = v58 * tp3;
+        const V v64 = v26 - v63;
+        const V v65 = v59 - v24;
+        const V v66 = v51 * v65;
+        const V v67 = v62 - v24;
+        const V v68 = v56 * v67;
+        const V v69 = p1 * v66;
+        const V v70 = v69 + v61;
+        const V v71 = p3 * v68;
+        const V v72 = v71 + v64;
+        const V v73 = v70 + v72;
+        const V v74 = v70 - v72;
+        const V v75 = 0.5 * v73;
+        softehl_store3(R + 5 * q + 2, (5 * points), v36, v75, v74);
+    }
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        softehl_store2(R + 5 * q + 0, (5 * points), v7, v16);
     }
 }
 
@@ -138,117 +338,23 @@ void softehl_film_facet_fields_rate(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 6 * e;
-        const double *restrict d = dofs + (6 + modes) * e;
-        const double *restrict t = direction + (10 + (6 + modes)) * e;
-        (void)X; (void)d; (void)t;
-        const double v1 = t[2] + t[12];
-        const double v2 = t[3] + t[13];
-        const double v3 = v2 - t[6];
-        const double v4 = X[3] - parameters[0];
-        const double v5 = X[2] + d[2];
-        const double v6 = d[3] + v4;
-        const double v7 = v6 * v6;
-        const double v8 = 0.08333333333333333 * v6;
-        const double v9 = X[0] + d[0];
-        const double v10 = X[4] + d[4];
-        const double v11 = v5 - v9;
-        const double v12 = v10 - v5;
-        const double v13 = 0.5 * v11;
-        const double v14 = 0.5 * v12;
-        const double v15 = 0.25 * v7;
-        const double v16 = v7 * v8;
-        const double v17 = v6 * t[7];
-        const double v18 = t[4] + t[14];
-        const double v19 = v15 * v3;
-        const double v20 = parameters[1] * v3;
-        const double v21 = v1 - t[0];
-        const double v22 = v21 - t[10];
-        const double v23 = v18 - v1;
-        const double v24 = v17 + v20;
-        const double v25 = 0.5 * v22;
-        const double v26 = 0.5 * v23;
-        const double v27 = 0.5 * v24;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q;
-            (void)w;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[6 + i];
-                p1 += B[4 * i + 1] * d[6 + i];
-                p2 += B[4 * i + 2] * d[6 + i];
-                p3 += B[4 * i + 3] * d[6 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            double t0 = 0.0, t1 = 0.0, t2 = 0.0, t3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                t0 += B[4 * i] * t[16 + i];
-                t1 += B[4 * i + 1] * t[16 + i];
-                t2 += B[4 * i + 2] * t[16 + i];
-                t3 += B[4 * i + 3] * t[16 + i];
-            }
-            (void)t0, (void)t1, (void)t2, (void)t3;
-            const double v28 = t0 - t2;
-            const double v29 = parameters[3] * t2;
-            const double v30 = p2 * t[9];
-            const double v31 = v30 + v29;
-            const double v32 = p2 * parameters[3];
-            const double v33 = exp(v32);
-            const double v34 = parameters[2] * v33;
-            const double v35 = v34 * v31;
-            const double v36 = v33 * t[8];
-            const double v37 = v36 + v35;
-            const double v38 = v14 * v37;
-            const double v39 = v34 * v26;
-            const double v40 = v39 + v38;
-            const double v41 = v34 * v14;
-            const double v42 = 1.0 / v41;
-            const double v43 = v16 * v42;
-            const double v44 = v43 * v40;
-            const double v45 = v44 - v19;
-            const double v46 = v42 * v45;
-            const double v47 = p3 * v46;
-            const double v48 = v43 * t3;
-            const double v49 = v47 - v48;
-            const double v50 = v27 + v49;
-            const double v51 = parameters[3] * t0;
-            const double v52 = p0 * t[9];
-            const double v53 = v52 + v51;
-            const double v54 = p0 * parameters[3];
-            const double v55 = exp(v54);
-            const double v56 = parameters[2] * v55;
-            const double v57 = v56 * v53;
-            const double v58 = v55 * t[8];
-            const double v59 = v58 + v57;
-            const double v60 = v13 * v59;
-            const double v61 = v56 * v25;
-            const double v62 = v61 + v60;
-            const double v63 = v56 * v13;
-            const double v64 = 1.0 / v63;
-            const double v65 = v16 * v64;
-            const double v66 = v65 * v62;
-            const double v67 = v66 - v19;
-            const double v68 = v64 * v67;
-            const double v69 = p1 * v68;
-            const double v70 = v65 * t1;
-            const double v71 = v69 - v70;
-            const double v72 = v27 + v71;
-            const double v73 = v72 + v50;
-            const double v74 = 0.5 * v73;
-            const double v75 = v72 - v50;
-            double *restrict out = values + 5 * (points * e + q);
-            out[2] = v28;
-            out[3] = v74;
-            out[4] = v75;
-        }
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            double *restrict out = values + 5 * (points * e + q);
-            out[0] = v1;
-            out[1] = v3;
-        }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_facet_fields_rate_group(points, modes, coordinates + 6 * e, dofs + (6 + modes) * e, 0, direction + (10 + (6 + modes)) * e, parameters, rule, basis, values + (5 * points) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_facet_fields_rate_group(points, modes, coordinates + 6 * (n - SOFTEHL_LANES), dofs + (6 + modes) * (n - SOFTEHL_LANES), 0, direction + (10 + (6 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (5 * points) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 6];
+    softehl_pad(X, coordinates, 6, n);
+    double d[SOFTEHL_LANES * (6 + modes)];
+    softehl_pad(d, dofs, (6 + modes), n);
+    double t[SOFTEHL_LANES * (10 + (6 + modes))];
+    softehl_pad(t, direction, (10 + (6 + modes)), n);
+    double R[SOFTEHL_LANES * (5 * points)];
+    softehl_film_facet_fields_rate(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (5 * points) * n; ++i) values[i] = R[i];
+#endif
 }

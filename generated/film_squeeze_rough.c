@@ -18,6 +18,8 @@
  */
 #include "softehl_kernels.h"
 
+SOFTEHL_LANEWISE(erfc)
+
 void softehl_film_squeeze_rough_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -97,6 +99,140 @@ void softehl_film_squeeze_rough_residual(
     }
 }
 
+static void softehl_film_squeeze_rough_tangent_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+#if SOFTEHL_LANES > 1
+    V K_lanes[((4 + modes) * (4 + modes))];
+#else
+    V *const K_lanes = K;
+#endif
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
+        K_lanes[i] = softehl_splat(0.0);
+    const V v1 = X2 + d2;
+    const double v2 = 1.0 / parameters[2];
+    const V v3 = X1 - parameters[0];
+    const V v4 = X3 - parameters[0];
+    const V v5 = d1 + v3;
+    const V v6 = d3 + v4;
+    const double v7 = 0.5 * parameters[1];
+    const V v8 = v1 - X0;
+    const V v9 = v8 - d0;
+    const V v10 = 0.5 * v9;
+    const V v11 = parameters[1] * v10;
+    const V v12 = parameters[2] * v11;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict b = a + 0 + 1 * q;
+        V b0;
+        softehl_load1(b + 0, (0 + 1 * points), &b0);
+        (void)b0;
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[4 + i];
+            p1 += B[4 * i + 1] * d_lanes[4 + i];
+            p2 += B[4 * i + 2] * d_lanes[4 + i];
+            p3 += B[4 * i + 3] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3;
+        const double v13 = 0.5 * w[0];
+        const V v14 = 1.0 - p2;
+        const double v15 = 0.5 - v13;
+        const double v16 = 0.5 + v13;
+        const V v17 = v14 * v12;
+        const V v18 = v14 * v7;
+        const V v19 = parameters[1] * v14;
+        const double v20 = parameters[1] * w[1];
+        const V v21 = v15 * v5;
+        const double v22 = v15 * v2;
+        const double v23 = v16 * v2;
+        const V v24 = v16 * v6;
+        const V v25 = v21 + v24;
+        const V v26 = v2 * v25;
+        const V v27 = w[1] * v18;
+        const double v28 = w[1] * v22;
+        const double v29 = w[1] * v23;
+        const V v30 = 0.5 * v26;
+        const V v31 = v26 * v30;
+        const V v32 = -v31;
+        const V v33 = 0.7071067811865476 * v26;
+        const V v34 = 0.3989422804014327 * v26;
+        const V v35 = softehl_vexp(v32);
+        const V v36 = softehl_verfc(v33);
+        const V v37 = 0.5 * v36;
+        const V v38 = 1.0 - v37;
+        const V v39 = v33 * v33;
+        const V v40 = -v39;
+        const V v41 = softehl_vexp(v40);
+        const V v42 = v26 * v38;
+        const V v43 = 0.3989422804014327 * v35;
+        const V v44 = v42 + v43;
+        const V v45 = parameters[2] * v44;
+        const V v46 = v27 * v45;
+        const V v47 = -v46;
+        const V v48 = v10 * v45;
+        const V v49 = v19 * v48;
+        const V v50 = b0 + v49;
+        const V v51 = w[1] * v50;
+        const V v52 = v20 * v48;
+        const V v53 = -v51;
+        const V v54 = v41 - v35;
+        const V v55 = v34 * v54;
+        const V v56 = v38 + v55;
+        const V v57 = v17 * v56;
+        const V v58 = v28 * v57;
+        const V v59 = v29 * v57;
+        const V v60 = -v58;
+        const V v61 = -v59;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
+            (void)N, (void)D, (void)N1, (void)D1;
+            R_lanes[4 + i] += N * v53;
+            K_lanes[(4 + i) * (4 + modes) + 0] += N * v46;
+            K_lanes[(4 + i) * (4 + modes) + 1] += N * v60;
+            K_lanes[(4 + i) * (4 + modes) + 2] += N * v47;
+            K_lanes[(4 + i) * (4 + modes) + 3] += N * v61;
+            const V r0 = softehl_splat(0.0);
+            const V r1 = softehl_splat(0.0);
+            const V r2 = N * v52;
+            const V r3 = softehl_splat(0.0);
+            for (ptrdiff_t j = 0; j < modes; ++j)
+                K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[4 * j] + r1 * B[4 * j + 1] + r2 * B[4 * j + 2] + r3 * B[4 * j + 3];
+        }
+    }
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+    softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
+#endif
+}
+
 void softehl_film_squeeze_rough_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -105,128 +241,27 @@ void softehl_film_squeeze_rough_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)direction;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + (0 + 1 * points) * e;
-        double *restrict R = values + (4 + modes) * e;
-        double *restrict K = tangent + (4 + modes) * (4 + modes) * e;
-        (void)X; (void)d; (void)a;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        for (ptrdiff_t i = 0; i < (4 + modes) * (4 + modes); ++i) K[i] = 0.0;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = 1.0 / parameters[2];
-        const double v4 = d[1] + v1;
-        const double v5 = d[3] + v2;
-        const double v6 = X[2] + d[2];
-        const double v7 = v6 - X[0];
-        const double v8 = v7 - d[0];
-        const double v9 = 0.5 * v8;
-        const double v10 = parameters[1] * v9;
-        const double v11 = parameters[2] * v10;
-        const double v12 = 0.5 * parameters[1];
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict b = a + 0 + 1 * q;
-            (void)b;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i];
-                p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i];
-                p3 += B[4 * i + 3] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v13 = 0.5 * w[0];
-            const double v14 = 0.5 + v13;
-            const double v15 = v14 * v5;
-            const double v16 = 0.5 - v13;
-            const double v17 = v16 * v4;
-            const double v18 = v17 + v15;
-            const double v19 = v3 * v18;
-            const double v20 = 0.5 * v19;
-            const double v21 = v19 * v20;
-            const double v22 = -v21;
-            const double v23 = exp(v22);
-            const double v24 = 0.3989422804014327 * v23;
-            const double v25 = 0.7071067811865476 * v19;
-            const double v26 = erfc(v25);
-            const double v27 = 0.5 * v26;
-            const double v28 = 1.0 - v27;
-            const double v29 = v19 * v28;
-            const double v30 = v29 + v24;
-            const double v31 = parameters[2] * v30;
-            const double v32 = v9 * v31;
-            const double v33 = 1.0 - p2;
-            const double v34 = parameters[1] * v33;
-            const double v35 = v34 * v32;
-            const double v36 = b[0] + v35;
-            const double v37 = w[1] * v36;
-            const double v38 = -v37;
-            const double v39 = v33 * v12;
-            const double v40 = w[1] * v39;
-            const double v41 = v40 * v31;
-            const double v42 = v25 * v25;
-            const double v43 = -v42;
-            const double v44 = exp(v43);
-            const double v45 = v44 - v23;
-            const double v46 = 0.3989422804014327 * v19;
-            const double v47 = v46 * v45;
-            const double v48 = v28 + v47;
-            const double v49 = v33 * v11;
-            const double v50 = v49 * v48;
-            const double v51 = v16 * v3;
-            const double v52 = w[1] * v51;
-            const double v53 = v52 * v50;
-            const double v54 = -v53;
-            const double v55 = -v41;
-            const double v56 = v14 * v3;
-            const double v57 = w[1] * v56;
-            const double v58 = v57 * v50;
-            const double v59 = -v58;
-            const double v60 = parameters[1] * w[1];
-            const double v61 = v60 * v32;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1;
-                R[4 + i] += N * v38;
-                K[(4 + i) * (4 + modes) + 0] += N * v41;
-                K[(4 + i) * (4 + modes) + 1] += N * v54;
-                K[(4 + i) * (4 + modes) + 2] += N * v55;
-                K[(4 + i) * (4 + modes) + 3] += N * v59;
-                const double r0 = 0.0;
-                const double r1 = 0.0;
-                const double r2 = N * v61;
-                const double r3 = 0.0;
-                for (ptrdiff_t j = 0; j < modes; ++j)
-                    K[(4 + i) * (4 + modes) + 4 + j] += r0 * B[4 * j] + r1 * B[4 * j + 1] + r2 * B[4 * j + 2] + r3 * B[4 * j + 3];
-            }
-        }
-        R[0] = 0.0;
-        R[1] = 0.0;
-        R[2] = 0.0;
-        R[3] = 0.0;
-        K[0 * (4 + modes) + 0] = 0.0;
-        K[0 * (4 + modes) + 1] = 0.0;
-        K[0 * (4 + modes) + 2] = 0.0;
-        K[0 * (4 + modes) + 3] = 0.0;
-        K[1 * (4 + modes) + 0] = 0.0;
-        K[1 * (4 + modes) + 1] = 0.0;
-        K[1 * (4 + modes) + 2] = 0.0;
-        K[1 * (4 + modes) + 3] = 0.0;
-        K[2 * (4 + modes) + 0] = 0.0;
-        K[2 * (4 + modes) + 1] = 0.0;
-        K[2 * (4 + modes) + 2] = 0.0;
-        K[2 * (4 + modes) + 3] = 0.0;
-        K[3 * (4 + modes) + 0] = 0.0;
-        K[3 * (4 + modes) + 1] = 0.0;
-        K[3 * (4 + modes) + 2] = 0.0;
-        K[3 * (4 + modes) + 3] = 0.0;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_squeeze_rough_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + (0 + 1 * points) * e, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_squeeze_rough_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + (0 + 1 * points) * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double a[SOFTEHL_LANES * (0 + 1 * points)];
+    softehl_pad(a, data, (0 + 1 * points), n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
+    softehl_film_squeeze_rough_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
+#endif
 }
 
 void softehl_film_squeeze_rough_fields(

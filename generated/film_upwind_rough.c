@@ -17,6 +17,121 @@
  */
 #include "softehl_kernels.h"
 
+static void softehl_film_upwind_rough_residual_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 1.0 / parameters[0];
+    const double v2 = 6.0 * parameters[2];
+    const V v3 = X2 + d2;
+    const double v4 = parameters[5] * parameters[6];
+    const double v5 = parameters[3] * v2;
+    const V v6 = X1 - parameters[1];
+    const V v7 = X3 - parameters[1];
+    const V v8 = d1 + v6;
+    const V v9 = d3 + v7;
+    const V v10 = v3 - X0;
+    const V v11 = v10 - d0;
+    const V v12 = 0.5 * v11;
+    const V v13 = v9 - v8;
+    const V v14 = v8 + v9;
+    const V v15 = v5 * v12;
+    const V v16 = v4 * v12;
+    const V v17 = v12 * v15;
+    const V v18 = 0.5 * v14;
+    const V v19 = 5.0 * v13;
+    const V v20 = 0.5 * v13;
+    const V v21 = v1 * v18;
+    const V v22 = parameters[1] + v18;
+    const M v23 = softehl_le(softehl_splat(0.5), v21);
+    V v24 = v21;
+    const M m25 = ~v23;
+    if (softehl_any(m25)) {
+        const V v26 = 1.0 - v21;
+        const V v27 = 4.0 * v26;
+        const V v28 = 1.0 / v27;
+        v24 = softehl_blend(m25, v28, v24);
+    }
+    const V v29 = parameters[0] * v24;
+    const V v30 = 1.0 / v29;
+    const V v31 = v19 * v30;
+    const V v32 = parameters[2] * v31;
+    const M v33 = softehl_le(v32, softehl_splat(0.0));
+    V v34 = softehl_splat(1.0);
+    const M m35 = ~v33;
+    if (softehl_any(m35)) {
+        const V v36 = v31 * v31;
+        const V v37 = 1.0 + v36;
+        const V v38 = 1.0 / v37;
+        v34 = softehl_blend(m35, v38, v34);
+    }
+    const double v39 = 3.141592653589793 * parameters[4];
+    const V v40 = 3.141592653589793 * v16;
+    const V v41 = v29 * v39;
+    const V v42 = v29 * v41;
+    const V v43 = v29 * v42;
+    const V v44 = 1.0 / v43;
+    const V v45 = v17 * v44;
+    const V v46 = v45 * v45;
+    const V v47 = v40 * v46;
+    const V v48 = 9.0 + v46;
+    const V v49 = 1.0 / v48;
+    const V v50 = v34 * v47;
+    const V v51 = v49 * v50;
+    V s52 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i];
+            p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1;
+        const V v53 = p1 * v51;
+        const double v54 = 0.5 * w[0];
+        const V v55 = w[0] * v22;
+        const double v56 = w[0] * v54;
+        const double v57 = (-0.16666666666666666) + v56;
+        const V v58 = w[1] * v53;
+        const V v59 = v57 * v20;
+        const V v60 = v59 + v55;
+        const V v61 = v60 * v58;
+        s52 += v61;
+    }
+    const V v62 = -s52;
+    R_lanes[1] = v62;
+    R_lanes[3] = s52;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+}
+
 void softehl_film_upwind_rough_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -25,102 +140,256 @@ void softehl_film_upwind_rough_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[1];
-        const double v2 = X[3] - parameters[1];
-        const double v3 = 1.0 / parameters[0];
-        const double v4 = 6.0 * parameters[2];
-        const double v5 = parameters[3] * v4;
-        const double v6 = d[1] + v1;
-        const double v7 = d[3] + v2;
-        const double v8 = v7 - v6;
-        const double v9 = 5.0 * v8;
-        const double v10 = parameters[5] * parameters[6];
-        const double v11 = X[2] + d[2];
-        const double v12 = v11 - X[0];
-        const double v13 = v12 - d[0];
-        const double v14 = 0.5 * v13;
-        const double v15 = v5 * v14;
-        const double v16 = v14 * v15;
-        const double v17 = v10 * v14;
-        const double v18 = v6 + v7;
-        const double v19 = 0.5 * v18;
-        const double v20 = 0.5 * v8;
-        const double v21 = v3 * v19;
-        const int v22 = 0.5 <= v21;
-        const double v23 = parameters[1] + v19;
-        double v24;
-        if (v22) {
-            v24 = v21;
-        } else {
-            const double v25 = 1.0 - v21;
-            const double v26 = 4.0 * v25;
-            const double v27 = 1.0 / v26;
-            v24 = v27;
-        }
-        const double v28 = parameters[0] * v24;
-        const double v29 = 1.0 / v28;
-        const double v30 = v9 * v29;
-        const double v31 = parameters[2] * v30;
-        const int v32 = v31 <= 0.0;
-        double v33;
-        if (v32) {
-            v33 = 1.0;
-        } else {
-            const double v34 = v30 * v30;
-            const double v35 = 1.0 + v34;
-            const double v36 = 1.0 / v35;
-            v33 = v36;
-        }
-        const double v37 = 3.141592653589793 * parameters[4];
-        const double v38 = 3.141592653589793 * v17;
-        const double v39 = v28 * v37;
-        const double v40 = v28 * v39;
-        const double v41 = v28 * v40;
-        const double v42 = 1.0 / v41;
-        const double v43 = v16 * v42;
-        const double v44 = v43 * v43;
-        const double v45 = v38 * v44;
-        const double v46 = 9.0 + v44;
-        const double v47 = 1.0 / v46;
-        const double v48 = v33 * v45;
-        const double v49 = v47 * v48;
-        double s50 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            const double v51 = w[0] * v23;
-            const double v52 = 0.5 * w[0];
-            const double v53 = w[0] * v52;
-            const double v54 = (-0.16666666666666666) + v53;
-            const double v55 = v54 * v20;
-            const double v56 = v55 + v51;
-            const double v57 = p1 * v49;
-            const double v58 = w[1] * v57;
-            const double v59 = v56 * v58;
-            s50 += v59;
-        }
-        const double v60 = -s50;
-        R[0] = 0.0;
-        R[1] = v60;
-        R[2] = 0.0;
-        R[3] = s50;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_upwind_rough_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_upwind_rough_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    softehl_film_upwind_rough_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+#endif
+}
+
+static void softehl_film_upwind_rough_tangent_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+#if SOFTEHL_LANES > 1
+    V K_lanes[((4 + modes) * (4 + modes))];
+#else
+    V *const K_lanes = K;
+#endif
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
+        K_lanes[i] = softehl_splat(0.0);
+    const double v1 = 1.0 / parameters[0];
+    const double v2 = 6.0 * parameters[2];
+    const V v3 = X2 + d2;
+    const double v4 = parameters[5] * parameters[6];
+    const double v5 = parameters[3] * v2;
+    const V v6 = X1 - parameters[1];
+    const V v7 = X3 - parameters[1];
+    const V v8 = d1 + v6;
+    const V v9 = d3 + v7;
+    const V v10 = v3 - X0;
+    const V v11 = v10 - d0;
+    const V v12 = 0.5 * v11;
+    const V v13 = v9 - v8;
+    const V v14 = v8 + v9;
+    const V v15 = v5 * v12;
+    const V v16 = v4 * v12;
+    const V v17 = 0.5 * v14;
+    const V v18 = 5.0 * v13;
+    const V v19 = 0.5 * v13;
+    const V v20 = v1 * v17;
+    const V v21 = parameters[1] + v17;
+    const M v22 = softehl_le(softehl_splat(0.5), v20);
+    V v23 = softehl_splat(0.0);
+    V v24 = softehl_splat(0.0);
+    const M m25 = v22;
+    if (softehl_any(m25)) {
+        const double v26 = 0.5 * v1;
+        v23 = softehl_blend(m25, v20, v23);
+        v24 = softehl_blend(m25, softehl_splat(v26), v24);
+    }
+    const M m27 = ~v22;
+    if (softehl_any(m27)) {
+        const double v28 = 2.0 * v1;
+        const V v29 = 1.0 - v20;
+        const V v30 = 4.0 * v29;
+        const V v31 = 1.0 / v30;
+        const V v32 = v31 * v28;
+        const V v33 = v31 * v32;
+        v23 = softehl_blend(m27, v31, v23);
+        v24 = softehl_blend(m27, v33, v24);
+    }
+    const double v34 = 3.141592653589793 * parameters[4];
+    const V v35 = v12 * v12;
+    const V v36 = parameters[0] * v23;
+    const V v37 = parameters[0] * v24;
+    const V v38 = v5 * v35;
+    const V v39 = v36 * v34;
+    const V v40 = 1.0 / v36;
+    const V v41 = v36 * v36;
+    const V v42 = v39 * v41;
+    const V v43 = v18 * v40;
+    const V v44 = parameters[2] * v43;
+    const M v45 = softehl_le(v44, softehl_splat(0.0));
+    const V v46 = 1.0 / v42;
+    const V v47 = v38 * v46;
+    const V v48 = v47 * v47;
+    V v49 = softehl_splat(1.0);
+    V v50 = softehl_splat(0.0);
+    V v51 = softehl_splat(0.0);
+    const M m52 = ~v45;
+    if (softehl_any(m52)) {
+        const V v53 = 2.0 * v43;
+        const V v54 = 5.0 * v40;
+        const V v55 = v40 * v43;
+        const V v56 = v43 * v43;
+        const V v57 = 1.0 + v56;
+        const V v58 = v53 * v48;
+        const V v59 = 1.0 / v57;
+        const V v60 = v37 * v55;
+        const V v61 = v54 + v60;
+        const V v62 = v54 - v60;
+        const V v63 = v59 * v59;
+        const V v64 = v61 * v58;
+        const V v65 = v62 * v58;
+        const V v66 = v63 * v64;
+        const V v67 = v63 * v65;
+        const V v68 = -v67;
+        v49 = softehl_blend(m52, v59, v49);
+        v50 = softehl_blend(m52, v66, v50);
+        v51 = softehl_blend(m52, v68, v51);
+    }
+    const V v69 = 3.141592653589793 * v16;
+    const double v70 = 3.141592653589793 * v4;
+    const double v71 = 9.42477796076938 * parameters[4];
+    const V v72 = 2.0 * v47;
+    const V v73 = v38 * v71;
+    const V v74 = v15 * v46;
+    const V v75 = v72 * v74;
+    const V v76 = 9.0 + v48;
+    const V v77 = v49 * v48;
+    const V v78 = v41 * v73;
+    const V v79 = 1.0 / v76;
+    const V v80 = v70 * v77;
+    const V v81 = v46 * v78;
+    const V v82 = v46 * v81;
+    const V v83 = v75 * v77;
+    const V v84 = v37 * v82;
+    const V v85 = v72 * v84;
+    const V v86 = v79 * v80;
+    const V v87 = v12 * v86;
+    const V v88 = 0.5 * v86;
+    const V v89 = 0.5 * v87;
+    const V v90 = v49 * v79;
+    const V v91 = v75 * v90;
+    const V v92 = v49 * v85;
+    const V v93 = v50 - v92;
+    const V v94 = v51 - v92;
+    const V v95 = v79 * v93;
+    const V v96 = v79 * v94;
+    const V v97 = v79 * v79;
+    const V v98 = v97 * v83;
+    const V v99 = v77 * v97;
+    const V v100 = v85 * v99;
+    const V v101 = v100 + v95;
+    const V v102 = v100 + v96;
+    const V v103 = v69 * v101;
+    const V v104 = v69 * v102;
+    const V v105 = v91 - v98;
+    const V v106 = v69 * v105;
+    const V v107 = v88 + v106;
+    const V v108 = v98 - v91;
+    const V v109 = v69 * v108;
+    const V v110 = v109 - v88;
+    V s111 = softehl_splat(0.0);
+    V s112 = softehl_splat(0.0);
+    V s113 = softehl_splat(0.0);
+    V s114 = softehl_splat(0.0);
+    V s115 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i];
+            p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1;
+        const double v116 = 0.5 * w[0];
+        const V v117 = w[0] * v21;
+        const double v118 = w[0] * v116;
+        const double v119 = (-0.16666666666666666) + v118;
+        const V v120 = p1 * v89;
+        const V v121 = p1 * w[1];
+        const V v122 = w[1] * v110;
+        const V v123 = w[1] * v107;
+        const V v124 = w[0] * v120;
+        const V v125 = v119 * v120;
+        const V v126 = v119 * v19;
+        const V v127 = v126 + v117;
+        const V v128 = p1 * v127;
+        const V v129 = v127 * v87;
+        const V v130 = v121 * v129;
+        s111 += v130;
+        const V v131 = w[1] * v129;
+        const V v132 = -v131;
+        const V v133 = v128 * v122;
+        s112 += v133;
+        const V v134 = v124 - v125;
+        const V v135 = v124 + v125;
+        const V v136 = v128 * v123;
+        s113 += v136;
+        const V v137 = v128 * v103;
+        const V v138 = v137 + v134;
+        const V v139 = v128 * v104;
+        const V v140 = v139 + v135;
+        const V v141 = w[1] * v138;
+        s114 += v141;
+        const V v142 = w[1] * v140;
+        s115 += v142;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[2 * i], D = B[2 * i + 1];
+            (void)N, (void)D;
+            K_lanes[1 * (4 + modes) + 4 + i] += D * v132;
+            K_lanes[3 * (4 + modes) + 4 + i] += D * v131;
+        }
+    }
+    const V v143 = -s111;
+    const V v144 = -s112;
+    const V v145 = -s113;
+    const V v146 = -s114;
+    const V v147 = -s115;
+    R_lanes[1] = v143;
+    R_lanes[3] = s111;
+    K_lanes[1 * (4 + modes) + 0] = v144;
+    K_lanes[1 * (4 + modes) + 1] = v146;
+    K_lanes[1 * (4 + modes) + 2] = v145;
+    K_lanes[1 * (4 + modes) + 3] = v147;
+    K_lanes[3 * (4 + modes) + 0] = s112;
+    K_lanes[3 * (4 + modes) + 1] = s114;
+    K_lanes[3 * (4 + modes) + 2] = s113;
+    K_lanes[3 * (4 + modes) + 3] = s115;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+    softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
+#endif
 }
 
 void softehl_film_upwind_rough_tangent(
@@ -131,214 +400,23 @@ void softehl_film_upwind_rough_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)direction;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        double *restrict R = values + (4 + modes) * e;
-        double *restrict K = tangent + (4 + modes) * (4 + modes) * e;
-        (void)X; (void)d;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        for (ptrdiff_t i = 0; i < (4 + modes) * (4 + modes); ++i) K[i] = 0.0;
-        const double v1 = X[1] - parameters[1];
-        const double v2 = X[3] - parameters[1];
-        const double v3 = 1.0 / parameters[0];
-        const double v4 = 6.0 * parameters[2];
-        const double v5 = parameters[3] * v4;
-        const double v6 = d[1] + v1;
-        const double v7 = d[3] + v2;
-        const double v8 = v7 - v6;
-        const double v9 = 5.0 * v8;
-        const double v10 = parameters[5] * parameters[6];
-        const double v11 = X[2] + d[2];
-        const double v12 = v11 - X[0];
-        const double v13 = v12 - d[0];
-        const double v14 = 0.5 * v13;
-        const double v15 = v5 * v14;
-        const double v16 = v10 * v14;
-        const double v17 = v6 + v7;
-        const double v18 = 0.5 * v17;
-        const double v19 = 0.5 * v8;
-        const double v20 = v3 * v18;
-        const int v21 = 0.5 <= v20;
-        const double v22 = parameters[1] + v18;
-        double v23, v24;
-        if (v21) {
-            const double v25 = 0.5 * v3;
-            v23 = v20;
-            v24 = v25;
-        } else {
-            const double v26 = 1.0 - v20;
-            const double v27 = 4.0 * v26;
-            const double v28 = 1.0 / v27;
-            const double v29 = 2.0 * v3;
-            const double v30 = v28 * v29;
-            const double v31 = v28 * v30;
-            v23 = v28;
-            v24 = v31;
-        }
-        const double v32 = parameters[0] * v23;
-        const double v33 = 1.0 / v32;
-        const double v34 = v9 * v33;
-        const double v35 = parameters[2] * v34;
-        const int v36 = v35 <= 0.0;
-        const double v37 = parameters[0] * v24;
-        const double v38 = v14 * v14;
-        const double v39 = v5 * v38;
-        const double v40 = 3.141592653589793 * parameters[4];
-        const double v41 = v32 * v40;
-        const double v42 = v32 * v32;
-        const double v43 = v41 * v42;
-        const double v44 = 1.0 / v43;
-        const double v45 = v39 * v44;
-        const double v46 = v45 * v45;
-        double v47, v48, v49;
-        if (v36) {
-            v47 = 1.0;
-            v48 = 0.0;
-            v49 = 0.0;
-        } else {
-            const double v50 = v34 * v34;
-            const double v51 = 1.0 + v50;
-            const double v52 = 1.0 / v51;
-            const double v53 = 2.0 * v34;
-            const double v54 = 5.0 * v33;
-            const double v55 = v33 * v34;
-            const double v56 = v37 * v55;
-            const double v57 = v54 + v56;
-            const double v58 = v54 - v56;
-            const double v59 = v52 * v52;
-            const double v60 = v53 * v46;
-            const double v61 = v57 * v60;
-            const double v62 = v59 * v61;
-            const double v63 = v58 * v60;
-            const double v64 = v59 * v63;
-            const double v65 = -v64;
-            v47 = v52;
-            v48 = v62;
-            v49 = v65;
-        }
-        const double v66 = 3.141592653589793 * v16;
-        const double v67 = 3.141592653589793 * v10;
-        const double v68 = 9.42477796076938 * parameters[4];
-        const double v69 = v39 * v68;
-        const double v70 = 2.0 * v45;
-        const double v71 = v15 * v44;
-        const double v72 = v70 * v71;
-        const double v73 = v42 * v69;
-        const double v74 = v44 * v73;
-        const double v75 = v44 * v74;
-        const double v76 = v37 * v75;
-        const double v77 = v70 * v76;
-        const double v78 = 9.0 + v46;
-        const double v79 = v47 * v46;
-        const double v80 = 1.0 / v78;
-        const double v81 = v67 * v79;
-        const double v82 = v80 * v81;
-        const double v83 = v14 * v82;
-        const double v84 = 0.5 * v82;
-        const double v85 = v47 * v80;
-        const double v86 = v72 * v85;
-        const double v87 = v80 * v80;
-        const double v88 = v72 * v79;
-        const double v89 = v87 * v88;
-        const double v90 = 0.5 * v83;
-        const double v91 = v47 * v77;
-        const double v92 = v79 * v87;
-        const double v93 = v77 * v92;
-        const double v94 = v86 - v89;
-        const double v95 = v89 - v86;
-        const double v96 = v48 - v91;
-        const double v97 = v49 - v91;
-        const double v98 = v66 * v95;
-        const double v99 = v80 * v96;
-        const double v100 = v66 * v94;
-        const double v101 = v80 * v97;
-        const double v102 = v98 - v84;
-        const double v103 = v93 + v99;
-        const double v104 = v84 + v100;
-        const double v105 = v93 + v101;
-        const double v106 = v66 * v103;
-        const double v107 = v66 * v105;
-        double s108 = 0.0;
-        double s109 = 0.0;
-        double s110 = 0.0;
-        double s111 = 0.0;
-        double s112 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            const double v113 = w[0] * v22;
-            const double v114 = 0.5 * w[0];
-            const double v115 = w[0] * v114;
-            const double v116 = (-0.16666666666666666) + v115;
-            const double v117 = v116 * v19;
-            const double v118 = v117 + v113;
-            const double v119 = v118 * v83;
-            const double v120 = p1 * w[1];
-            const double v121 = v120 * v119;
-            const double v122 = p1 * v118;
-            const double v123 = w[1] * v102;
-            const double v124 = v122 * v123;
-            const double v125 = w[1] * v104;
-            const double v126 = v122 * v125;
-            const double v127 = v122 * v106;
-            const double v128 = p1 * v90;
-            const double v129 = w[0] * v128;
-            const double v130 = v129 + v127;
-            const double v131 = v116 * v128;
-            const double v132 = v130 - v131;
-            const double v133 = w[1] * v132;
-            const double v134 = v129 + v131;
-            const double v135 = v122 * v107;
-            const double v136 = v135 + v134;
-            const double v137 = w[1] * v136;
-            const double v138 = w[1] * v119;
-            const double v139 = -v138;
-            s108 += v121;
-            s109 += v124;
-            s110 += v126;
-            s111 += v133;
-            s112 += v137;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[2 * i], D = B[2 * i + 1];
-                (void)N, (void)D;
-                K[1 * (4 + modes) + 4 + i] += D * v139;
-                K[3 * (4 + modes) + 4 + i] += D * v138;
-            }
-        }
-        const double v140 = -s108;
-        const double v141 = -s109;
-        const double v142 = -s111;
-        const double v143 = -s110;
-        const double v144 = -s112;
-        R[0] = 0.0;
-        R[1] = v140;
-        R[2] = 0.0;
-        R[3] = s108;
-        K[0 * (4 + modes) + 0] = 0.0;
-        K[0 * (4 + modes) + 1] = 0.0;
-        K[0 * (4 + modes) + 2] = 0.0;
-        K[0 * (4 + modes) + 3] = 0.0;
-        K[1 * (4 + modes) + 0] = v141;
-        K[1 * (4 + modes) + 1] = v142;
-        K[1 * (4 + modes) + 2] = v143;
-        K[1 * (4 + modes) + 3] = v144;
-        K[2 * (4 + modes) + 0] = 0.0;
-        K[2 * (4 + modes) + 1] = 0.0;
-        K[2 * (4 + modes) + 2] = 0.0;
-        K[2 * (4 + modes) + 3] = 0.0;
-        K[3 * (4 + modes) + 0] = s109;
-        K[3 * (4 + modes) + 1] = s111;
-        K[3 * (4 + modes) + 2] = s110;
-        K[3 * (4 + modes) + 3] = s112;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_upwind_rough_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_upwind_rough_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
+    softehl_film_upwind_rough_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
+#endif
 }

@@ -17,6 +17,215 @@
  */
 #include "softehl_kernels.h"
 
+static void softehl_film_upwind_rough_pseudo_load_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V t0, t1, t2, t3;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
+    (void)t0; (void)t1; (void)t2; (void)t3;
+    V t4, t5, t6, t7;
+    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
+    (void)t4; (void)t5; (void)t6; (void)t7;
+    V t8, t9, t10;
+    softehl_load3(t + 8, 11, &t8, &t9, &t10);
+    (void)t8; (void)t9; (void)t10;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 1.0 / parameters[0];
+    const double v2 = 6.0 * parameters[2];
+    const V v3 = X2 + d2;
+    const V v4 = X1 - parameters[1];
+    const V v5 = X3 - parameters[1];
+    const V v6 = d1 + v4;
+    const V v7 = d3 + v5;
+    const V v8 = t2 - t0;
+    const V v9 = v2 * t7;
+    const double v10 = parameters[3] * v2;
+    const double v11 = 6.0 * parameters[3];
+    const V v12 = v3 - X0;
+    const V v13 = 0.5 * v8;
+    const V v14 = t6 * v11;
+    const V v15 = v9 + v14;
+    const V v16 = v12 - d0;
+    const double v17 = v1 * v1;
+    const V v18 = v6 + v7;
+    const V v19 = v7 - v6;
+    const V v20 = 0.5 * v16;
+    const V v21 = v10 * v16;
+    const V v22 = t4 * v17;
+    const V v23 = 0.5 * v18;
+    const V v24 = v13 * v21;
+    const V v25 = 5.0 * v19;
+    const V v26 = 0.5 * v19;
+    const V v27 = v20 * v20;
+    const V v28 = t1 - t5;
+    const V v29 = t3 - t5;
+    const V v30 = v1 * v23;
+    const V v31 = parameters[1] + v23;
+    const V v32 = v27 * v15;
+    const V v33 = v24 + v32;
+    const V v34 = v10 * v27;
+    const M v35 = softehl_le(softehl_splat(0.5), v30);
+    const V v36 = v28 + v29;
+    const V v37 = v29 - v28;
+    const double v38 = 3.141592653589793 * parameters[4];
+    const double v39 = 9.42477796076938 * parameters[4];
+    const V v40 = 0.5 * v36;
+    const V v41 = 0.5 * v37;
+    const V v42 = t5 + v40;
+    V v43 = softehl_splat(0.0);
+    V v44 = softehl_splat(0.0);
+    const M m45 = v35;
+    if (softehl_any(m45)) {
+        const V v46 = v1 * v40;
+        const V v47 = v23 * v22;
+        const V v48 = v46 - v47;
+        v43 = softehl_blend(m45, v30, v43);
+        v44 = softehl_blend(m45, v48, v44);
+    }
+    const M m49 = ~v35;
+    if (softehl_any(m49)) {
+        const V v50 = 2.0 * v18;
+        const double v51 = 4.0 * v1;
+        const V v52 = v1 * v50;
+        const V v53 = 4.0 - v52;
+        const V v54 = v22 * v50;
+        const V v55 = v51 * v40;
+        const V v56 = v54 - v55;
+        const V v57 = 1.0 / v53;
+        const V v58 = v57 * v57;
+        const V v59 = v56 * v58;
+        const V v60 = -v59;
+        v43 = softehl_blend(m49, v57, v43);
+        v44 = softehl_blend(m49, v60, v44);
+    }
+    const V v61 = t4 * v43;
+    const V v62 = parameters[0] * v43;
+    const V v63 = parameters[0] * v44;
+    const V v64 = v61 + v63;
+    const V v65 = 1.0 / v62;
+    const V v66 = v62 * v62;
+    const V v67 = v62 * v66;
+    const V v68 = v25 * v65;
+    const V v69 = parameters[2] * v68;
+    const M v70 = softehl_le(v69, softehl_splat(0.0));
+    const V v71 = v38 * v67;
+    const V v72 = 1.0 / v71;
+    const V v73 = v34 * v72;
+    const V v74 = v73 * v73;
+    V v75 = softehl_splat(1.0);
+    V v76 = softehl_splat(0.0);
+    const M m77 = ~v70;
+    if (softehl_any(m77)) {
+        const V v78 = 2.0 * v68;
+        const V v79 = v68 * v68;
+        const V v80 = 1.0 + v79;
+        const V v81 = v78 * v74;
+        const V v82 = 1.0 / v80;
+        const V v83 = t5 - t1;
+        const V v84 = v29 + v83;
+        const V v85 = 5.0 * v84;
+        const V v86 = v68 * v64;
+        const V v87 = v85 - v86;
+        const V v88 = v65 * v87;
+        const V v89 = v82 * v81;
+        const V v90 = v82 * v89;
+        const V v91 = v90 * v88;
+        const V v92 = -v91;
+        v75 = softehl_blend(m77, v82, v75);
+        v76 = softehl_blend(m77, v92, v76);
+    }
+    const V v93 = 3.141592653589793 * v67;
+    const V v94 = v39 * v66;
+    const V v95 = t8 * v93;
+    const double v96 = 3.141592653589793 * parameters[6];
+    const V v97 = 2.0 * v73;
+    const V v98 = v64 * v94;
+    const V v99 = v95 + v98;
+    const V v100 = v73 * v99;
+    const V v101 = v33 - v100;
+    const V v102 = 9.0 + v74;
+    const V v103 = v75 * v74;
+    const V v104 = 1.0 / v102;
+    const V v105 = 3.141592653589793 * v103;
+    const V v106 = v103 * v104;
+    const V v107 = v75 - v106;
+    const V v108 = v72 * v101;
+    const V v109 = v97 * v108;
+    const V v110 = v109 * v107;
+    const V v111 = v76 + v110;
+    const V v112 = v104 * v105;
+    const V v113 = v104 * v111;
+    const V v114 = v96 * v113;
+    const V v115 = parameters[6] * v112;
+    const V v116 = t10 * v112;
+    const V v117 = v116 + v114;
+    const V v118 = t9 * v115;
+    const V v119 = parameters[5] * v117;
+    const V v120 = v118 + v119;
+    const V v121 = parameters[5] * v115;
+    const V v122 = v13 * v121;
+    const V v123 = v20 * v120;
+    const V v124 = v122 + v123;
+    const V v125 = v20 * v121;
+    V s126 = softehl_splat(0.0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q;
+        (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i];
+            p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1;
+        const V v127 = p1 * w[1];
+        const double v128 = 0.5 * w[0];
+        const V v129 = w[0] * v31;
+        const double v130 = w[0] * v128;
+        const double v131 = (-0.16666666666666666) + v130;
+        const V v132 = w[0] * v42;
+        const V v133 = v131 * v26;
+        const V v134 = v133 + v129;
+        const V v135 = v131 * v41;
+        const V v136 = v135 + v132;
+        const V v137 = v136 * v125;
+        const V v138 = v134 * v124;
+        const V v139 = v137 + v138;
+        const V v140 = v127 * v139;
+        s126 += v140;
+    }
+    const V v141 = -s126;
+    R_lanes[1] = v141;
+    R_lanes[3] = s126;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+}
+
 void softehl_film_upwind_rough_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -25,180 +234,23 @@ void softehl_film_upwind_rough_pseudo_load(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)data;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict t = direction + 11 * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d; (void)t;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[1];
-        const double v2 = X[3] - parameters[1];
-        const double v3 = 1.0 / parameters[0];
-        const double v4 = 6.0 * parameters[2];
-        const double v5 = parameters[3] * v4;
-        const double v6 = d[1] + v1;
-        const double v7 = d[3] + v2;
-        const double v8 = v7 - v6;
-        const double v9 = 5.0 * v8;
-        const double v10 = X[2] + d[2];
-        const double v11 = v10 - X[0];
-        const double v12 = v11 - d[0];
-        const double v13 = 0.5 * v12;
-        const double v14 = v6 + v7;
-        const double v15 = 0.5 * v14;
-        const double v16 = 0.5 * v8;
-        const double v17 = v3 * v15;
-        const int v18 = 0.5 <= v17;
-        const double v19 = parameters[1] + v15;
-        const double v20 = 3.141592653589793 * parameters[4];
-        const double v21 = v13 * v13;
-        const double v22 = v5 * v21;
-        const double v23 = 9.42477796076938 * parameters[4];
-        const double v24 = t[1] - t[5];
-        const double v25 = t[3] - t[5];
-        const double v26 = v3 * v3;
-        const double v27 = t[4] * v26;
-        const double v28 = v4 * t[7];
-        const double v29 = 6.0 * parameters[3];
-        const double v30 = t[6] * v29;
-        const double v31 = v28 + v30;
-        const double v32 = t[2] - t[0];
-        const double v33 = 0.5 * v32;
-        const double v34 = v5 * v12;
-        const double v35 = v33 * v34;
-        const double v36 = v21 * v31;
-        const double v37 = v35 + v36;
-        const double v38 = v24 + v25;
-        const double v39 = v25 - v24;
-        const double v40 = 0.5 * v38;
-        const double v41 = 0.5 * v39;
-        const double v42 = t[5] + v40;
-        double v43, v44;
-        if (v18) {
-            const double v45 = v3 * v40;
-            const double v46 = v15 * v27;
-            const double v47 = v45 - v46;
-            v43 = v17;
-            v44 = v47;
-        } else {
-            const double v48 = 4.0 * v3;
-            const double v49 = 2.0 * v14;
-            const double v50 = v3 * v49;
-            const double v51 = v27 * v49;
-            const double v52 = v48 * v40;
-            const double v53 = 4.0 - v50;
-            const double v54 = v51 - v52;
-            const double v55 = 1.0 / v53;
-            const double v56 = v55 * v55;
-            const double v57 = v54 * v56;
-            const double v58 = -v57;
-            v43 = v55;
-            v44 = v58;
-        }
-        const double v59 = parameters[0] * v43;
-        const double v60 = 1.0 / v59;
-        const double v61 = v9 * v60;
-        const double v62 = parameters[2] * v61;
-        const int v63 = v62 <= 0.0;
-        const double v64 = v59 * v59;
-        const double v65 = v59 * v64;
-        const double v66 = t[4] * v43;
-        const double v67 = parameters[0] * v44;
-        const double v68 = v66 + v67;
-        const double v69 = v20 * v65;
-        const double v70 = 1.0 / v69;
-        const double v71 = v22 * v70;
-        const double v72 = v71 * v71;
-        double v73, v74;
-        if (v63) {
-            v73 = 1.0;
-            v74 = 0.0;
-        } else {
-            const double v75 = v61 * v61;
-            const double v76 = 2.0 * v61;
-            const double v77 = 1.0 + v75;
-            const double v78 = 1.0 / v77;
-            const double v79 = v61 * v68;
-            const double v80 = t[5] + v25;
-            const double v81 = v80 - t[1];
-            const double v82 = 5.0 * v81;
-            const double v83 = v82 - v79;
-            const double v84 = v60 * v83;
-            const double v85 = v76 * v72;
-            const double v86 = v78 * v85;
-            const double v87 = v78 * v86;
-            const double v88 = v84 * v87;
-            const double v89 = -v88;
-            v73 = v78;
-            v74 = v89;
-        }
-        const double v90 = 3.141592653589793 * parameters[6];
-        const double v91 = 3.141592653589793 * v65;
-        const double v92 = t[8] * v91;
-        const double v93 = v23 * v64;
-        const double v94 = 2.0 * v71;
-        const double v95 = 9.0 + v72;
-        const double v96 = v68 * v93;
-        const double v97 = v73 * v72;
-        const double v98 = 1.0 / v95;
-        const double v99 = v97 * v98;
-        const double v100 = 3.141592653589793 * v97;
-        const double v101 = v98 * v100;
-        const double v102 = parameters[6] * v101;
-        const double v103 = parameters[5] * v102;
-        const double v104 = v13 * v103;
-        const double v105 = t[10] * v101;
-        const double v106 = t[9] * v102;
-        const double v107 = v33 * v103;
-        const double v108 = v92 + v96;
-        const double v109 = v71 * v108;
-        const double v110 = v37 - v109;
-        const double v111 = v70 * v110;
-        const double v112 = v94 * v111;
-        const double v113 = v73 - v99;
-        const double v114 = v112 * v113;
-        const double v115 = v74 + v114;
-        const double v116 = v98 * v115;
-        const double v117 = v90 * v116;
-        const double v118 = v105 + v117;
-        const double v119 = parameters[5] * v118;
-        const double v120 = v106 + v119;
-        const double v121 = v13 * v120;
-        const double v122 = v107 + v121;
-        double s123 = 0.0;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            const double v124 = w[0] * v19;
-            const double v125 = 0.5 * w[0];
-            const double v126 = w[0] * v125;
-            const double v127 = (-0.16666666666666666) + v126;
-            const double v128 = v127 * v16;
-            const double v129 = v128 + v124;
-            const double v130 = v129 * v122;
-            const double v131 = w[0] * v42;
-            const double v132 = v127 * v41;
-            const double v133 = v132 + v131;
-            const double v134 = v133 * v104;
-            const double v135 = v134 + v130;
-            const double v136 = p1 * w[1];
-            const double v137 = v136 * v135;
-            s123 += v137;
-        }
-        const double v138 = -s123;
-        R[0] = 0.0;
-        R[1] = v138;
-        R[2] = 0.0;
-        R[3] = s123;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_film_upwind_rough_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + 11 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_film_upwind_rough_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 4];
+    softehl_pad(X, coordinates, 4, n);
+    double d[SOFTEHL_LANES * (4 + modes)];
+    softehl_pad(d, dofs, (4 + modes), n);
+    double t[SOFTEHL_LANES * 11];
+    softehl_pad(t, direction, 11, n);
+    double R[SOFTEHL_LANES * (4 + modes)];
+    softehl_film_upwind_rough_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
+#endif
 }

@@ -36,17 +36,17 @@ void softehl_film_void_pseudo_load(
         const double v6 = v3 + v5;
         const int v7 = 0.0 < v6;
         const double v8 = 2.0 * v3;
-        const double v9 = v3 * v3;
-        const double v10 = 1e-30 + v9;
-        const double v11 = v5 * v5;
-        const double v12 = v10 + v11;
-        const double v13 = 2.0 * v5;
-        const double v14 = 1.0 / v12;
+        const double v9 = v5 * v5;
+        const double v10 = 2.0 * v5;
+        const double v11 = 1e-30 + v9;
+        const double v12 = v3 * v3;
+        const double v13 = v11 + v12;
+        const double v14 = 1.0 / v13;
         const double v15 = sqrt(v14);
         const double v16 = 0.5 * v15;
         const double v17 = v4 * v5;
         const double v18 = t[2] * v17;
-        const double v19 = v13 * v18;
+        const double v19 = v10 * v18;
         const double v20 = v3 * t[1];
         const double v21 = t[0] + v20;
         const double v22 = v2 * v21;
@@ -56,10 +56,10 @@ void softehl_film_void_pseudo_load(
         const double v26 = v16 * v25;
         double v27;
         if (v7) {
-            const double v28 = sqrt(v12);
+            const double v28 = sqrt(v13);
             const double v29 = v6 + v28;
             const double v30 = 1.0 / v29;
-            const double v31 = v13 * v22;
+            const double v31 = v10 * v22;
             const double v32 = v23 + v26;
             const double v33 = v5 * v30;
             const double v34 = v32 * v33;

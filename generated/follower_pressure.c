@@ -10,57 +10,6 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_follower_pressure_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    const double v1 = 6.283185307179586 * parameters[0];
-    const V v2 = X2 + d2;
-    const V v3 = X3 + d3;
-    const V v4 = X1 + d1;
-    const V v5 = 0.2113248654051871 * v3;
-    const V v6 = 0.7886751345948129 * v3;
-    const V v7 = v3 - X1;
-    const V v8 = v7 - d1;
-    const V v9 = 0.5 * v8;
-    const V v10 = v2 - X0;
-    const V v11 = v10 - d0;
-    const V v12 = 0.5 * v11;
-    const V v13 = 0.7886751345948129 * v4;
-    const V v14 = v5 + v13;
-    const V v15 = 0.2113248654051871 * v4;
-    const V v16 = v6 + v15;
-    const V v17 = v1 * v14;
-    const V v18 = v1 * v16;
-    const V v19 = v9 * v17;
-    const V v20 = v12 * v17;
-    const V v21 = v9 * v18;
-    const V v22 = v12 * v18;
-    const V v23 = 0.2113248654051871 * v20;
-    const V v24 = 0.7886751345948129 * v20;
-    const V v25 = 0.7886751345948129 * v22;
-    const V v26 = v23 + v25;
-    const V v27 = 0.2113248654051871 * v22;
-    const V v28 = v24 + v27;
-    const V v29 = -v26;
-    const V v30 = -v28;
-    const V v31 = 0.2113248654051871 * v19;
-    const V v32 = 0.7886751345948129 * v19;
-    const V v33 = 0.7886751345948129 * v21;
-    const V v34 = v31 + v33;
-    const V v35 = 0.2113248654051871 * v21;
-    const V v36 = v32 + v35;
-    softehl_store4(R + 0, 4, v36, v30, v34, v29);
-}
-
 void softehl_follower_pressure_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -69,101 +18,59 @@ void softehl_follower_pressure_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_follower_pressure_residual_group(coordinates + 4 * e, dofs + 4 * e, 0, 0, parameters,
-            values + 4 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates + 4 * e, 4, n - e);
-    double d[SOFTEHL_LANES * 4];
-    softehl_pad(d, dofs + 4 * e, 4, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 4], K[SOFTEHL_LANES * 1];
-    softehl_follower_pressure_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) values[4 * e + i] = R[i];
-}
-
-static void softehl_follower_pressure_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    const double v1 = 6.283185307179586 * parameters[0];
-    const double v2 = 1.3277932893555753 * parameters[0];
-    const double v3 = 4.9553920178240105 * parameters[0];
-    const double v4 = 4.1887902047863905 * parameters[0];
-    const V v5 = X2 + d2;
-    const V v6 = X3 + d3;
-    const V v7 = 0.2113248654051871 * v6;
-    const V v8 = 0.7886751345948129 * v6;
-    const V v9 = X1 + d1;
-    const V v10 = v6 - X1;
-    const V v11 = v10 - d1;
-    const V v12 = 0.5 * v11;
-    const V v13 = v5 - X0;
-    const V v14 = 0.7886751345948129 * v9;
-    const V v15 = v7 + v14;
-    const V v16 = 0.2113248654051871 * v9;
-    const V v17 = v8 + v16;
-    const V v18 = v13 - d0;
-    const V v19 = v1 * v15;
-    const V v20 = v1 * v17;
-    const V v21 = 0.5 * v18;
-    const V v22 = 0.39433756729740643 * v18;
-    const V v23 = v12 * v4;
-    const V v24 = v22 * v3;
-    const V v25 = v21 * v2;
-    const V v26 = v12 * v19;
-    const V v27 = v12 * v20;
-    const V v28 = v21 * v19;
-    const V v29 = v21 * v20;
-    const V v30 = 0.39433756729740643 * v19;
-    const V v31 = 0.10566243270259355 * v19;
-    const V v32 = 0.2113248654051871 * v25;
-    const V v33 = v24 + v32;
-    const V v34 = 1.5773502691896257 * v25;
-    const V v35 = 0.10566243270259355 * v20;
-    const V v36 = v30 + v35;
-    const V v37 = 0.39433756729740643 * v20;
-    const V v38 = v31 + v37;
-    const V v39 = 0.2113248654051871 * v28;
-    const V v40 = 0.7886751345948129 * v28;
-    const V v41 = v23 - v36;
-    softehl_store4(K + 0, 16, softehl_splat(0.0), v41, softehl_splat(0.0), v38);
-    const V v42 = -v36;
-    const V v43 = 0.2113248654051871 * v26;
-    const V v44 = 0.7886751345948129 * v26;
-    const V v45 = v38 + v23;
-    softehl_store4(K + 8, 16, softehl_splat(0.0), v42, softehl_splat(0.0), v45);
-    const V v46 = -v38;
-    const V v47 = -v33;
-    const V v48 = -v34;
-    softehl_store4(K + 4, 16, v36, v47, v42, v48);
-    softehl_store4(K + 12, 16, v38, v48, v46, v47);
-    const V v49 = 0.7886751345948129 * v29;
-    const V v50 = v39 + v49;
-    const V v51 = 0.2113248654051871 * v29;
-    const V v52 = v40 + v51;
-    const V v53 = 0.7886751345948129 * v27;
-    const V v54 = v43 + v53;
-    const V v55 = 0.2113248654051871 * v27;
-    const V v56 = v44 + v55;
-    const V v57 = -v50;
-    const V v58 = -v52;
-    softehl_store4(R + 0, 4, v56, v58, v54, v57);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 4 * e;
+        const double *restrict d = dofs + 4 * e;
+        double *restrict R = values + 4 * e;
+        (void)X; (void)d;
+        const double v1 = X[1] + d[1];
+        const double v2 = 0.2113248654051871 * v1;
+        const double v3 = X[3] + d[3];
+        const double v4 = 0.7886751345948129 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = 6.283185307179586 * parameters[0];
+        const double v7 = v6 * v5;
+        const double v8 = v3 - X[1];
+        const double v9 = v8 - d[1];
+        const double v10 = 0.5 * v9;
+        const double v11 = v10 * v7;
+        const double v12 = 0.2113248654051871 * v11;
+        const double v13 = 0.7886751345948129 * v1;
+        const double v14 = 0.2113248654051871 * v3;
+        const double v15 = v14 + v13;
+        const double v16 = v6 * v15;
+        const double v17 = v10 * v16;
+        const double v18 = 0.7886751345948129 * v17;
+        const double v19 = v18 + v12;
+        const double v20 = X[2] + d[2];
+        const double v21 = v20 - X[0];
+        const double v22 = v21 - d[0];
+        const double v23 = 0.5 * v22;
+        const double v24 = v23 * v7;
+        const double v25 = 0.2113248654051871 * v24;
+        const double v26 = v23 * v16;
+        const double v27 = 0.7886751345948129 * v26;
+        const double v28 = v27 + v25;
+        const double v29 = -v28;
+        const double v30 = 0.7886751345948129 * v11;
+        const double v31 = 0.2113248654051871 * v17;
+        const double v32 = v31 + v30;
+        const double v33 = 0.7886751345948129 * v24;
+        const double v34 = 0.2113248654051871 * v26;
+        const double v35 = v34 + v33;
+        const double v36 = -v35;
+        R[0] = v19;
+        R[1] = v29;
+        R[2] = v32;
+        R[3] = v36;
+    }
 }
 
 void softehl_follower_pressure_tangent(
@@ -174,23 +81,95 @@ void softehl_follower_pressure_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_follower_pressure_tangent_group(coordinates + 4 * e, dofs + 4 * e, 0, 0, parameters,
-            values + 4 * e, tangent + 16 * e);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates + 4 * e, 4, n - e);
-    double d[SOFTEHL_LANES * 4];
-    softehl_pad(d, dofs + 4 * e, 4, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 4], K[SOFTEHL_LANES * 16];
-    softehl_follower_pressure_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) values[4 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 16 * (n - e); ++i) tangent[16 * e + i] = K[i];
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 4 * e;
+        const double *restrict d = dofs + 4 * e;
+        double *restrict R = values + 4 * e;
+        double *restrict K = tangent + 4 * 4 * e;
+        (void)X; (void)d;
+        const double v1 = X[1] + d[1];
+        const double v2 = 0.2113248654051871 * v1;
+        const double v3 = X[3] + d[3];
+        const double v4 = 0.7886751345948129 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = 6.283185307179586 * parameters[0];
+        const double v7 = v6 * v5;
+        const double v8 = v3 - X[1];
+        const double v9 = v8 - d[1];
+        const double v10 = 0.5 * v9;
+        const double v11 = v10 * v7;
+        const double v12 = 0.2113248654051871 * v11;
+        const double v13 = 0.7886751345948129 * v1;
+        const double v14 = 0.2113248654051871 * v3;
+        const double v15 = v14 + v13;
+        const double v16 = v6 * v15;
+        const double v17 = v10 * v16;
+        const double v18 = 0.7886751345948129 * v17;
+        const double v19 = v18 + v12;
+        const double v20 = X[2] + d[2];
+        const double v21 = v20 - X[0];
+        const double v22 = v21 - d[0];
+        const double v23 = 0.5 * v22;
+        const double v24 = v23 * v7;
+        const double v25 = 0.2113248654051871 * v24;
+        const double v26 = v23 * v16;
+        const double v27 = 0.7886751345948129 * v26;
+        const double v28 = v27 + v25;
+        const double v29 = -v28;
+        const double v30 = 0.7886751345948129 * v11;
+        const double v31 = 0.2113248654051871 * v17;
+        const double v32 = v31 + v30;
+        const double v33 = 0.7886751345948129 * v24;
+        const double v34 = 0.2113248654051871 * v26;
+        const double v35 = v34 + v33;
+        const double v36 = -v35;
+        const double v37 = 0.10566243270259355 * v7;
+        const double v38 = 0.39433756729740643 * v16;
+        const double v39 = v38 + v37;
+        const double v40 = 4.1887902047863905 * parameters[0];
+        const double v41 = v10 * v40;
+        const double v42 = v41 - v39;
+        const double v43 = 0.39433756729740643 * v7;
+        const double v44 = 0.10566243270259355 * v16;
+        const double v45 = v44 + v43;
+        const double v46 = 1.3277932893555753 * parameters[0];
+        const double v47 = v23 * v46;
+        const double v48 = 0.2113248654051871 * v47;
+        const double v49 = 4.9553920178240105 * parameters[0];
+        const double v50 = 0.39433756729740643 * v22;
+        const double v51 = v50 * v49;
+        const double v52 = v51 + v48;
+        const double v53 = -v52;
+        const double v54 = -v39;
+        const double v55 = 1.5773502691896257 * v47;
+        const double v56 = -v55;
+        const double v57 = v45 + v41;
+        const double v58 = -v45;
+        R[0] = v19;
+        R[1] = v29;
+        R[2] = v32;
+        R[3] = v36;
+        K[0] = 0.0;
+        K[1] = v42;
+        K[2] = 0.0;
+        K[3] = v45;
+        K[4] = v39;
+        K[5] = v53;
+        K[6] = v54;
+        K[7] = v56;
+        K[8] = 0.0;
+        K[9] = v54;
+        K[10] = 0.0;
+        K[11] = v57;
+        K[12] = v45;
+        K[13] = v56;
+        K[14] = v58;
+        K[15] = v53;
+    }
 }

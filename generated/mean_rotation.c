@@ -19,11 +19,12 @@
 #include "softehl_kernels.h"
 
 static void softehl_mean_rotation_energy_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -220,32 +221,32 @@ void softehl_mean_rotation_energy(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_energy_group(coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters,
-            values + 1 * e, 0);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_mean_rotation_energy_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_mean_rotation_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs + 9 * e, 9, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_mean_rotation_energy_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
+    softehl_pad(d, dofs, 9, n);
+    double R[SOFTEHL_LANES * 1];
+    softehl_mean_rotation_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
+#endif
 }
 
 static void softehl_mean_rotation_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -500,32 +501,32 @@ void softehl_mean_rotation_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_residual_group(coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters,
-            values + 9 * e, 0);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_mean_rotation_residual_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 9 * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_mean_rotation_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 9 * (n - SOFTEHL_LANES), 0);
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs + 9 * e, 9, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 9], K[SOFTEHL_LANES * 1];
-    softehl_mean_rotation_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 9 * (n - e); ++i) values[9 * e + i] = R[i];
+    softehl_pad(d, dofs, 9, n);
+    double R[SOFTEHL_LANES * 9];
+    softehl_mean_rotation_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < 9 * n; ++i) values[i] = R[i];
+#endif
 }
 
 static void softehl_mean_rotation_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -856,23 +857,23 @@ void softehl_mean_rotation_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_tangent_group(coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters,
-            values + 9 * e, tangent + 81 * e);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_mean_rotation_tangent_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 9 * e, tangent + (9 * 9) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_mean_rotation_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 9 * (n - SOFTEHL_LANES), tangent + (9 * 9) * (n - SOFTEHL_LANES));
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs + 9 * e, 9, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 9], K[SOFTEHL_LANES * 81];
-    softehl_mean_rotation_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 9 * (n - e); ++i) values[9 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 81 * (n - e); ++i) tangent[81 * e + i] = K[i];
+    softehl_pad(d, dofs, 9, n);
+    double R[SOFTEHL_LANES * 9];
+    double K[SOFTEHL_LANES * (9 * 9)];
+    softehl_mean_rotation_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < 9 * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < (9 * 9) * n; ++i) tangent[i] = K[i];
+#endif
 }

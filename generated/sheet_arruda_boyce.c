@@ -9,63 +9,6 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_sheet_arruda_boyce_energy_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = parameters[1] * parameters[1];
-    const V v5 = -v3;
-    const double v6 = parameters[1] * v4;
-    const double v7 = v4 * v4;
-    const double v8 = 1.0 / v4;
-    const V v9 = softehl_vexp(v5);
-    const double v10 = v6 * v6;
-    const double v11 = v7 * v7;
-    const double v12 = 1.0 / v7;
-    const double v13 = 1.0 / v11;
-    const double v14 = 1.0 / v10;
-    const V v15 = v1 * v1;
-    const V v16 = v2 * v2;
-    const V v17 = v15 + v16;
-    const V v18 = v9 * v9;
-    const V v19 = v17 + v18;
-    const V v20 = v19 * v19;
-    const V v21 = v20 * v20;
-    const V v22 = 0.0007703153988868275 * v19;
-    const V v23 = v21 * v22;
-    const V v24 = 0.0027142857142857142 * v21;
-    const V v25 = v24 - 0.21985714285714286;
-    const V v26 = v14 * v25;
-    const V v27 = v23 - 0.18718664192949908;
-    const V v28 = v13 * v27;
-    const V v29 = v26 + v28;
-    const V v30 = 0.5 * v19;
-    const V v31 = v30 + v29;
-    const V v32 = 0.010476190476190476 * v19;
-    const V v33 = v20 * v32;
-    const V v34 = 0.05 * v20;
-    const V v35 = v34 - 0.45;
-    const V v36 = v8 * v35;
-    const V v37 = v36 + v31;
-    const V v38 = v33 - 0.28285714285714286;
-    const V v39 = v12 * v38;
-    const V v40 = v39 + v37;
-    const V v41 = v40 - 1.5;
-    const V v42 = parameters[0] * v41;
-    softehl_store1(R + 0, 1, v42);
-}
-
 void softehl_sheet_arruda_boyce_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -74,83 +17,61 @@ void softehl_sheet_arruda_boyce_energy(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_arruda_boyce_energy_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 1 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_sheet_arruda_boyce_energy_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
-}
-
-static void softehl_sheet_arruda_boyce_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = parameters[1] * parameters[1];
-    const V v5 = -v3;
-    const double v6 = parameters[1] * v4;
-    const double v7 = v4 * v4;
-    const double v8 = 1.0 / v4;
-    const V v9 = softehl_vexp(v5);
-    const double v10 = v6 * v6;
-    const double v11 = v7 * v7;
-    const double v12 = 1.0 / v7;
-    const double v13 = 1.0 / v11;
-    const double v14 = 1.0 / v10;
-    const double v15 = 0.1 * v8;
-    const double v16 = 0.010857142857142857 * v14;
-    const double v17 = 0.0038515769944341373 * v13;
-    const double v18 = 0.03142857142857143 * v12;
-    const V v19 = 2.0 * v9;
-    const V v20 = v9 * v19;
-    const V v21 = v9 * v9;
-    const V v22 = v1 * v1;
-    const V v23 = v22 + v21;
-    const V v24 = v2 * v2;
-    const V v25 = v24 + v23;
-    const V v26 = v15 * v25;
-    const V v27 = 0.5 + v26;
-    const V v28 = v16 * v25;
-    const V v29 = v18 + v28;
-    const V v30 = v25 * v25;
-    const V v31 = v17 * v30;
-    const V v32 = v29 + v31;
-    const V v33 = v30 * v32;
-    const V v34 = v27 + v33;
-    const V v35 = parameters[0] * v34;
-    const V v36 = v20 * v35;
-    const V v37 = 2.0 * v2;
-    const V v38 = v2 * v37;
-    const V v39 = v38 * v35;
-    const V v40 = v39 - v36;
-    const V v41 = 2.0 * v1;
-    const V v42 = v1 * v41;
-    const V v43 = v42 * v35;
-    const V v44 = v43 - v36;
-    softehl_store2(R + 0, 2, v44, v40);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 * v10;
+        const double v12 = v11 * v11;
+        const double v13 = 0.0027142857142857142 * v12;
+        const double v14 = v13 - 0.21985714285714286;
+        const double v15 = parameters[1] * parameters[1];
+        const double v16 = parameters[1] * v15;
+        const double v17 = v16 * v16;
+        const double v18 = 1.0 / v17;
+        const double v19 = v18 * v14;
+        const double v20 = 0.05 * v11;
+        const double v21 = v20 - 0.45;
+        const double v22 = 1.0 / v15;
+        const double v23 = v22 * v21;
+        const double v24 = v19 + v23;
+        const double v25 = 0.0007703153988868275 * v10;
+        const double v26 = v12 * v25;
+        const double v27 = v26 - 0.18718664192949908;
+        const double v28 = v15 * v15;
+        const double v29 = v28 * v28;
+        const double v30 = 1.0 / v29;
+        const double v31 = v30 * v27;
+        const double v32 = v31 + v24;
+        const double v33 = 0.010476190476190476 * v10;
+        const double v34 = v11 * v33;
+        const double v35 = v34 - 0.28285714285714286;
+        const double v36 = 1.0 / v28;
+        const double v37 = v36 * v35;
+        const double v38 = v37 + v32;
+        const double v39 = v38 - 1.5;
+        const double v40 = 0.5 * v10;
+        const double v41 = v40 + v39;
+        const double v42 = parameters[0] * v41;
+        values[e] = v42;
+    }
 }
 
 void softehl_sheet_arruda_boyce_residual(
@@ -161,32 +82,74 @@ void softehl_sheet_arruda_boyce_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_arruda_boyce_residual_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_arruda_boyce_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 * v10;
+        const double v12 = parameters[1] * parameters[1];
+        const double v13 = v12 * v12;
+        const double v14 = v13 * v13;
+        const double v15 = 1.0 / v14;
+        const double v16 = 0.0038515769944341373 * v15;
+        const double v17 = v11 * v16;
+        const double v18 = parameters[1] * v12;
+        const double v19 = v18 * v18;
+        const double v20 = 1.0 / v19;
+        const double v21 = 0.010857142857142857 * v20;
+        const double v22 = v10 * v21;
+        const double v23 = v22 + v17;
+        const double v24 = 1.0 / v13;
+        const double v25 = 0.03142857142857143 * v24;
+        const double v26 = v25 + v23;
+        const double v27 = v11 * v26;
+        const double v28 = 1.0 / v12;
+        const double v29 = 0.1 * v28;
+        const double v30 = v10 * v29;
+        const double v31 = 0.5 + v30;
+        const double v32 = v31 + v27;
+        const double v33 = parameters[0] * v32;
+        const double v34 = 2.0 * v3;
+        const double v35 = v3 * v34;
+        const double v36 = v35 * v33;
+        const double v37 = 2.0 * v8;
+        const double v38 = v8 * v37;
+        const double v39 = v38 * v33;
+        const double v40 = v36 - v39;
+        const double v41 = 2.0 * v1;
+        const double v42 = v1 * v41;
+        const double v43 = v42 * v33;
+        const double v44 = v43 - v39;
+        R[0] = v40;
+        R[1] = v44;
+    }
 }
 
 static void softehl_sheet_arruda_boyce_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1;
     softehl_load2(X + 0, 2, &X0, &X1);
     (void)X0; (void)X1;
@@ -295,83 +258,25 @@ void softehl_sheet_arruda_boyce_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_arruda_boyce_tangent_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, tangent + 4 * e);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_sheet_arruda_boyce_tangent_group(points, modes, coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters, rule, basis, values + 2 * e, tangent + (2 * 2) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_sheet_arruda_boyce_tangent_group(points, modes, coordinates + 2 * (n - SOFTEHL_LANES), dofs + 2 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 2 * (n - SOFTEHL_LANES), tangent + (2 * 2) * (n - SOFTEHL_LANES));
+        return;
+    }
     double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
+    softehl_pad(X, coordinates, 2, n);
     double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 4];
-    softehl_sheet_arruda_boyce_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) tangent[4 * e + i] = K[i];
-}
-
-static void softehl_sheet_arruda_boyce_d_mu_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = parameters[1] * parameters[1];
-    const V v5 = -v3;
-    const double v6 = parameters[1] * v4;
-    const double v7 = v4 * v4;
-    const double v8 = 1.0 / v4;
-    const V v9 = softehl_vexp(v5);
-    const double v10 = v6 * v6;
-    const double v11 = v7 * v7;
-    const double v12 = 1.0 / v7;
-    const double v13 = 1.0 / v11;
-    const double v14 = 1.0 / v10;
-    const double v15 = 0.1 * v8;
-    const double v16 = 0.010857142857142857 * v14;
-    const double v17 = 0.0038515769944341373 * v13;
-    const double v18 = 0.03142857142857143 * v12;
-    const V v19 = 2.0 * v9;
-    const V v20 = v9 * v19;
-    const V v21 = v9 * v9;
-    const V v22 = v1 * v1;
-    const V v23 = v22 + v21;
-    const V v24 = v2 * v2;
-    const V v25 = v24 + v23;
-    const V v26 = v15 * v25;
-    const V v27 = 0.5 + v26;
-    const V v28 = v16 * v25;
-    const V v29 = v18 + v28;
-    const V v30 = v25 * v25;
-    const V v31 = v17 * v30;
-    const V v32 = v29 + v31;
-    const V v33 = v30 * v32;
-    const V v34 = v27 + v33;
-    const V v35 = v20 * v34;
-    const V v36 = 2.0 * v2;
-    const V v37 = v2 * v36;
-    const V v38 = v37 * v34;
-    const V v39 = v38 - v35;
-    const V v40 = 2.0 * v1;
-    const V v41 = v1 * v40;
-    const V v42 = v41 * v34;
-    const V v43 = v42 - v35;
-    softehl_store2(R + 0, 2, v43, v39);
+    softehl_pad(d, dofs, 2, n);
+    double R[SOFTEHL_LANES * 2];
+    double K[SOFTEHL_LANES * (2 * 2)];
+    softehl_sheet_arruda_boyce_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < 2 * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < (2 * 2) * n; ++i) tangent[i] = K[i];
+#endif
 }
 
 void softehl_sheet_arruda_boyce_d_mu(
@@ -382,91 +287,64 @@ void softehl_sheet_arruda_boyce_d_mu(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_arruda_boyce_d_mu_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_arruda_boyce_d_mu_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_arruda_boyce_d_lambda_m_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = parameters[1] * parameters[1];
-    const V v5 = -v3;
-    const double v6 = v4 * v4;
-    const double v7 = parameters[1] * v4;
-    const double v8 = 1.0 / v4;
-    const V v9 = softehl_vexp(v5);
-    const double v10 = v6 * v6;
-    const double v11 = 1.0 / v10;
-    const double v12 = v7 * v7;
-    const double v13 = 0.12571428571428572 * v7;
-    const double v14 = 1.0 / v6;
-    const double v15 = 0.06514285714285714 * v6;
-    const double v16 = v14 * v13;
-    const double v17 = v14 * v16;
-    const double v18 = 1.0 / v12;
-    const double v19 = v18 * v15;
-    const double v20 = v18 * v19;
-    const V v21 = 2.0 * v9;
-    const V v22 = v9 * v21;
-    const V v23 = v9 * v9;
-    const V v24 = v1 * v1;
-    const V v25 = v24 + v23;
-    const V v26 = v2 * v2;
-    const V v27 = v26 + v25;
-    const V v28 = v27 * v27;
-    const V v29 = v28 * v17;
-    const double v30 = 0.2 * v8;
-    const double v31 = v8 * v30;
-    const V v32 = v28 * v20;
-    const V v33 = v31 + v32;
-    const V v34 = v27 * v33;
-    const V v35 = 2.0 * v2;
-    const V v36 = v2 * v35;
-    const V v37 = 2.0 * v1;
-    const V v38 = v1 * v37;
-    const double v39 = 0.030812615955473098 * v11;
-    const double v40 = v11 * v39;
-    const double v41 = v12 * v40;
-    const V v42 = v28 * v41;
-    const V v43 = v28 * v42;
-    const V v44 = v34 + v43;
-    const V v45 = parameters[1] * v44;
-    const V v46 = v29 + v45;
-    const V v47 = parameters[0] * v46;
-    const V v48 = v22 * v47;
-    const V v49 = v36 * v47;
-    const V v50 = v48 - v49;
-    const V v51 = v38 * v47;
-    const V v52 = v48 - v51;
-    softehl_store2(R + 0, 2, v52, v50);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 * v10;
+        const double v12 = parameters[1] * parameters[1];
+        const double v13 = v12 * v12;
+        const double v14 = v13 * v13;
+        const double v15 = 1.0 / v14;
+        const double v16 = 0.0038515769944341373 * v15;
+        const double v17 = v11 * v16;
+        const double v18 = parameters[1] * v12;
+        const double v19 = v18 * v18;
+        const double v20 = 1.0 / v19;
+        const double v21 = 0.010857142857142857 * v20;
+        const double v22 = v10 * v21;
+        const double v23 = v22 + v17;
+        const double v24 = 1.0 / v13;
+        const double v25 = 0.03142857142857143 * v24;
+        const double v26 = v25 + v23;
+        const double v27 = v11 * v26;
+        const double v28 = 1.0 / v12;
+        const double v29 = 0.1 * v28;
+        const double v30 = v10 * v29;
+        const double v31 = 0.5 + v30;
+        const double v32 = v31 + v27;
+        const double v33 = 2.0 * v3;
+        const double v34 = v3 * v33;
+        const double v35 = v34 * v32;
+        const double v36 = 2.0 * v8;
+        const double v37 = v8 * v36;
+        const double v38 = v37 * v32;
+        const double v39 = v35 - v38;
+        const double v40 = 2.0 * v1;
+        const double v41 = v1 * v40;
+        const double v42 = v41 * v32;
+        const double v43 = v42 - v38;
+        R[0] = v39;
+        R[1] = v43;
+    }
 }
 
 void softehl_sheet_arruda_boyce_d_lambda_m(
@@ -477,22 +355,71 @@ void softehl_sheet_arruda_boyce_d_lambda_m(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_arruda_boyce_d_lambda_m_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_arruda_boyce_d_lambda_m_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = parameters[1] * parameters[1];
+        const double v2 = v1 * v1;
+        const double v3 = v2 * v2;
+        const double v4 = 1.0 / v3;
+        const double v5 = 0.030812615955473098 * v4;
+        const double v6 = v4 * v5;
+        const double v7 = parameters[1] * v1;
+        const double v8 = v7 * v7;
+        const double v9 = v8 * v6;
+        const double v10 = exp(d[1]);
+        const double v11 = v10 * v10;
+        const double v12 = exp(d[0]);
+        const double v13 = v12 * v12;
+        const double v14 = v13 + v11;
+        const double v15 = d[0] + d[1];
+        const double v16 = -v15;
+        const double v17 = exp(v16);
+        const double v18 = v17 * v17;
+        const double v19 = v14 + v18;
+        const double v20 = v19 * v19;
+        const double v21 = v20 * v9;
+        const double v22 = v20 * v21;
+        const double v23 = 0.06514285714285714 * v2;
+        const double v24 = 1.0 / v8;
+        const double v25 = v24 * v23;
+        const double v26 = v24 * v25;
+        const double v27 = v20 * v26;
+        const double v28 = 1.0 / v1;
+        const double v29 = 0.2 * v28;
+        const double v30 = v28 * v29;
+        const double v31 = v30 + v27;
+        const double v32 = v19 * v31;
+        const double v33 = v32 + v22;
+        const double v34 = parameters[1] * v33;
+        const double v35 = 1.0 / v2;
+        const double v36 = 0.12571428571428572 * v7;
+        const double v37 = v35 * v36;
+        const double v38 = v35 * v37;
+        const double v39 = v20 * v38;
+        const double v40 = v39 + v34;
+        const double v41 = parameters[0] * v40;
+        const double v42 = 2.0 * v12;
+        const double v43 = v12 * v42;
+        const double v44 = v43 * v41;
+        const double v45 = 2.0 * v17;
+        const double v46 = v17 * v45;
+        const double v47 = v46 * v41;
+        const double v48 = v47 - v44;
+        const double v49 = 2.0 * v10;
+        const double v50 = v10 * v49;
+        const double v51 = v50 * v41;
+        const double v52 = v47 - v51;
+        R[0] = v48;
+        R[1] = v52;
+    }
 }

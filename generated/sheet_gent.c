@@ -9,40 +9,6 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_sheet_gent_energy_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 0.5 * parameters[0];
-    const V v2 = softehl_vexp(d0);
-    const V v3 = softehl_vexp(d1);
-    const V v4 = d0 + d1;
-    const V v5 = -v4;
-    const double v6 = parameters[1] * v1;
-    const double v7 = 1.0 / parameters[1];
-    const V v8 = softehl_vexp(v5);
-    const V v9 = v2 * v2;
-    const V v10 = v3 * v3;
-    const V v11 = v9 + v10;
-    const V v12 = v8 * v8;
-    const V v13 = v11 + v12;
-    const V v14 = v13 - 3.0;
-    const V v15 = v7 * v14;
-    const V v16 = 1.0 - v15;
-    const V v17 = softehl_vlog(v16);
-    const V v18 = v6 * v17;
-    const V v19 = -v18;
-    softehl_store1(R + 0, 1, v19);
-}
-
 void softehl_sheet_gent_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -51,69 +17,38 @@ void softehl_sheet_gent_energy(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_gent_energy_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 1 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_sheet_gent_energy_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
-}
-
-static void softehl_sheet_gent_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 0.5 * parameters[0];
-    const V v2 = softehl_vexp(d0);
-    const V v3 = softehl_vexp(d1);
-    const V v4 = d0 + d1;
-    const double v5 = 1.0 / parameters[1];
-    const double v6 = parameters[1] * v1;
-    const V v7 = -v4;
-    const V v8 = softehl_vexp(v7);
-    const double v9 = v5 * v6;
-    const V v10 = 2.0 * v8;
-    const V v11 = v8 * v10;
-    const V v12 = v8 * v8;
-    const V v13 = v2 * v2;
-    const V v14 = v13 + v12;
-    const V v15 = v3 * v3;
-    const V v16 = v15 + v14;
-    const V v17 = v16 - 3.0;
-    const V v18 = v5 * v17;
-    const V v19 = 1.0 - v18;
-    const V v20 = 1.0 / v19;
-    const V v21 = v9 * v20;
-    const V v22 = v11 * v21;
-    const V v23 = 2.0 * v3;
-    const V v24 = v3 * v23;
-    const V v25 = v24 * v21;
-    const V v26 = v25 - v22;
-    const V v27 = 2.0 * v2;
-    const V v28 = v2 * v27;
-    const V v29 = v28 * v21;
-    const V v30 = v29 - v22;
-    softehl_store2(R + 0, 2, v30, v26);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 1.0 / parameters[1];
+        const double v13 = v12 * v11;
+        const double v14 = 1.0 - v13;
+        const double v15 = log(v14);
+        const double v16 = 0.5 * parameters[0];
+        const double v17 = parameters[1] * v16;
+        const double v18 = v17 * v15;
+        const double v19 = -v18;
+        values[e] = v19;
+    }
 }
 
 void softehl_sheet_gent_residual(
@@ -124,102 +59,51 @@ void softehl_sheet_gent_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_gent_residual_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_gent_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_gent_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 0.5 * parameters[0];
-    const V v2 = softehl_vexp(d0);
-    const V v3 = softehl_vexp(d1);
-    const V v4 = d0 + d1;
-    const double v5 = parameters[1] * v1;
-    const double v6 = 1.0 / parameters[1];
-    const V v7 = -v4;
-    const V v8 = softehl_vexp(v7);
-    const V v9 = 2.0 * v8;
-    const V v10 = 2.0 * v3;
-    const V v11 = 2.0 * v2;
-    const double v12 = v6 * v5;
-    const V v13 = v8 * v9;
-    const V v14 = v2 * v11;
-    const V v15 = v2 * v2;
-    const V v16 = v3 * v3;
-    const V v17 = v15 + v16;
-    const V v18 = v8 * v8;
-    const V v19 = v17 + v18;
-    const V v20 = v19 - 3.0;
-    const V v21 = v6 * v20;
-    const V v22 = 1.0 - v21;
-    const V v23 = 1.0 / v22;
-    const double v24 = v6 * v6;
-    const double v25 = v5 * v24;
-    const V v26 = v12 * v23;
-    const V v27 = v23 * v23;
-    const V v28 = v9 * v26;
-    const V v29 = v10 * v26;
-    const V v30 = v11 * v26;
-    const V v31 = v8 * v28;
-    const V v32 = v3 * v10;
-    const V v33 = v32 - v13;
-    const V v34 = v33 * v25;
-    const V v35 = v34 * v27;
-    const V v36 = v10 * v35;
-    const V v37 = v29 + v36;
-    const V v38 = v3 * v29;
-    const V v39 = v3 * v37;
-    const V v40 = v14 - v13;
-    const V v41 = v40 * v25;
-    const V v42 = v41 * v27;
-    const V v43 = v11 * v42;
-    const V v44 = v30 + v43;
-    const V v45 = v2 * v30;
-    const V v46 = v2 * v44;
-    const V v47 = v9 * v42;
-    const V v48 = v47 - v28;
-    const V v49 = v8 * v48;
-    const V v50 = v46 - v49;
-    const V v51 = v14 * v35;
-    const V v52 = v9 * v35;
-    const V v53 = v52 - v28;
-    const V v54 = v31 + v50;
-    const V v55 = v45 + v54;
-    const V v56 = v45 - v31;
-    const V v57 = v38 + v39;
-    const V v58 = v38 - v31;
-    softehl_store2(R + 0, 2, v56, v58);
-    const V v59 = v8 * v53;
-    const V v60 = v31 - v59;
-    const V v61 = v51 + v60;
-    const V v62 = v60 + v57;
-    softehl_store4(K + 0, 4, v55, v61, v61, v62);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 1.0 / parameters[1];
+        const double v13 = v12 * v11;
+        const double v14 = 1.0 - v13;
+        const double v15 = 1.0 / v14;
+        const double v16 = 0.5 * parameters[0];
+        const double v17 = parameters[1] * v16;
+        const double v18 = v12 * v17;
+        const double v19 = v18 * v15;
+        const double v20 = 2.0 * v3;
+        const double v21 = v3 * v20;
+        const double v22 = v21 * v19;
+        const double v23 = 2.0 * v8;
+        const double v24 = v8 * v23;
+        const double v25 = v24 * v19;
+        const double v26 = v22 - v25;
+        const double v27 = 2.0 * v1;
+        const double v28 = v1 * v27;
+        const double v29 = v28 * v19;
+        const double v30 = v29 - v25;
+        R[0] = v26;
+        R[1] = v30;
+    }
 }
 
 void softehl_sheet_gent_tangent(
@@ -230,69 +114,87 @@ void softehl_sheet_gent_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_gent_tangent_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, tangent + 4 * e);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 4];
-    softehl_sheet_gent_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) tangent[4 * e + i] = K[i];
-}
-
-static void softehl_sheet_gent_d_mu_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = 0.5 * parameters[1];
-    const double v5 = 1.0 / parameters[1];
-    const V v6 = -v3;
-    const V v7 = softehl_vexp(v6);
-    const double v8 = v4 * v5;
-    const V v9 = 2.0 * v7;
-    const V v10 = v7 * v9;
-    const V v11 = v7 * v7;
-    const V v12 = v1 * v1;
-    const V v13 = v12 + v11;
-    const V v14 = v2 * v2;
-    const V v15 = v14 + v13;
-    const V v16 = v15 - 3.0;
-    const V v17 = v5 * v16;
-    const V v18 = 1.0 - v17;
-    const V v19 = 1.0 / v18;
-    const V v20 = v19 * v8;
-    const V v21 = v10 * v20;
-    const V v22 = 2.0 * v2;
-    const V v23 = v2 * v22;
-    const V v24 = v23 * v20;
-    const V v25 = v24 - v21;
-    const V v26 = 2.0 * v1;
-    const V v27 = v1 * v26;
-    const V v28 = v27 * v20;
-    const V v29 = v28 - v21;
-    softehl_store2(R + 0, 2, v29, v25);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        double *restrict K = tangent + 2 * 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 1.0 / parameters[1];
+        const double v13 = v12 * v11;
+        const double v14 = 1.0 - v13;
+        const double v15 = 1.0 / v14;
+        const double v16 = 0.5 * parameters[0];
+        const double v17 = parameters[1] * v16;
+        const double v18 = v12 * v17;
+        const double v19 = v18 * v15;
+        const double v20 = 2.0 * v3;
+        const double v21 = v20 * v19;
+        const double v22 = v3 * v21;
+        const double v23 = 2.0 * v8;
+        const double v24 = v23 * v19;
+        const double v25 = v8 * v24;
+        const double v26 = v22 - v25;
+        const double v27 = 2.0 * v1;
+        const double v28 = v27 * v19;
+        const double v29 = v1 * v28;
+        const double v30 = v29 - v25;
+        const double v31 = v25 + v22;
+        const double v32 = v15 * v15;
+        const double v33 = v3 * v20;
+        const double v34 = v8 * v23;
+        const double v35 = v33 - v34;
+        const double v36 = v12 * v12;
+        const double v37 = v17 * v36;
+        const double v38 = v35 * v37;
+        const double v39 = v38 * v32;
+        const double v40 = v20 * v39;
+        const double v41 = v21 + v40;
+        const double v42 = v3 * v41;
+        const double v43 = v42 + v31;
+        const double v44 = v23 * v39;
+        const double v45 = v44 - v24;
+        const double v46 = v8 * v45;
+        const double v47 = v43 - v46;
+        const double v48 = v1 * v27;
+        const double v49 = v48 - v34;
+        const double v50 = v49 * v37;
+        const double v51 = v50 * v32;
+        const double v52 = v23 * v51;
+        const double v53 = v52 - v24;
+        const double v54 = v8 * v53;
+        const double v55 = v25 - v54;
+        const double v56 = v33 * v51;
+        const double v57 = v56 + v55;
+        const double v58 = v27 * v51;
+        const double v59 = v28 + v58;
+        const double v60 = v1 * v59;
+        const double v61 = v29 + v60;
+        const double v62 = v55 + v61;
+        R[0] = v26;
+        R[1] = v30;
+        K[0] = v47;
+        K[1] = v57;
+        K[2] = v57;
+        K[3] = v62;
+    }
 }
 
 void softehl_sheet_gent_d_mu(
@@ -303,76 +205,50 @@ void softehl_sheet_gent_d_mu(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_gent_d_mu_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_gent_d_mu_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_gent_d_J_m_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 0.5 * parameters[0];
-    const V v2 = softehl_vexp(d0);
-    const V v3 = softehl_vexp(d1);
-    const V v4 = d0 + d1;
-    const double v5 = 1.0 / parameters[1];
-    const double v6 = parameters[1] * v1;
-    const V v7 = -v4;
-    const V v8 = softehl_vexp(v7);
-    const V v9 = 2.0 * v8;
-    const V v10 = v8 * v9;
-    const V v11 = v8 * v8;
-    const V v12 = v2 * v2;
-    const V v13 = v12 + v11;
-    const V v14 = v3 * v3;
-    const V v15 = v14 + v13;
-    const V v16 = v15 - 3.0;
-    const V v17 = v6 * v16;
-    const V v18 = v5 * v16;
-    const V v19 = 1.0 - v18;
-    const V v20 = 1.0 / v19;
-    const V v21 = v20 * v17;
-    const double v22 = v5 * v5;
-    const V v23 = v22 * v21;
-    const V v24 = v1 - v23;
-    const V v25 = v5 * v24;
-    const double v26 = v6 * v22;
-    const V v27 = v25 - v26;
-    const V v28 = v20 * v27;
-    const V v29 = v10 * v28;
-    const V v30 = 2.0 * v3;
-    const V v31 = v3 * v30;
-    const V v32 = v31 * v28;
-    const V v33 = v32 - v29;
-    const V v34 = 2.0 * v2;
-    const V v35 = v2 * v34;
-    const V v36 = v35 * v28;
-    const V v37 = v36 - v29;
-    softehl_store2(R + 0, 2, v37, v33);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 1.0 / parameters[1];
+        const double v13 = v12 * v11;
+        const double v14 = 1.0 - v13;
+        const double v15 = 1.0 / v14;
+        const double v16 = 0.5 * parameters[1];
+        const double v17 = v16 * v12;
+        const double v18 = v15 * v17;
+        const double v19 = 2.0 * v3;
+        const double v20 = v3 * v19;
+        const double v21 = v20 * v18;
+        const double v22 = 2.0 * v8;
+        const double v23 = v8 * v22;
+        const double v24 = v23 * v18;
+        const double v25 = v21 - v24;
+        const double v26 = 2.0 * v1;
+        const double v27 = v1 * v26;
+        const double v28 = v27 * v18;
+        const double v29 = v28 - v24;
+        R[0] = v25;
+        R[1] = v29;
+    }
 }
 
 void softehl_sheet_gent_d_J_m(
@@ -383,22 +259,56 @@ void softehl_sheet_gent_d_J_m(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_gent_d_J_m_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_gent_d_J_m_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 0.5 * parameters[0];
+        const double v13 = parameters[1] * v12;
+        const double v14 = v13 * v11;
+        const double v15 = 1.0 / parameters[1];
+        const double v16 = v15 * v11;
+        const double v17 = 1.0 - v16;
+        const double v18 = 1.0 / v17;
+        const double v19 = v18 * v14;
+        const double v20 = v15 * v15;
+        const double v21 = v20 * v19;
+        const double v22 = v12 - v21;
+        const double v23 = v15 * v22;
+        const double v24 = v13 * v20;
+        const double v25 = v23 - v24;
+        const double v26 = v18 * v25;
+        const double v27 = 2.0 * v3;
+        const double v28 = v3 * v27;
+        const double v29 = v28 * v26;
+        const double v30 = 2.0 * v8;
+        const double v31 = v8 * v30;
+        const double v32 = v31 * v26;
+        const double v33 = v29 - v32;
+        const double v34 = 2.0 * v1;
+        const double v35 = v1 * v34;
+        const double v36 = v35 * v26;
+        const double v37 = v36 - v32;
+        R[0] = v33;
+        R[1] = v37;
+    }
 }

@@ -9,45 +9,6 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_sheet_mooney_rivlin_energy_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = -v3;
-    const V v5 = softehl_vexp(v4);
-    const V v6 = 1.0 / v1;
-    const V v7 = v1 * v1;
-    const V v8 = v6 * v6;
-    const V v9 = v2 * v2;
-    const V v10 = v7 + v9;
-    const V v11 = 1.0 / v2;
-    const V v12 = v11 * v11;
-    const V v13 = v8 + v12;
-    const V v14 = v5 * v5;
-    const V v15 = v10 + v14;
-    const V v16 = 1.0 / v5;
-    const V v17 = v16 * v16;
-    const V v18 = v13 + v17;
-    const V v19 = v15 - 3.0;
-    const V v20 = parameters[0] * v19;
-    const V v21 = v18 - 3.0;
-    const V v22 = parameters[1] * v21;
-    const V v23 = v20 + v22;
-    const V v24 = 0.5 * v23;
-    softehl_store1(R + 0, 1, v24);
-}
-
 void softehl_sheet_mooney_rivlin_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -56,72 +17,43 @@ void softehl_sheet_mooney_rivlin_energy(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_mooney_rivlin_energy_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 1 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_sheet_mooney_rivlin_energy_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
-}
-
-static void softehl_sheet_mooney_rivlin_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const V v3 = softehl_vexp(d0);
-    const V v4 = softehl_vexp(d1);
-    const V v5 = d0 + d1;
-    const V v6 = -v5;
-    const V v7 = softehl_vexp(v6);
-    const V v8 = 1.0 / v3;
-    const V v9 = 1.0 / v4;
-    const V v10 = 1.0 / v7;
-    const V v11 = 2.0 * v7;
-    const V v12 = v7 * v1;
-    const V v13 = 2.0 * v4;
-    const V v14 = v4 * v1;
-    const V v15 = v3 * v1;
-    const V v16 = 2.0 * v3;
-    const V v17 = v2 * v10;
-    const V v18 = v10 * v17;
-    const V v19 = v10 * v18;
-    const V v20 = v12 - v19;
-    const V v21 = v11 * v20;
-    const V v22 = v2 * v9;
-    const V v23 = v9 * v22;
-    const V v24 = v9 * v23;
-    const V v25 = v14 - v24;
-    const V v26 = v13 * v25;
-    const V v27 = v2 * v8;
-    const V v28 = v8 * v27;
-    const V v29 = v8 * v28;
-    const V v30 = v15 - v29;
-    const V v31 = v16 * v30;
-    const V v32 = v26 - v21;
-    const V v33 = v31 - v21;
-    softehl_store2(R + 0, 2, v33, v32);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = 1.0 / v1;
+        const double v3 = v2 * v2;
+        const double v4 = exp(d[0]);
+        const double v5 = 1.0 / v4;
+        const double v6 = v5 * v5;
+        const double v7 = v6 + v3;
+        const double v8 = d[0] + d[1];
+        const double v9 = -v8;
+        const double v10 = exp(v9);
+        const double v11 = 1.0 / v10;
+        const double v12 = v11 * v11;
+        const double v13 = v7 + v12;
+        const double v14 = v13 - 3.0;
+        const double v15 = parameters[1] * v14;
+        const double v16 = v1 * v1;
+        const double v17 = v4 * v4;
+        const double v18 = v17 + v16;
+        const double v19 = v10 * v10;
+        const double v20 = v18 + v19;
+        const double v21 = v20 - 3.0;
+        const double v22 = parameters[0] * v21;
+        const double v23 = v22 + v15;
+        const double v24 = 0.5 * v23;
+        values[e] = v24;
+    }
 }
 
 void softehl_sheet_mooney_rivlin_residual(
@@ -132,96 +64,54 @@ void softehl_sheet_mooney_rivlin_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_mooney_rivlin_residual_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_mooney_rivlin_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_mooney_rivlin_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 0.5 * parameters[0];
-    const V v2 = softehl_vexp(d0);
-    const V v3 = softehl_vexp(d1);
-    const V v4 = d0 + d1;
-    const double v5 = 0.5 * parameters[1];
-    const V v6 = -v4;
-    const V v7 = softehl_vexp(v6);
-    const V v8 = 1.0 / v2;
-    const V v9 = v8 * v8;
-    const V v10 = parameters[1] * v8;
-    const V v11 = 1.0 / v3;
-    const V v12 = v11 * v11;
-    const V v13 = parameters[1] * v11;
-    const V v14 = 1.0 / v7;
-    const V v15 = parameters[1] * v14;
-    const V v16 = v14 * v14;
-    const V v17 = 2.0 * v7;
-    const V v18 = v1 * v17;
-    const V v19 = 2.0 * v3;
-    const V v20 = v1 * v19;
-    const V v21 = 2.0 * v2;
-    const V v22 = v1 * v21;
-    const V v23 = v16 * v15;
-    const V v24 = v18 - v23;
-    const V v25 = v7 * v24;
-    const V v26 = v12 * v13;
-    const V v27 = v20 - v26;
-    const V v28 = v3 * v27;
-    const V v29 = v9 * v10;
-    const V v30 = v22 - v29;
-    const V v31 = v2 * v30;
-    const V v32 = 6.0 * v2;
-    const V v33 = v5 * v32;
-    const V v34 = v9 * v33;
-    const V v35 = v9 * v34;
-    const V v36 = v22 + v35;
-    const V v37 = v2 * v36;
-    const V v38 = v31 + v37;
-    const V v39 = v31 - v25;
-    const V v40 = 6.0 * v7;
-    const V v41 = v5 * v40;
-    const V v42 = v16 * v41;
-    const V v43 = v16 * v42;
-    const V v44 = v18 + v43;
-    const V v45 = v7 * v44;
-    const V v46 = v25 + v45;
-    const V v47 = v38 + v46;
-    const V v48 = v28 + v46;
-    const V v49 = v28 - v25;
-    softehl_store2(R + 0, 2, v39, v49);
-    const V v50 = 6.0 * v3;
-    const V v51 = v5 * v50;
-    const V v52 = v12 * v51;
-    const V v53 = v12 * v52;
-    const V v54 = v20 + v53;
-    const V v55 = v3 * v54;
-    const V v56 = v55 + v48;
-    softehl_store4(K + 0, 4, v47, v46, v46, v56);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[0]);
+        const double v2 = 1.0 / v1;
+        const double v3 = 0.5 * parameters[1];
+        const double v4 = v3 * v2;
+        const double v5 = v2 * v4;
+        const double v6 = v2 * v5;
+        const double v7 = 0.5 * parameters[0];
+        const double v8 = v1 * v7;
+        const double v9 = v8 - v6;
+        const double v10 = 2.0 * v1;
+        const double v11 = v10 * v9;
+        const double v12 = d[0] + d[1];
+        const double v13 = -v12;
+        const double v14 = exp(v13);
+        const double v15 = 1.0 / v14;
+        const double v16 = v3 * v15;
+        const double v17 = v15 * v16;
+        const double v18 = v15 * v17;
+        const double v19 = v14 * v7;
+        const double v20 = v19 - v18;
+        const double v21 = 2.0 * v14;
+        const double v22 = v21 * v20;
+        const double v23 = v11 - v22;
+        const double v24 = exp(d[1]);
+        const double v25 = 1.0 / v24;
+        const double v26 = v3 * v25;
+        const double v27 = v25 * v26;
+        const double v28 = v25 * v27;
+        const double v29 = v24 * v7;
+        const double v30 = v29 - v28;
+        const double v31 = 2.0 * v24;
+        const double v32 = v31 * v30;
+        const double v33 = v32 - v22;
+        R[0] = v23;
+        R[1] = v33;
+    }
 }
 
 void softehl_sheet_mooney_rivlin_tangent(
@@ -232,50 +122,81 @@ void softehl_sheet_mooney_rivlin_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_mooney_rivlin_tangent_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, tangent + 4 * e);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 4];
-    softehl_sheet_mooney_rivlin_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) tangent[4 * e + i] = K[i];
-}
-
-static void softehl_sheet_mooney_rivlin_d_mu_1_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = -v3;
-    const V v5 = softehl_vexp(v4);
-    const V v6 = v5 * v5;
-    const V v7 = v1 * v1;
-    const V v8 = v2 * v2;
-    const V v9 = v8 - v6;
-    const V v10 = v7 - v6;
-    softehl_store2(R + 0, 2, v10, v9);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        double *restrict K = tangent + 2 * 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[0]);
+        const double v2 = 1.0 / v1;
+        const double v3 = v2 * v2;
+        const double v4 = parameters[1] * v2;
+        const double v5 = v3 * v4;
+        const double v6 = 2.0 * v1;
+        const double v7 = 0.5 * parameters[0];
+        const double v8 = v7 * v6;
+        const double v9 = v8 - v5;
+        const double v10 = v1 * v9;
+        const double v11 = d[0] + d[1];
+        const double v12 = -v11;
+        const double v13 = exp(v12);
+        const double v14 = 1.0 / v13;
+        const double v15 = v14 * v14;
+        const double v16 = parameters[1] * v14;
+        const double v17 = v15 * v16;
+        const double v18 = 2.0 * v13;
+        const double v19 = v7 * v18;
+        const double v20 = v19 - v17;
+        const double v21 = v13 * v20;
+        const double v22 = v10 - v21;
+        const double v23 = exp(d[1]);
+        const double v24 = 1.0 / v23;
+        const double v25 = v24 * v24;
+        const double v26 = parameters[1] * v24;
+        const double v27 = v25 * v26;
+        const double v28 = 2.0 * v23;
+        const double v29 = v7 * v28;
+        const double v30 = v29 - v27;
+        const double v31 = v23 * v30;
+        const double v32 = v31 - v21;
+        const double v33 = 6.0 * v13;
+        const double v34 = 0.5 * parameters[1];
+        const double v35 = v34 * v33;
+        const double v36 = v15 * v35;
+        const double v37 = v15 * v36;
+        const double v38 = v19 + v37;
+        const double v39 = v13 * v38;
+        const double v40 = v21 + v39;
+        const double v41 = 6.0 * v1;
+        const double v42 = v34 * v41;
+        const double v43 = v3 * v42;
+        const double v44 = v3 * v43;
+        const double v45 = v8 + v44;
+        const double v46 = v1 * v45;
+        const double v47 = v10 + v46;
+        const double v48 = v47 + v40;
+        const double v49 = v31 + v40;
+        const double v50 = 6.0 * v23;
+        const double v51 = v34 * v50;
+        const double v52 = v25 * v51;
+        const double v53 = v25 * v52;
+        const double v54 = v29 + v53;
+        const double v55 = v23 * v54;
+        const double v56 = v55 + v49;
+        R[0] = v22;
+        R[1] = v32;
+        K[0] = v48;
+        K[1] = v40;
+        K[2] = v40;
+        K[3] = v56;
+    }
 }
 
 void softehl_sheet_mooney_rivlin_d_mu_1(
@@ -286,52 +207,32 @@ void softehl_sheet_mooney_rivlin_d_mu_1(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_mooney_rivlin_d_mu_1_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_mooney_rivlin_d_mu_1_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_mooney_rivlin_d_mu_2_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = -v3;
-    const V v5 = softehl_vexp(v4);
-    const V v6 = 1.0 / v1;
-    const V v7 = 1.0 / v2;
-    const V v8 = 1.0 / v5;
-    const V v9 = v8 * v8;
-    const V v10 = v7 * v7;
-    const V v11 = v9 - v10;
-    const V v12 = v6 * v6;
-    const V v13 = v9 - v12;
-    softehl_store2(R + 0, 2, v13, v11);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)parameters;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = d[0] + d[1];
+        const double v2 = -v1;
+        const double v3 = exp(v2);
+        const double v4 = v3 * v3;
+        const double v5 = exp(d[0]);
+        const double v6 = v5 * v5;
+        const double v7 = v6 - v4;
+        const double v8 = exp(d[1]);
+        const double v9 = v8 * v8;
+        const double v10 = v9 - v4;
+        R[0] = v7;
+        R[1] = v10;
+    }
 }
 
 void softehl_sheet_mooney_rivlin_d_mu_2(
@@ -342,22 +243,33 @@ void softehl_sheet_mooney_rivlin_d_mu_2(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_mooney_rivlin_d_mu_2_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_mooney_rivlin_d_mu_2_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)parameters;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = d[0] + d[1];
+        const double v2 = -v1;
+        const double v3 = exp(v2);
+        const double v4 = 1.0 / v3;
+        const double v5 = v4 * v4;
+        const double v6 = exp(d[0]);
+        const double v7 = 1.0 / v6;
+        const double v8 = v7 * v7;
+        const double v9 = v5 - v8;
+        const double v10 = exp(d[1]);
+        const double v11 = 1.0 / v10;
+        const double v12 = v11 * v11;
+        const double v13 = v5 - v12;
+        R[0] = v9;
+        R[1] = v13;
+    }
 }

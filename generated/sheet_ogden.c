@@ -13,67 +13,6 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_sheet_ogden_energy_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = 1.0 / parameters[1];
-    const double v5 = 1.0 / parameters[3];
-    const double v6 = 1.0 / parameters[5];
-    const V v7 = parameters[1] * v3;
-    const V v8 = parameters[3] * v3;
-    const V v9 = parameters[5] * v3;
-    const V v10 = -v7;
-    const V v11 = -v8;
-    const V v12 = -v9;
-    const V v13 = softehl_vlog(v1);
-    const V v14 = softehl_vlog(v2);
-    const V v15 = softehl_vexp(v10);
-    const V v16 = softehl_vexp(v11);
-    const V v17 = softehl_vexp(v12);
-    const double v18 = parameters[0] * v4;
-    const double v19 = parameters[2] * v5;
-    const double v20 = parameters[4] * v6;
-    const V v21 = parameters[1] * v13;
-    const V v22 = softehl_vexp(v21);
-    const V v23 = v22 + v15;
-    const V v24 = parameters[1] * v14;
-    const V v25 = softehl_vexp(v24);
-    const V v26 = v25 + v23;
-    const V v27 = parameters[3] * v13;
-    const V v28 = softehl_vexp(v27);
-    const V v29 = v28 + v16;
-    const V v30 = parameters[3] * v14;
-    const V v31 = softehl_vexp(v30);
-    const V v32 = v31 + v29;
-    const V v33 = parameters[5] * v13;
-    const V v34 = parameters[5] * v14;
-    const V v35 = softehl_vexp(v33);
-    const V v36 = v35 + v17;
-    const V v37 = softehl_vexp(v34);
-    const V v38 = v37 + v36;
-    const V v39 = v26 - 3.0;
-    const V v40 = v18 * v39;
-    const V v41 = v32 - 3.0;
-    const V v42 = v19 * v41;
-    const V v43 = v40 + v42;
-    const V v44 = v38 - 3.0;
-    const V v45 = v20 * v44;
-    const V v46 = v43 + v45;
-    softehl_store1(R + 0, 1, v46);
-}
-
 void softehl_sheet_ogden_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -82,97 +21,65 @@ void softehl_sheet_ogden_energy(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_energy_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 1 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_sheet_ogden_energy_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
-}
-
-static void softehl_sheet_ogden_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = 1.0 / parameters[1];
-    const double v5 = 1.0 / parameters[3];
-    const double v6 = 1.0 / parameters[5];
-    const V v7 = parameters[1] * v3;
-    const V v8 = parameters[3] * v3;
-    const V v9 = parameters[5] * v3;
-    const V v10 = -v7;
-    const V v11 = -v8;
-    const V v12 = -v9;
-    const V v13 = softehl_vlog(v1);
-    const V v14 = softehl_vlog(v2);
-    const V v15 = softehl_vexp(v10);
-    const V v16 = softehl_vexp(v11);
-    const V v17 = softehl_vexp(v12);
-    const double v18 = parameters[0] * v4;
-    const double v19 = parameters[2] * v5;
-    const double v20 = parameters[4] * v6;
-    const V v21 = parameters[5] * v17;
-    const V v22 = parameters[3] * v16;
-    const V v23 = parameters[1] * v15;
-    const V v24 = parameters[1] * v13;
-    const V v25 = softehl_vexp(v24);
-    const V v26 = parameters[1] * v25;
-    const V v27 = v18 * v26;
-    const V v28 = v20 * v21;
-    const V v29 = v19 * v22;
-    const V v30 = v28 + v29;
-    const V v31 = v18 * v23;
-    const V v32 = v30 + v31;
-    const V v33 = parameters[1] * v14;
-    const V v34 = softehl_vexp(v33);
-    const V v35 = parameters[1] * v34;
-    const V v36 = v18 * v35;
-    const V v37 = parameters[3] * v13;
-    const V v38 = softehl_vexp(v37);
-    const V v39 = parameters[5] * v13;
-    const V v40 = softehl_vexp(v39);
-    const V v41 = parameters[5] * v40;
-    const V v42 = v20 * v41;
-    const V v43 = v42 + v27;
-    const V v44 = parameters[3] * v38;
-    const V v45 = v19 * v44;
-    const V v46 = v45 + v43;
-    const V v47 = parameters[3] * v14;
-    const V v48 = softehl_vexp(v47);
-    const V v49 = parameters[3] * v48;
-    const V v50 = v19 * v49;
-    const V v51 = v50 + v36;
-    const V v52 = parameters[5] * v14;
-    const V v53 = softehl_vexp(v52);
-    const V v54 = parameters[5] * v53;
-    const V v55 = v20 * v54;
-    const V v56 = v55 + v51;
-    const V v57 = v56 - v32;
-    const V v58 = v46 - v32;
-    softehl_store2(R + 0, 2, v58, v57);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = log(v1);
+        const double v3 = parameters[3] * v2;
+        const double v4 = exp(v3);
+        const double v5 = exp(d[0]);
+        const double v6 = log(v5);
+        const double v7 = parameters[3] * v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 + v4;
+        const double v10 = d[0] + d[1];
+        const double v11 = parameters[3] * v10;
+        const double v12 = -v11;
+        const double v13 = exp(v12);
+        const double v14 = v13 + v9;
+        const double v15 = v14 - 3.0;
+        const double v16 = 1.0 / parameters[3];
+        const double v17 = parameters[2] * v16;
+        const double v18 = v17 * v15;
+        const double v19 = parameters[1] * v2;
+        const double v20 = exp(v19);
+        const double v21 = parameters[1] * v6;
+        const double v22 = exp(v21);
+        const double v23 = v22 + v20;
+        const double v24 = parameters[1] * v10;
+        const double v25 = -v24;
+        const double v26 = exp(v25);
+        const double v27 = v26 + v23;
+        const double v28 = v27 - 3.0;
+        const double v29 = 1.0 / parameters[1];
+        const double v30 = parameters[0] * v29;
+        const double v31 = v30 * v28;
+        const double v32 = v31 + v18;
+        const double v33 = parameters[5] * v2;
+        const double v34 = exp(v33);
+        const double v35 = parameters[5] * v6;
+        const double v36 = exp(v35);
+        const double v37 = v36 + v34;
+        const double v38 = parameters[5] * v10;
+        const double v39 = -v38;
+        const double v40 = exp(v39);
+        const double v41 = v40 + v37;
+        const double v42 = v41 - 3.0;
+        const double v43 = 1.0 / parameters[5];
+        const double v44 = parameters[4] * v43;
+        const double v45 = v44 * v42;
+        const double v46 = v45 + v32;
+        values[e] = v46;
+    }
 }
 
 void softehl_sheet_ogden_residual(
@@ -183,32 +90,88 @@ void softehl_sheet_ogden_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_residual_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_ogden_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = d[0] + d[1];
+        const double v2 = parameters[3] * v1;
+        const double v3 = -v2;
+        const double v4 = exp(v3);
+        const double v5 = parameters[3] * v4;
+        const double v6 = 1.0 / parameters[3];
+        const double v7 = parameters[2] * v6;
+        const double v8 = v7 * v5;
+        const double v9 = parameters[5] * v1;
+        const double v10 = -v9;
+        const double v11 = exp(v10);
+        const double v12 = parameters[5] * v11;
+        const double v13 = 1.0 / parameters[5];
+        const double v14 = parameters[4] * v13;
+        const double v15 = v14 * v12;
+        const double v16 = v15 + v8;
+        const double v17 = parameters[1] * v1;
+        const double v18 = -v17;
+        const double v19 = exp(v18);
+        const double v20 = parameters[1] * v19;
+        const double v21 = 1.0 / parameters[1];
+        const double v22 = parameters[0] * v21;
+        const double v23 = v22 * v20;
+        const double v24 = v16 + v23;
+        const double v25 = exp(d[0]);
+        const double v26 = log(v25);
+        const double v27 = parameters[3] * v26;
+        const double v28 = exp(v27);
+        const double v29 = parameters[3] * v28;
+        const double v30 = v7 * v29;
+        const double v31 = parameters[5] * v26;
+        const double v32 = exp(v31);
+        const double v33 = parameters[5] * v32;
+        const double v34 = v14 * v33;
+        const double v35 = v34 + v30;
+        const double v36 = parameters[1] * v26;
+        const double v37 = exp(v36);
+        const double v38 = parameters[1] * v37;
+        const double v39 = v22 * v38;
+        const double v40 = v35 + v39;
+        const double v41 = v40 - v24;
+        const double v42 = exp(d[1]);
+        const double v43 = log(v42);
+        const double v44 = parameters[3] * v43;
+        const double v45 = exp(v44);
+        const double v46 = parameters[3] * v45;
+        const double v47 = v7 * v46;
+        const double v48 = parameters[5] * v43;
+        const double v49 = exp(v48);
+        const double v50 = parameters[5] * v49;
+        const double v51 = v14 * v50;
+        const double v52 = v51 + v47;
+        const double v53 = parameters[1] * v43;
+        const double v54 = exp(v53);
+        const double v55 = parameters[1] * v54;
+        const double v56 = v22 * v55;
+        const double v57 = v52 + v56;
+        const double v58 = v57 - v24;
+        R[0] = v41;
+        R[1] = v58;
+    }
 }
 
 static void softehl_sheet_ogden_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1;
     softehl_load2(X + 0, 2, &X0, &X1);
     (void)X0; (void)X1;
@@ -302,54 +265,25 @@ void softehl_sheet_ogden_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_tangent_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, tangent + 4 * e);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_sheet_ogden_tangent_group(points, modes, coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters, rule, basis, values + 2 * e, tangent + (2 * 2) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_sheet_ogden_tangent_group(points, modes, coordinates + 2 * (n - SOFTEHL_LANES), dofs + 2 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 2 * (n - SOFTEHL_LANES), tangent + (2 * 2) * (n - SOFTEHL_LANES));
+        return;
+    }
     double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
+    softehl_pad(X, coordinates, 2, n);
     double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 4];
-    softehl_sheet_ogden_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) tangent[4 * e + i] = K[i];
-}
-
-static void softehl_sheet_ogden_d_mu_1_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = parameters[1] * v3;
-    const V v5 = softehl_vlog(v1);
-    const V v6 = parameters[1] * v5;
-    const V v7 = softehl_vexp(v6);
-    const V v8 = -v4;
-    const V v9 = softehl_vlog(v2);
-    const V v10 = parameters[1] * v9;
-    const V v11 = softehl_vexp(v10);
-    const V v12 = softehl_vexp(v8);
-    const V v13 = v11 - v12;
-    const V v14 = v7 - v12;
-    softehl_store2(R + 0, 2, v14, v13);
+    softehl_pad(d, dofs, 2, n);
+    double R[SOFTEHL_LANES * 2];
+    double K[SOFTEHL_LANES * (2 * 2)];
+    softehl_sheet_ogden_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < 2 * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < (2 * 2) * n; ++i) tangent[i] = K[i];
+#endif
 }
 
 void softehl_sheet_ogden_d_mu_1(
@@ -360,71 +294,35 @@ void softehl_sheet_ogden_d_mu_1(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_d_mu_1_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_ogden_d_mu_1_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_ogden_d_alpha_1_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = 1.0 / parameters[1];
-    const V v5 = parameters[1] * v3;
-    const V v6 = softehl_vlog(v1);
-    const V v7 = softehl_vlog(v2);
-    const V v8 = -v5;
-    const V v9 = softehl_vexp(v8);
-    const V v10 = parameters[1] * v6;
-    const V v11 = softehl_vexp(v10);
-    const V v12 = parameters[1] * v7;
-    const V v13 = softehl_vexp(v12);
-    const double v14 = parameters[0] * v4;
-    const double v15 = v4 * v14;
-    const V v16 = v7 * v14;
-    const V v17 = v6 * v14;
-    const V v18 = v3 * v14;
-    const V v19 = v16 - v15;
-    const V v20 = parameters[1] * v19;
-    const V v21 = v14 + v20;
-    const V v22 = v13 * v21;
-    const V v23 = v17 - v15;
-    const V v24 = v18 + v15;
-    const V v25 = parameters[1] * v23;
-    const V v26 = v14 + v25;
-    const V v27 = v11 * v26;
-    const V v28 = parameters[1] * v24;
-    const V v29 = v14 - v28;
-    const V v30 = v9 * v29;
-    const V v31 = v22 - v30;
-    const V v32 = v27 - v30;
-    softehl_store2(R + 0, 2, v32, v31);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = d[0] + d[1];
+        const double v2 = parameters[1] * v1;
+        const double v3 = -v2;
+        const double v4 = exp(v3);
+        const double v5 = exp(d[0]);
+        const double v6 = log(v5);
+        const double v7 = parameters[1] * v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 - v4;
+        const double v10 = exp(d[1]);
+        const double v11 = log(v10);
+        const double v12 = parameters[1] * v11;
+        const double v13 = exp(v12);
+        const double v14 = v13 - v4;
+        R[0] = v9;
+        R[1] = v14;
+    }
 }
 
 void softehl_sheet_ogden_d_alpha_1(
@@ -435,53 +333,53 @@ void softehl_sheet_ogden_d_alpha_1(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_d_alpha_1_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_ogden_d_alpha_1_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_ogden_d_mu_2_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = parameters[3] * v3;
-    const V v5 = softehl_vlog(v1);
-    const V v6 = softehl_vlog(v2);
-    const V v7 = parameters[3] * v5;
-    const V v8 = parameters[3] * v6;
-    const V v9 = -v4;
-    const V v10 = softehl_vexp(v7);
-    const V v11 = softehl_vexp(v8);
-    const V v12 = softehl_vexp(v9);
-    const V v13 = v11 - v12;
-    const V v14 = v10 - v12;
-    softehl_store2(R + 0, 2, v14, v13);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = 1.0 / parameters[1];
+        const double v2 = parameters[0] * v1;
+        const double v3 = v1 * v2;
+        const double v4 = d[0] + d[1];
+        const double v5 = v4 * v2;
+        const double v6 = v5 + v3;
+        const double v7 = parameters[1] * v6;
+        const double v8 = v2 - v7;
+        const double v9 = parameters[1] * v4;
+        const double v10 = -v9;
+        const double v11 = exp(v10);
+        const double v12 = v11 * v8;
+        const double v13 = exp(d[0]);
+        const double v14 = log(v13);
+        const double v15 = v14 * v2;
+        const double v16 = v15 - v3;
+        const double v17 = parameters[1] * v16;
+        const double v18 = v2 + v17;
+        const double v19 = parameters[1] * v14;
+        const double v20 = exp(v19);
+        const double v21 = v20 * v18;
+        const double v22 = v21 - v12;
+        const double v23 = exp(d[1]);
+        const double v24 = log(v23);
+        const double v25 = v24 * v2;
+        const double v26 = v25 - v3;
+        const double v27 = parameters[1] * v26;
+        const double v28 = v2 + v27;
+        const double v29 = parameters[1] * v24;
+        const double v30 = exp(v29);
+        const double v31 = v30 * v28;
+        const double v32 = v31 - v12;
+        R[0] = v22;
+        R[1] = v32;
+    }
 }
 
 void softehl_sheet_ogden_d_mu_2(
@@ -492,71 +390,35 @@ void softehl_sheet_ogden_d_mu_2(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_d_mu_2_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_ogden_d_mu_2_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_ogden_d_alpha_2_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = 1.0 / parameters[3];
-    const V v5 = parameters[3] * v3;
-    const V v6 = softehl_vlog(v1);
-    const V v7 = softehl_vlog(v2);
-    const V v8 = -v5;
-    const V v9 = softehl_vexp(v8);
-    const V v10 = parameters[3] * v6;
-    const V v11 = softehl_vexp(v10);
-    const V v12 = parameters[3] * v7;
-    const V v13 = softehl_vexp(v12);
-    const double v14 = parameters[2] * v4;
-    const double v15 = v4 * v14;
-    const V v16 = v7 * v14;
-    const V v17 = v6 * v14;
-    const V v18 = v3 * v14;
-    const V v19 = v16 - v15;
-    const V v20 = parameters[3] * v19;
-    const V v21 = v14 + v20;
-    const V v22 = v13 * v21;
-    const V v23 = v17 - v15;
-    const V v24 = v18 + v15;
-    const V v25 = parameters[3] * v23;
-    const V v26 = v14 + v25;
-    const V v27 = v11 * v26;
-    const V v28 = parameters[3] * v24;
-    const V v29 = v14 - v28;
-    const V v30 = v9 * v29;
-    const V v31 = v22 - v30;
-    const V v32 = v27 - v30;
-    softehl_store2(R + 0, 2, v32, v31);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = d[0] + d[1];
+        const double v2 = parameters[3] * v1;
+        const double v3 = -v2;
+        const double v4 = exp(v3);
+        const double v5 = exp(d[0]);
+        const double v6 = log(v5);
+        const double v7 = parameters[3] * v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 - v4;
+        const double v10 = exp(d[1]);
+        const double v11 = log(v10);
+        const double v12 = parameters[3] * v11;
+        const double v13 = exp(v12);
+        const double v14 = v13 - v4;
+        R[0] = v9;
+        R[1] = v14;
+    }
 }
 
 void softehl_sheet_ogden_d_alpha_2(
@@ -567,53 +429,53 @@ void softehl_sheet_ogden_d_alpha_2(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_d_alpha_2_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_ogden_d_alpha_2_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_ogden_d_mu_3_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = parameters[5] * v3;
-    const V v5 = softehl_vlog(v1);
-    const V v6 = softehl_vlog(v2);
-    const V v7 = parameters[5] * v5;
-    const V v8 = parameters[5] * v6;
-    const V v9 = -v4;
-    const V v10 = softehl_vexp(v7);
-    const V v11 = softehl_vexp(v8);
-    const V v12 = softehl_vexp(v9);
-    const V v13 = v11 - v12;
-    const V v14 = v10 - v12;
-    softehl_store2(R + 0, 2, v14, v13);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = 1.0 / parameters[3];
+        const double v2 = parameters[2] * v1;
+        const double v3 = v1 * v2;
+        const double v4 = d[0] + d[1];
+        const double v5 = v4 * v2;
+        const double v6 = v5 + v3;
+        const double v7 = parameters[3] * v6;
+        const double v8 = v2 - v7;
+        const double v9 = parameters[3] * v4;
+        const double v10 = -v9;
+        const double v11 = exp(v10);
+        const double v12 = v11 * v8;
+        const double v13 = exp(d[0]);
+        const double v14 = log(v13);
+        const double v15 = v14 * v2;
+        const double v16 = v15 - v3;
+        const double v17 = parameters[3] * v16;
+        const double v18 = v2 + v17;
+        const double v19 = parameters[3] * v14;
+        const double v20 = exp(v19);
+        const double v21 = v20 * v18;
+        const double v22 = v21 - v12;
+        const double v23 = exp(d[1]);
+        const double v24 = log(v23);
+        const double v25 = v24 * v2;
+        const double v26 = v25 - v3;
+        const double v27 = parameters[3] * v26;
+        const double v28 = v2 + v27;
+        const double v29 = parameters[3] * v24;
+        const double v30 = exp(v29);
+        const double v31 = v30 * v28;
+        const double v32 = v31 - v12;
+        R[0] = v22;
+        R[1] = v32;
+    }
 }
 
 void softehl_sheet_ogden_d_mu_3(
@@ -624,71 +486,35 @@ void softehl_sheet_ogden_d_mu_3(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_d_mu_3_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_ogden_d_mu_3_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_ogden_d_alpha_3_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = 1.0 / parameters[5];
-    const V v5 = parameters[5] * v3;
-    const V v6 = softehl_vlog(v1);
-    const V v7 = softehl_vlog(v2);
-    const V v8 = -v5;
-    const V v9 = softehl_vexp(v8);
-    const V v10 = parameters[5] * v6;
-    const V v11 = softehl_vexp(v10);
-    const V v12 = parameters[5] * v7;
-    const V v13 = softehl_vexp(v12);
-    const double v14 = parameters[4] * v4;
-    const double v15 = v4 * v14;
-    const V v16 = v7 * v14;
-    const V v17 = v6 * v14;
-    const V v18 = v3 * v14;
-    const V v19 = v16 - v15;
-    const V v20 = parameters[5] * v19;
-    const V v21 = v14 + v20;
-    const V v22 = v13 * v21;
-    const V v23 = v17 - v15;
-    const V v24 = v18 + v15;
-    const V v25 = parameters[5] * v23;
-    const V v26 = v14 + v25;
-    const V v27 = v11 * v26;
-    const V v28 = parameters[5] * v24;
-    const V v29 = v14 - v28;
-    const V v30 = v9 * v29;
-    const V v31 = v22 - v30;
-    const V v32 = v27 - v30;
-    softehl_store2(R + 0, 2, v32, v31);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = d[0] + d[1];
+        const double v2 = parameters[5] * v1;
+        const double v3 = -v2;
+        const double v4 = exp(v3);
+        const double v5 = exp(d[0]);
+        const double v6 = log(v5);
+        const double v7 = parameters[5] * v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 - v4;
+        const double v10 = exp(d[1]);
+        const double v11 = log(v10);
+        const double v12 = parameters[5] * v11;
+        const double v13 = exp(v12);
+        const double v14 = v13 - v4;
+        R[0] = v9;
+        R[1] = v14;
+    }
 }
 
 void softehl_sheet_ogden_d_alpha_3(
@@ -699,22 +525,51 @@ void softehl_sheet_ogden_d_alpha_3(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_d_alpha_3_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_ogden_d_alpha_3_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = 1.0 / parameters[5];
+        const double v2 = parameters[4] * v1;
+        const double v3 = v1 * v2;
+        const double v4 = d[0] + d[1];
+        const double v5 = v4 * v2;
+        const double v6 = v5 + v3;
+        const double v7 = parameters[5] * v6;
+        const double v8 = v2 - v7;
+        const double v9 = parameters[5] * v4;
+        const double v10 = -v9;
+        const double v11 = exp(v10);
+        const double v12 = v11 * v8;
+        const double v13 = exp(d[0]);
+        const double v14 = log(v13);
+        const double v15 = v14 * v2;
+        const double v16 = v15 - v3;
+        const double v17 = parameters[5] * v16;
+        const double v18 = v2 + v17;
+        const double v19 = parameters[5] * v14;
+        const double v20 = exp(v19);
+        const double v21 = v20 * v18;
+        const double v22 = v21 - v12;
+        const double v23 = exp(d[1]);
+        const double v24 = log(v23);
+        const double v25 = v24 * v2;
+        const double v26 = v25 - v3;
+        const double v27 = parameters[5] * v26;
+        const double v28 = v2 + v27;
+        const double v29 = parameters[5] * v24;
+        const double v30 = exp(v29);
+        const double v31 = v30 * v28;
+        const double v32 = v31 - v12;
+        R[0] = v22;
+        R[1] = v32;
+    }
 }

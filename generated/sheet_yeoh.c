@@ -10,38 +10,6 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_sheet_yeoh_energy_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = -v3;
-    const V v5 = softehl_vexp(v4);
-    const V v6 = v1 * v1;
-    const V v7 = v2 * v2;
-    const V v8 = v6 + v7;
-    const V v9 = v5 * v5;
-    const V v10 = v8 + v9;
-    const V v11 = v10 - 3.0;
-    const V v12 = v11 * v11;
-    const V v13 = parameters[2] * v12;
-    const V v14 = parameters[0] + v13;
-    const V v15 = v11 * v14;
-    const V v16 = parameters[1] * v12;
-    const V v17 = v16 + v15;
-    softehl_store1(R + 0, 1, v17);
-}
-
 void softehl_sheet_yeoh_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,
@@ -50,67 +18,36 @@ void softehl_sheet_yeoh_energy(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_yeoh_energy_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 1 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_sheet_yeoh_energy_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
-}
-
-static void softehl_sheet_yeoh_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 3.0 * parameters[2];
-    const double v2 = 2.0 * parameters[1];
-    const V v3 = softehl_vexp(d0);
-    const V v4 = softehl_vexp(d1);
-    const V v5 = d0 + d1;
-    const V v6 = -v5;
-    const V v7 = softehl_vexp(v6);
-    const V v8 = 2.0 * v7;
-    const V v9 = v7 * v8;
-    const V v10 = v7 * v7;
-    const V v11 = v3 * v3;
-    const V v12 = v11 + v10;
-    const V v13 = v4 * v4;
-    const V v14 = v13 + v12;
-    const V v15 = v14 - 3.0;
-    const V v16 = v1 * v15;
-    const V v17 = v2 + v16;
-    const V v18 = v15 * v17;
-    const V v19 = parameters[0] + v18;
-    const V v20 = v9 * v19;
-    const V v21 = 2.0 * v4;
-    const V v22 = v4 * v21;
-    const V v23 = v22 * v19;
-    const V v24 = v23 - v20;
-    const V v25 = 2.0 * v3;
-    const V v26 = v3 * v25;
-    const V v27 = v26 * v19;
-    const V v28 = v27 - v20;
-    softehl_store2(R + 0, 2, v28, v24);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = v11 * v11;
+        const double v13 = parameters[2] * v12;
+        const double v14 = parameters[0] + v13;
+        const double v15 = v11 * v14;
+        const double v16 = parameters[1] * v12;
+        const double v17 = v16 + v15;
+        values[e] = v17;
+    }
 }
 
 void softehl_sheet_yeoh_residual(
@@ -121,99 +58,49 @@ void softehl_sheet_yeoh_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_yeoh_residual_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_yeoh_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_yeoh_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 3.0 * parameters[2];
-    const V v2 = softehl_vexp(d0);
-    const V v3 = softehl_vexp(d1);
-    const V v4 = d0 + d1;
-    const V v5 = -v4;
-    const double v6 = 2.0 * parameters[1];
-    const V v7 = softehl_vexp(v5);
-    const V v8 = 2.0 * v7;
-    const V v9 = 2.0 * v3;
-    const V v10 = 2.0 * v2;
-    const V v11 = v7 * v8;
-    const V v12 = v2 * v10;
-    const V v13 = v2 * v2;
-    const V v14 = v3 * v3;
-    const V v15 = v13 + v14;
-    const V v16 = v7 * v7;
-    const V v17 = v15 + v16;
-    const V v18 = v17 - 3.0;
-    const V v19 = v18 * v1;
-    const V v20 = 2.0 * v18;
-    const V v21 = v18 * v19;
-    const V v22 = parameters[0] + v21;
-    const V v23 = parameters[1] * v20;
-    const V v24 = v23 + v22;
-    const V v25 = v1 * v20;
-    const V v26 = v6 + v25;
-    const V v27 = v8 * v24;
-    const V v28 = v9 * v24;
-    const V v29 = v10 * v24;
-    const V v30 = v3 * v9;
-    const V v31 = v30 - v11;
-    const V v32 = v31 * v26;
-    const V v33 = v9 * v32;
-    const V v34 = v33 + v28;
-    const V v35 = v3 * v28;
-    const V v36 = v3 * v34;
-    const V v37 = v12 - v11;
-    const V v38 = v37 * v26;
-    const V v39 = v10 * v38;
-    const V v40 = v8 * v38;
-    const V v41 = v8 * v32;
-    const V v42 = v12 * v32;
-    const V v43 = v40 - v27;
-    const V v44 = v41 - v27;
-    const V v45 = v7 * v27;
-    const V v46 = v39 + v29;
-    const V v47 = v2 * v29;
-    const V v48 = v2 * v46;
-    const V v49 = v7 * v43;
-    const V v50 = v48 - v49;
-    const V v51 = v45 + v50;
-    const V v52 = v47 + v51;
-    const V v53 = v47 - v45;
-    const V v54 = v35 + v36;
-    const V v55 = v35 - v45;
-    softehl_store2(R + 0, 2, v53, v55);
-    const V v56 = v7 * v44;
-    const V v57 = v45 - v56;
-    const V v58 = v42 + v57;
-    const V v59 = v54 + v57;
-    softehl_store4(K + 0, 4, v52, v58, v58, v59);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 3.0 * parameters[2];
+        const double v13 = v11 * v12;
+        const double v14 = 2.0 * parameters[1];
+        const double v15 = v14 + v13;
+        const double v16 = v11 * v15;
+        const double v17 = parameters[0] + v16;
+        const double v18 = 2.0 * v3;
+        const double v19 = v3 * v18;
+        const double v20 = v19 * v17;
+        const double v21 = 2.0 * v8;
+        const double v22 = v8 * v21;
+        const double v23 = v22 * v17;
+        const double v24 = v20 - v23;
+        const double v25 = 2.0 * v1;
+        const double v26 = v1 * v25;
+        const double v27 = v26 * v17;
+        const double v28 = v27 - v23;
+        R[0] = v24;
+        R[1] = v28;
+    }
 }
 
 void softehl_sheet_yeoh_tangent(
@@ -224,53 +111,84 @@ void softehl_sheet_yeoh_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_yeoh_tangent_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, tangent + 4 * e);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 4];
-    softehl_sheet_yeoh_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 4 * (n - e); ++i) tangent[4 * e + i] = K[i];
-}
-
-static void softehl_sheet_yeoh_d_c_1_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = -v3;
-    const V v5 = softehl_vexp(v4);
-    const V v6 = 2.0 * v5;
-    const V v7 = v5 * v6;
-    const V v8 = 2.0 * v2;
-    const V v9 = v2 * v8;
-    const V v10 = v9 - v7;
-    const V v11 = 2.0 * v1;
-    const V v12 = v1 * v11;
-    const V v13 = v12 - v7;
-    softehl_store2(R + 0, 2, v13, v10);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        double *restrict K = tangent + 2 * 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 3.0 * parameters[2];
+        const double v13 = v11 * v12;
+        const double v14 = v11 * v13;
+        const double v15 = 2.0 * v11;
+        const double v16 = parameters[1] * v15;
+        const double v17 = parameters[0] + v16;
+        const double v18 = v14 + v17;
+        const double v19 = 2.0 * v3;
+        const double v20 = v19 * v18;
+        const double v21 = v3 * v20;
+        const double v22 = 2.0 * v8;
+        const double v23 = v22 * v18;
+        const double v24 = v8 * v23;
+        const double v25 = v21 - v24;
+        const double v26 = 2.0 * v1;
+        const double v27 = v26 * v18;
+        const double v28 = v1 * v27;
+        const double v29 = v28 - v24;
+        const double v30 = v24 + v21;
+        const double v31 = v12 * v15;
+        const double v32 = 2.0 * parameters[1];
+        const double v33 = v32 + v31;
+        const double v34 = v3 * v19;
+        const double v35 = v8 * v22;
+        const double v36 = v34 - v35;
+        const double v37 = v36 * v33;
+        const double v38 = v19 * v37;
+        const double v39 = v38 + v20;
+        const double v40 = v3 * v39;
+        const double v41 = v40 + v30;
+        const double v42 = v22 * v37;
+        const double v43 = v42 - v23;
+        const double v44 = v8 * v43;
+        const double v45 = v41 - v44;
+        const double v46 = v1 * v26;
+        const double v47 = v46 - v35;
+        const double v48 = v47 * v33;
+        const double v49 = v22 * v48;
+        const double v50 = v49 - v23;
+        const double v51 = v8 * v50;
+        const double v52 = v24 - v51;
+        const double v53 = v34 * v48;
+        const double v54 = v53 + v52;
+        const double v55 = v26 * v48;
+        const double v56 = v55 + v27;
+        const double v57 = v1 * v56;
+        const double v58 = v28 + v57;
+        const double v59 = v52 + v58;
+        R[0] = v25;
+        R[1] = v29;
+        K[0] = v45;
+        K[1] = v54;
+        K[2] = v54;
+        K[3] = v59;
+    }
 }
 
 void softehl_sheet_yeoh_d_c_1(
@@ -281,62 +199,35 @@ void softehl_sheet_yeoh_d_c_1(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_yeoh_d_c_1_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_yeoh_d_c_1_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_yeoh_d_c_2_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = -v3;
-    const V v5 = softehl_vexp(v4);
-    const V v6 = 2.0 * v5;
-    const V v7 = v5 * v6;
-    const V v8 = v5 * v5;
-    const V v9 = v1 * v1;
-    const V v10 = v9 + v8;
-    const V v11 = v2 * v2;
-    const V v12 = v11 + v10;
-    const V v13 = v12 - 3.0;
-    const V v14 = 2.0 * v13;
-    const V v15 = v7 * v14;
-    const V v16 = 2.0 * v2;
-    const V v17 = v2 * v16;
-    const V v18 = v17 * v14;
-    const V v19 = v18 - v15;
-    const V v20 = 2.0 * v1;
-    const V v21 = v1 * v20;
-    const V v22 = v21 * v14;
-    const V v23 = v22 - v15;
-    softehl_store2(R + 0, 2, v23, v19);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)parameters;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[0]);
+        const double v2 = 2.0 * v1;
+        const double v3 = v1 * v2;
+        const double v4 = d[0] + d[1];
+        const double v5 = -v4;
+        const double v6 = exp(v5);
+        const double v7 = 2.0 * v6;
+        const double v8 = v6 * v7;
+        const double v9 = v3 - v8;
+        const double v10 = exp(d[1]);
+        const double v11 = 2.0 * v10;
+        const double v12 = v10 * v11;
+        const double v13 = v12 - v8;
+        R[0] = v9;
+        R[1] = v13;
+    }
 }
 
 void softehl_sheet_yeoh_d_c_2(
@@ -347,63 +238,45 @@ void softehl_sheet_yeoh_d_c_2(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_yeoh_d_c_2_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_yeoh_d_c_2_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
-}
-
-static void softehl_sheet_yeoh_d_c_3_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K)
-{
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
-    V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
-    V d0, d1;
-    softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const V v4 = -v3;
-    const V v5 = softehl_vexp(v4);
-    const V v6 = 2.0 * v5;
-    const V v7 = v5 * v6;
-    const V v8 = v5 * v5;
-    const V v9 = v1 * v1;
-    const V v10 = v9 + v8;
-    const V v11 = v2 * v2;
-    const V v12 = v11 + v10;
-    const V v13 = v12 - 3.0;
-    const V v14 = 3.0 * v13;
-    const V v15 = v13 * v14;
-    const V v16 = v7 * v15;
-    const V v17 = 2.0 * v2;
-    const V v18 = v2 * v17;
-    const V v19 = v18 * v15;
-    const V v20 = v19 - v16;
-    const V v21 = 2.0 * v1;
-    const V v22 = v1 * v21;
-    const V v23 = v22 * v15;
-    const V v24 = v23 - v16;
-    softehl_store2(R + 0, 2, v24, v20);
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)parameters;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 2.0 * v11;
+        const double v13 = 2.0 * v3;
+        const double v14 = v3 * v13;
+        const double v15 = v14 * v12;
+        const double v16 = 2.0 * v8;
+        const double v17 = v8 * v16;
+        const double v18 = v17 * v12;
+        const double v19 = v15 - v18;
+        const double v20 = 2.0 * v1;
+        const double v21 = v1 * v20;
+        const double v22 = v21 * v12;
+        const double v23 = v22 - v18;
+        R[0] = v19;
+        R[1] = v23;
+    }
 }
 
 void softehl_sheet_yeoh_d_c_3(
@@ -414,22 +287,44 @@ void softehl_sheet_yeoh_d_c_3(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_yeoh_d_c_3_group(coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters,
-            values + 2 * e, 0);
-    if (e == n) return;
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates + 2 * e, 2, n - e);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs + 2 * e, 2, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 2], K[SOFTEHL_LANES * 1];
-    softehl_sheet_yeoh_d_c_3_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 2 * (n - e); ++i) values[2 * e + i] = R[i];
+    (void)points;
+    (void)modes;
+    (void)data;
+    (void)parameters;
+    (void)direction;
+    (void)rule;
+    (void)basis;
+    (void)tangent;
+    for (ptrdiff_t e = 0; e < n; ++e) {
+        const double *restrict X = coordinates + 2 * e;
+        const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e;
+        (void)X; (void)d;
+        const double v1 = exp(d[1]);
+        const double v2 = v1 * v1;
+        const double v3 = exp(d[0]);
+        const double v4 = v3 * v3;
+        const double v5 = v4 + v2;
+        const double v6 = d[0] + d[1];
+        const double v7 = -v6;
+        const double v8 = exp(v7);
+        const double v9 = v8 * v8;
+        const double v10 = v5 + v9;
+        const double v11 = v10 - 3.0;
+        const double v12 = 3.0 * v11;
+        const double v13 = v11 * v12;
+        const double v14 = 2.0 * v3;
+        const double v15 = v3 * v14;
+        const double v16 = v15 * v13;
+        const double v17 = 2.0 * v8;
+        const double v18 = v8 * v17;
+        const double v19 = v18 * v13;
+        const double v20 = v16 - v19;
+        const double v21 = 2.0 * v1;
+        const double v22 = v1 * v21;
+        const double v23 = v22 * v13;
+        const double v24 = v23 - v19;
+        R[0] = v20;
+        R[1] = v24;
+    }
 }

@@ -24,11 +24,12 @@
 #include "softehl_kernels.h"
 
 static void softehl_solid_q4_energy_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -540,32 +541,32 @@ void softehl_solid_q4_energy(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_q4_energy_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
-            values + 1 * e, 0);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_solid_q4_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_solid_q4_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs + 8 * e, 8, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 1], K[SOFTEHL_LANES * 1];
-    softehl_solid_q4_energy_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 1 * (n - e); ++i) values[1 * e + i] = R[i];
+    softehl_pad(d, dofs, 8, n);
+    double R[SOFTEHL_LANES * 1];
+    softehl_solid_q4_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
+#endif
 }
 
 static void softehl_solid_q4_residual_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -1160,32 +1161,32 @@ void softehl_solid_q4_residual(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_q4_residual_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
-            values + 8 * e, 0);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_solid_q4_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_solid_q4_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs + 8 * e, 8, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 8], K[SOFTEHL_LANES * 1];
-    softehl_solid_q4_residual_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 8 * (n - e); ++i) values[8 * e + i] = R[i];
+    softehl_pad(d, dofs, 8, n);
+    double R[SOFTEHL_LANES * 8];
+    softehl_solid_q4_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
+#endif
 }
 
 static void softehl_solid_q4_tangent_group(
-    const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
     double *restrict R, double *restrict K)
 {
-    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
     (void)X0; (void)X1; (void)X2; (void)X3;
@@ -2798,25 +2799,302 @@ void softehl_solid_q4_tangent(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;
-    (void)parameters, (void)direction;
-    ptrdiff_t e = 0;
-    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_q4_tangent_group(coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters,
-            values + 8 * e, tangent + 64 * e);
-    if (e == n) return;
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_solid_q4_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_solid_q4_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
+        return;
+    }
     double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates + 8 * e, 8, n - e);
+    softehl_pad(X, coordinates, 8, n);
     double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs + 8 * e, 8, n - e);
-    double a[SOFTEHL_LANES * 1];
-    a[0] = 0.0;
-    double t[SOFTEHL_LANES * 1];
-    t[0] = 0.0;
-    double R[SOFTEHL_LANES * 8], K[SOFTEHL_LANES * 64];
-    softehl_solid_q4_tangent_group(X, d, a, t, parameters, R, K);
-    for (ptrdiff_t i = 0; i < 8 * (n - e); ++i) values[8 * e + i] = R[i];
-    for (ptrdiff_t i = 0; i < 64 * (n - e); ++i) tangent[64 * e + i] = K[i];
+    softehl_pad(d, dofs, 8, n);
+    double R[SOFTEHL_LANES * 8];
+    double K[SOFTEHL_LANES * (8 * 8)];
+    softehl_solid_q4_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
+#endif
+}
+
+static void softehl_solid_q4_fields_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
+    const double *restrict d, const double *restrict a, const double *restrict t,
+    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
+    double *restrict R, double *restrict K)
+{
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
+    (void)X0; (void)X1; (void)X2; (void)X3;
+    V X4, X5, X6, X7;
+    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    (void)X4; (void)X5; (void)X6; (void)X7;
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
+    (void)d0; (void)d1; (void)d2; (void)d3;
+    V d4, d5, d6, d7;
+    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    (void)d4; (void)d5; (void)d6; (void)d7;
+    const double v1 = 0.5 * parameters[0];
+    const double v2 = 0.5 * parameters[1];
+    const double v3 = 0.25 * parameters[2];
+    const V v4 = X0 + d0;
+    const V v5 = X1 + d1;
+    const V v6 = X2 + d2;
+    const V v7 = X3 + d3;
+    const V v8 = X4 + d4;
+    const V v9 = X4 - X2;
+    const V v10 = X6 + d6;
+    const V v11 = X4 - X6;
+    const V v12 = X5 + d5;
+    const V v13 = X5 - X3;
+    const V v14 = X7 + d7;
+    const V v15 = X5 - X7;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q;
+        (void)w;
+        const double v16 = 1.0 - w[0];
+        const double v17 = 1.0 + w[0];
+        const double v18 = 0.25 * w[0];
+        const double v19 = 1.0 - w[1];
+        const double v20 = 1.0 + w[1];
+        const double v21 = 0.25 * w[1];
+        const double v22 = 0.25 * v19;
+        const double v23 = 0.25 + v18;
+        const double v24 = 0.25 - v18;
+        const double v25 = 0.25 * v20;
+        const double v26 = 0.25 - v21;
+        const double v27 = 0.25 + v21;
+        const double v28 = v18 - 0.25;
+        const double v29 = v22 * v16;
+        const double v30 = v22 * v17;
+        const double v31 = v17 * v25;
+        const double v32 = v16 * v25;
+        const double v33 = v21 - 0.25;
+        const V v34 = X6 * v24;
+        const V v35 = X2 * v26;
+        const V v36 = v27 * v15;
+        const V v37 = v23 * v13;
+        const V v38 = v29 * v4;
+        const V v39 = v29 * v5;
+        const V v40 = v23 * v9;
+        const V v41 = v34 + v40;
+        const V v42 = X5 * v31;
+        const V v43 = v27 * v11;
+        const V v44 = v35 + v43;
+        const V v45 = X3 * v26;
+        const V v46 = v45 + v36;
+        const V v47 = X7 * v24;
+        const V v48 = v47 + v37;
+        const V v49 = v31 * v8;
+        const V v50 = v38 + v49;
+        const V v51 = v31 * v12;
+        const V v52 = v39 + v51;
+        const V v53 = d5 * v31;
+        const V v54 = X7 * v32;
+        const V v55 = v42 + v54;
+        const V v56 = v32 * v10;
+        const V v57 = v56 + v50;
+        const V v58 = v32 * v14;
+        const V v59 = v58 + v52;
+        const V v60 = d7 * v32;
+        const V v61 = v53 + v60;
+        const V v62 = X3 * v30;
+        const V v63 = v62 + v55;
+        const V v64 = v6 * v30;
+        const V v65 = v64 + v57;
+        const V v66 = v7 * v30;
+        const V v67 = v66 + v59;
+        const V v68 = d3 * v30;
+        const V v69 = v68 + v61;
+        const V v70 = X0 * v33;
+        const V v71 = v70 + v44;
+        const V v72 = X0 * v28;
+        const V v73 = v72 + v41;
+        const V v74 = X1 * v33;
+        const V v75 = v74 + v46;
+        const V v76 = X1 * v28;
+        const V v77 = v76 + v48;
+        const V v78 = X1 * v29;
+        const V v79 = v78 + v63;
+        const V v80 = d1 * v29;
+        const V v81 = v80 + v69;
+        const V v82 = 1.0 / v79;
+        const V v83 = v28 * v71;
+        const V v84 = v24 * v71;
+        const V v85 = v24 * v75;
+        const V v86 = v71 * v77;
+        const V v87 = v23 * v71;
+        const V v88 = v23 * v75;
+        const V v89 = v33 * v77;
+        const V v90 = v33 * v73;
+        const V v91 = v83 - v90;
+        const V v92 = v28 * v75;
+        const V v93 = v89 - v92;
+        const V v94 = v73 * v75;
+        const V v95 = v86 - v94;
+        const V v96 = 1.0 / v95;
+        const V v97 = v27 * v77;
+        const V v98 = v27 * v73;
+        const V v99 = v26 * v73;
+        const V v100 = v87 + v99;
+        const V v101 = v26 * v77;
+        const V v102 = v88 + v101;
+        const V v103 = v85 + v97;
+        const V v104 = v87 - v98;
+        const V v105 = v84 + v98;
+        const V v106 = v97 - v88;
+        const V v107 = v81 * v82;
+        const V v108 = 1.0 + v107;
+        const V v109 = v93 * v96;
+        const V v110 = v91 * v96;
+        const V v111 = v96 * v102;
+        const V v112 = v96 * v100;
+        const V v113 = v96 * v106;
+        const V v114 = v96 * v104;
+        const V v115 = v108 * v108;
+        const V v116 = 2.0 * v108;
+        const V v117 = v96 * v103;
+        const V v118 = v96 * v105;
+        const V v119 = v108 * v116;
+        const V v120 = 2.0 * v115;
+        const V v121 = d1 * v109;
+        const V v122 = d1 * v110;
+        const V v123 = 1.0 + v122;
+        const V v124 = d0 * v110;
+        const V v125 = d0 * v109;
+        const V v126 = 1.0 + v125;
+        const V v127 = d2 * v111;
+        const V v128 = v126 + v127;
+        const V v129 = d2 * v112;
+        const V v130 = v124 - v129;
+        const V v131 = d3 * v111;
+        const V v132 = v121 + v131;
+        const V v133 = d3 * v112;
+        const V v134 = v123 - v133;
+        const V v135 = d4 * v113;
+        const V v136 = v128 + v135;
+        const V v137 = d4 * v114;
+        const V v138 = v130 + v137;
+        const V v139 = d5 * v113;
+        const V v140 = v132 + v139;
+        const V v141 = d5 * v114;
+        const V v142 = v134 + v141;
+        const V v143 = d6 * v117;
+        const V v144 = v136 - v143;
+        const V v145 = d6 * v118;
+        const V v146 = v138 + v145;
+        const V v147 = d7 * v117;
+        const V v148 = v140 - v147;
+        const V v149 = d7 * v118;
+        const V v150 = v142 + v149;
+        const V v151 = 2.0 * v148;
+        const V v152 = 2.0 * v146;
+        const V v153 = 2.0 * v144;
+        const V v154 = v144 * v148;
+        const V v155 = v144 * v144;
+        const V v156 = v148 * v148;
+        const V v157 = 2.0 * v150;
+        const V v158 = v144 * v150;
+        const V v159 = v146 * v150;
+        const V v160 = v154 + v159;
+        const V v161 = v146 * v146;
+        const V v162 = v155 + v161;
+        const V v163 = v150 * v150;
+        const V v164 = v156 + v163;
+        const V v165 = v146 * v148;
+        const V v166 = v158 - v165;
+        const V v167 = 2.0 * v160;
+        const V v168 = v115 + v162;
+        const V v169 = 2.0 * v162;
+        const V v170 = 2.0 * v164;
+        const V v171 = v166 * v166;
+        const V v172 = 2.0 * v166;
+        const V v173 = v108 * v166;
+        const V v174 = v164 + v168;
+        const V v175 = 1.0 / v173;
+        const V v176 = v115 * v172;
+        const V v177 = v115 * v171;
+        const V v178 = 2.0 * v174;
+        const V v179 = v174 * v174;
+        const V v180 = v1 * v174;
+        const V v181 = v115 * v115;
+        const V v182 = v179 - v181;
+        const V v183 = v162 * v162;
+        const V v184 = v182 - v183;
+        const V v185 = v164 * v164;
+        const V v186 = v184 - v185;
+        const V v187 = 0.5 * v186;
+        const V v188 = softehl_vrcbrt(v177);
+        const V v189 = 1.0 / v177;
+        const V v190 = v160 * v160;
+        const V v191 = v187 - v190;
+        const V v192 = v1 * v188;
+        const V v193 = v188 * v188;
+        const V v194 = parameters[1] * v188;
+        const V v195 = v191 * v194;
+        const V v196 = v180 + v195;
+        const V v197 = v2 * v193;
+        const V v198 = v167 * v197;
+        const V v199 = 0.5 * v197;
+        const V v200 = v178 * v199;
+        const V v201 = v192 + v200;
+        const V v202 = 1.0 - v189;
+        const V v203 = v3 * v202;
+        const V v204 = v119 * v175;
+        const V v205 = 0.3333333333333333 * v193;
+        const V v206 = v193 * v205;
+        const V v207 = v196 * v206;
+        const V v208 = v203 - v207;
+        const V v209 = v176 * v208;
+        const V v210 = v171 * v208;
+        const V v211 = v120 * v199;
+        const V v212 = v210 - v211;
+        const V v213 = v201 + v212;
+        const V v214 = v204 * v213;
+        const V v215 = v169 * v199;
+        const V v216 = v201 - v215;
+        const V v217 = v170 * v199;
+        const V v218 = v201 - v217;
+        const V v219 = v157 * v218;
+        const V v220 = v151 * v218;
+        const V v221 = v152 * v216;
+        const V v222 = v153 * v216;
+        const V v223 = v148 * v198;
+        const V v224 = v222 - v223;
+        const V v225 = v148 * v209;
+        const V v226 = v221 - v225;
+        const V v227 = v150 * v198;
+        const V v228 = v226 - v227;
+        const V v229 = v150 * v209;
+        const V v230 = v224 + v229;
+        const V v231 = v148 * v230;
+        const V v232 = v150 * v228;
+        const V v233 = v231 + v232;
+        const V v234 = v175 * v233;
+        const V v235 = v144 * v230;
+        const V v236 = v146 * v228;
+        const V v237 = v235 + v236;
+        const V v238 = v175 * v237;
+        const V v239 = v146 * v198;
+        const V v240 = v219 - v239;
+        const V v241 = v144 * v198;
+        const V v242 = v220 - v241;
+        const V v243 = v146 * v209;
+        const V v244 = v242 - v243;
+        const V v245 = v144 * v209;
+        const V v246 = v240 + v245;
+        const V v247 = v148 * v244;
+        const V v248 = v150 * v246;
+        const V v249 = v247 + v248;
+        const V v250 = v175 * v249;
+        softehl_store4(R + 7 * q + 0, (7 * points), v65, v67, v173, v238);
+        softehl_store3(R + 7 * q + 4, (7 * points), v250, v214, v234);
+    }
 }
 
 void softehl_solid_q4_fields(
@@ -2827,276 +3105,21 @@ void softehl_solid_q4_fields(
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent)
 {
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 8 * e;
-        const double *restrict d = dofs + 8 * e;
-        (void)X; (void)d;
-        const double v1 = 0.5 * parameters[0];
-        const double v2 = 0.5 * parameters[1];
-        const double v3 = 0.25 * parameters[2];
-        const double v4 = X[0] + d[0];
-        const double v5 = X[2] + d[2];
-        const double v6 = X[4] + d[4];
-        const double v7 = X[6] + d[6];
-        const double v8 = X[1] + d[1];
-        const double v9 = X[3] + d[3];
-        const double v10 = X[5] + d[5];
-        const double v11 = X[7] + d[7];
-        const double v12 = X[4] - X[6];
-        const double v13 = X[5] - X[7];
-        const double v14 = X[4] - X[2];
-        const double v15 = X[5] - X[3];
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 3 * q;
-            (void)w;
-            const double v16 = 1.0 + w[1];
-            const double v17 = 0.25 * v16;
-            const double v18 = 1.0 + w[0];
-            const double v19 = v18 * v17;
-            const double v20 = v19 * v6;
-            const double v21 = 1.0 - w[0];
-            const double v22 = 1.0 - w[1];
-            const double v23 = 0.25 * v22;
-            const double v24 = v23 * v21;
-            const double v25 = v24 * v4;
-            const double v26 = v25 + v20;
-            const double v27 = v21 * v17;
-            const double v28 = v27 * v7;
-            const double v29 = v28 + v26;
-            const double v30 = v23 * v18;
-            const double v31 = v5 * v30;
-            const double v32 = v31 + v29;
-            const double v33 = v19 * v10;
-            const double v34 = v24 * v8;
-            const double v35 = v34 + v33;
-            const double v36 = v27 * v11;
-            const double v37 = v36 + v35;
-            const double v38 = v9 * v30;
-            const double v39 = v38 + v37;
-            const double v40 = 0.25 * w[1];
-            const double v41 = v40 - 0.25;
-            const double v42 = X[1] * v41;
-            const double v43 = 0.25 - v40;
-            const double v44 = X[3] * v43;
-            const double v45 = v44 + v42;
-            const double v46 = 0.25 + v40;
-            const double v47 = v46 * v13;
-            const double v48 = v47 + v45;
-            const double v49 = 0.25 * w[0];
-            const double v50 = v49 - 0.25;
-            const double v51 = X[0] * v50;
-            const double v52 = 0.25 - v49;
-            const double v53 = X[6] * v52;
-            const double v54 = v53 + v51;
-            const double v55 = 0.25 + v49;
-            const double v56 = v55 * v14;
-            const double v57 = v56 + v54;
-            const double v58 = v57 * v48;
-            const double v59 = X[1] * v50;
-            const double v60 = X[7] * v52;
-            const double v61 = v60 + v59;
-            const double v62 = v55 * v15;
-            const double v63 = v62 + v61;
-            const double v64 = X[0] * v41;
-            const double v65 = X[2] * v43;
-            const double v66 = v65 + v64;
-            const double v67 = v46 * v12;
-            const double v68 = v67 + v66;
-            const double v69 = v68 * v63;
-            const double v70 = v69 - v58;
-            const double v71 = 1.0 / v70;
-            const double v72 = v55 * v48;
-            const double v73 = v43 * v63;
-            const double v74 = v73 + v72;
-            const double v75 = v74 * v71;
-            const double v76 = d[3] * v75;
-            const double v77 = v50 * v48;
-            const double v78 = v41 * v63;
-            const double v79 = v78 - v77;
-            const double v80 = v79 * v71;
-            const double v81 = d[1] * v80;
-            const double v82 = v81 + v76;
-            const double v83 = v46 * v63;
-            const double v84 = v83 - v72;
-            const double v85 = v84 * v71;
-            const double v86 = d[5] * v85;
-            const double v87 = v86 + v82;
-            const double v88 = v52 * v48;
-            const double v89 = v83 + v88;
-            const double v90 = v89 * v71;
-            const double v91 = d[7] * v90;
-            const double v92 = v87 - v91;
-            const double v93 = v46 * v57;
-            const double v94 = v55 * v68;
-            const double v95 = v94 - v93;
-            const double v96 = v95 * v71;
-            const double v97 = d[4] * v96;
-            const double v98 = v41 * v57;
-            const double v99 = v50 * v68;
-            const double v100 = v99 - v98;
-            const double v101 = v100 * v71;
-            const double v102 = d[0] * v101;
-            const double v103 = v102 + v97;
-            const double v104 = v52 * v68;
-            const double v105 = v93 + v104;
-            const double v106 = v105 * v71;
-            const double v107 = d[6] * v106;
-            const double v108 = v107 + v103;
-            const double v109 = v43 * v57;
-            const double v110 = v94 + v109;
-            const double v111 = v110 * v71;
-            const double v112 = d[2] * v111;
-            const double v113 = v108 - v112;
-            const double v114 = v113 * v92;
-            const double v115 = d[1] * v101;
-            const double v116 = 1.0 + v115;
-            const double v117 = d[5] * v96;
-            const double v118 = v117 + v116;
-            const double v119 = d[7] * v106;
-            const double v120 = v119 + v118;
-            const double v121 = d[3] * v111;
-            const double v122 = v120 - v121;
-            const double v123 = d[0] * v80;
-            const double v124 = 1.0 + v123;
-            const double v125 = d[2] * v75;
-            const double v126 = v125 + v124;
-            const double v127 = d[4] * v85;
-            const double v128 = v127 + v126;
-            const double v129 = d[6] * v90;
-            const double v130 = v128 - v129;
-            const double v131 = v130 * v122;
-            const double v132 = v131 - v114;
-            const double v133 = X[5] * v19;
-            const double v134 = X[1] * v24;
-            const double v135 = v134 + v133;
-            const double v136 = X[7] * v27;
-            const double v137 = v136 + v135;
-            const double v138 = X[3] * v30;
-            const double v139 = v138 + v137;
-            const double v140 = 1.0 / v139;
-            const double v141 = d[5] * v19;
-            const double v142 = d[1] * v24;
-            const double v143 = v142 + v141;
-            const double v144 = d[7] * v27;
-            const double v145 = v144 + v143;
-            const double v146 = d[3] * v30;
-            const double v147 = v146 + v145;
-            const double v148 = v147 * v140;
-            const double v149 = 1.0 + v148;
-            const double v150 = v149 * v132;
-            const double v151 = v132 * v132;
-            const double v152 = v149 * v149;
-            const double v153 = v152 * v151;
-            const double v154 = softehl_rcbrt(v153);
-            const double v155 = v154 * v154;
-            const double v156 = v2 * v155;
-            const double v157 = 0.5 * v156;
-            const double v158 = v113 * v113;
-            const double v159 = v130 * v130;
-            const double v160 = v159 + v158;
-            const double v161 = v152 + v160;
-            const double v162 = v122 * v122;
-            const double v163 = v92 * v92;
-            const double v164 = v163 + v162;
-            const double v165 = v164 + v161;
-            const double v166 = 2.0 * v165;
-            const double v167 = v157 * v166;
-            const double v168 = v1 * v154;
-            const double v169 = v168 + v167;
-            const double v170 = 2.0 * v160;
-            const double v171 = v170 * v157;
-            const double v172 = v169 - v171;
-            const double v173 = 2.0 * v113;
-            const double v174 = v173 * v172;
-            const double v175 = v113 * v122;
-            const double v176 = v130 * v92;
-            const double v177 = v176 + v175;
-            const double v178 = 2.0 * v177;
-            const double v179 = v178 * v156;
-            const double v180 = v122 * v179;
-            const double v181 = v174 - v180;
-            const double v182 = 0.3333333333333333 * v155;
-            const double v183 = v155 * v182;
-            const double v184 = v165 * v165;
-            const double v185 = v152 * v152;
-            const double v186 = v184 - v185;
-            const double v187 = v160 * v160;
-            const double v188 = v186 - v187;
-            const double v189 = v164 * v164;
-            const double v190 = v188 - v189;
-            const double v191 = 0.5 * v190;
-            const double v192 = v177 * v177;
-            const double v193 = v191 - v192;
-            const double v194 = parameters[1] * v154;
-            const double v195 = v194 * v193;
-            const double v196 = v1 * v165;
-            const double v197 = v196 + v195;
-            const double v198 = v183 * v197;
-            const double v199 = 1.0 / v153;
-            const double v200 = 1.0 - v199;
-            const double v201 = v3 * v200;
-            const double v202 = v201 - v198;
-            const double v203 = 2.0 * v132;
-            const double v204 = v152 * v203;
-            const double v205 = v204 * v202;
-            const double v206 = v92 * v205;
-            const double v207 = v181 - v206;
-            const double v208 = v113 * v207;
-            const double v209 = v122 * v205;
-            const double v210 = 2.0 * v130;
-            const double v211 = v210 * v172;
-            const double v212 = v211 + v209;
-            const double v213 = v92 * v179;
-            const double v214 = v212 - v213;
-            const double v215 = v130 * v214;
-            const double v216 = v215 + v208;
-            const double v217 = 1.0 / v150;
-            const double v218 = v217 * v216;
-            const double v219 = v130 * v205;
-            const double v220 = 2.0 * v164;
-            const double v221 = v220 * v157;
-            const double v222 = v169 - v221;
-            const double v223 = 2.0 * v122;
-            const double v224 = v223 * v222;
-            const double v225 = v224 + v219;
-            const double v226 = v113 * v179;
-            const double v227 = v225 - v226;
-            const double v228 = v122 * v227;
-            const double v229 = 2.0 * v92;
-            const double v230 = v229 * v222;
-            const double v231 = v130 * v179;
-            const double v232 = v230 - v231;
-            const double v233 = v113 * v205;
-            const double v234 = v232 - v233;
-            const double v235 = v92 * v234;
-            const double v236 = v235 + v228;
-            const double v237 = v217 * v236;
-            const double v238 = v151 * v202;
-            const double v239 = v169 + v238;
-            const double v240 = 2.0 * v152;
-            const double v241 = v240 * v157;
-            const double v242 = v239 - v241;
-            const double v243 = 2.0 * v149;
-            const double v244 = v149 * v243;
-            const double v245 = v244 * v217;
-            const double v246 = v245 * v242;
-            const double v247 = v122 * v207;
-            const double v248 = v92 * v214;
-            const double v249 = v248 + v247;
-            const double v250 = v217 * v249;
-            double *restrict out = values + 7 * (points * e + q);
-            out[0] = v32;
-            out[1] = v39;
-            out[2] = v150;
-            out[3] = v218;
-            out[4] = v237;
-            out[5] = v246;
-            out[6] = v250;
-        }
+    (void)coordinates, (void)data, (void)direction, (void)tangent;
+    if (n < 1) return;
+    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
+        softehl_solid_q4_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) {
+        if (n % SOFTEHL_LANES) softehl_solid_q4_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
+        return;
     }
+    double X[SOFTEHL_LANES * 8];
+    softehl_pad(X, coordinates, 8, n);
+    double d[SOFTEHL_LANES * 8];
+    softehl_pad(d, dofs, 8, n);
+    double R[SOFTEHL_LANES * (7 * points)];
+    softehl_solid_q4_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
+    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
+#endif
 }

@@ -135,7 +135,8 @@ class Call:
             return self.kernel.default_rule
         if self.kernel.unrolled:
             raise ArgumentError(
-                f"the quadrature rule of {self.kernel.name} is written into it: give none"
+                f"the quadrature rule of {self.kernel.name} is written into it: give none, or "
+                "write unroll=False on its page"
             )
         return given
 

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 from softehl.codegen.derive.interfaces import Interface, linear_interface
-from softehl.codegen.derive.invariants import quadratic_interface, through_invariants
+from softehl.codegen.derive.invariants import (
+    ABOVE,
+    degrees,
+    quadratic_interface,
+    through_invariants,
+)
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.traverse import reachable, strip, substitute
 from softehl.codegen.language.definition import Definition
@@ -34,7 +41,7 @@ def linear_forms(d: Definition) -> Structure | None:
         return None
     g = d.graph
     (root,), kept = strip(g, [d.potential], d.constant)
-    if _has_guarded_values(root):
+    if _guarded_coefficients(root, d.directions):
         return None
     interface = linear_interface(g, [root], d.directions)
     if interface is None:
@@ -75,13 +82,16 @@ def _named(g: Graph, form: Node, named: dict[Node, Node]) -> Node:
     return named.setdefault(form, g.name(f"z{len(named)}", form))
 
 
+WHOLE = frozenset(map(Fraction, range(1, 10)))
+"""Exponents of powers that are products: they have a value everywhere."""
 _PARTIAL = frozenset({Op.RECIP, Op.POW, Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP})
 
 
-def _has_guarded_values(root: Node) -> bool:
-    """True where only a side of a branch holds a value that need not exist outside of it.
+def _guarded_coefficients(root: Node, sources: Sequence[Node]) -> bool:
+    """True where a polynomial of the unknowns holds what has a value on one side of a branch only.
 
-    An interface would take such a value out of its branch.
+    An interface would take such a coefficient out of its branch.  What is no polynomial, as the
+    logarithm of a volume ratio, stands above all interfaces and stays where it is.
     """
     always: set[Node] = set()
     stack = [root]
@@ -90,4 +100,7 @@ def _has_guarded_values(root: Node) -> bool:
         if n not in always:
             always.add(n)
             stack += n.args[:1] if n.op is Op.BRANCH else n.args
-    return any(n.op in _PARTIAL and n not in always for n in reachable([root]))
+    degree = degrees([root], sources, ())
+    polynomials = [n for n in degree if 0 < degree[n] < ABOVE]
+    below = (n for n in reachable(polynomials) if n.op in _PARTIAL and n not in always)
+    return any(n.op is not Op.POW or n.payload not in WHOLE for n in below)

@@ -10,18 +10,19 @@ from softehl.codegen.emit.printer import Printer, dofs_expression
 from softehl.codegen.language.definition import Definition
 
 
-def gather(p: Printer, value: str, array: str, before: int = 0) -> None:
+def gather(p: Printer, depth: int, value: str, array: str, before: int = 0) -> None:
     """Values and xi-derivatives of the interpolated fields at the point.
 
     before: entries of the array that stand before those of the dofs.
     """
     names = [f"{value}{k}" for k in range(p.d.components)]
-    p.line(3, f"double {', '.join(f'{name} = 0.0' for name in names)};")
-    p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
+    unknowns = p.output.format(array)
+    p.line(depth, f"{p.kind} {', '.join(f'{name} = {p.zero}' for name in names)};")
+    p.line(depth, "for (ptrdiff_t i = 0; i < modes; ++i) {")
     for name, shape in zip(names, _shapes(p.d, "i"), strict=True):
-        p.line(4, f"{name} += {shape} * {array}[{before + len(p.d.unknowns)} + i];")
-    p.line(3, "}")
-    p.line(3, f"{', '.join(f'(void){name}' for name in names)};")
+        p.line(depth + 1, f"{name} += {shape} * {unknowns}[{before + len(p.d.unknowns)} + i];")
+    p.line(depth, "}")
+    p.line(depth, f"{', '.join(f'(void){name}' for name in names)};")
 
 
 def _shapes(d: Definition, mode: str) -> list[str]:
@@ -35,30 +36,30 @@ def _letters(d: Definition) -> list[str]:
     return [f"{letter}{k or ''}" for k in range(d.components // 2) for letter in "ND"]
 
 
-def scatter(p: Printer, task: str, entries: Sequence[Entry]) -> None:
+def scatter(p: Printer, depth: int, task: str, entries: Sequence[Entry]) -> None:
+    """Outputs of the point spread over the shape functions."""
     direct = len(p.d.unknowns)
-    at = {(x.row, x.column): p.ref(x.node) for x in entries}
-    p.line(3, "for (ptrdiff_t i = 0; i < modes; ++i) {")
+    at = {(x.row, x.column): p.value(x.node) for x in entries}
+    p.line(depth, "for (ptrdiff_t i = 0; i < modes; ++i) {")
     letters = _letters(p.d)
     values = zip(letters, _shapes(p.d, "i"), strict=True)
-    p.line(4, f"const double {', '.join(f'{name} = {shape}' for name, shape in values)};")
-    p.line(4, f"{', '.join(f'(void){name}' for name in letters)};")
+    p.line(depth + 1, f"const double {', '.join(f'{name} = {shape}' for name, shape in values)};")
+    p.line(depth + 1, f"{', '.join(f'(void){name}' for name in letters)};")
     for column, target in _scatter_targets(p.d, task):
         left = _combination(letters, [at.get(k) for k in column])
         if left:
-            p.line(4, f"{target} += {left};")
+            p.line(depth + 1, f"{p.output.format(target[0])}{target[1:]} += {left};")
     size = range(p.d.components)
     blocks = [[at.get((Slot(True, r), Slot(True, c))) for r in size] for c in size]
     if any(value is not None for pair in blocks for value in pair):
         for c, pair in enumerate(blocks):
-            p.line(4, f"const double r{c} = {_combination(letters, pair) or '0.0'};")
-        p.line(4, "for (ptrdiff_t j = 0; j < modes; ++j)")
+            right = _combination(letters, pair) or p.zero
+            p.line(depth + 1, f"const {p.kind} r{c} = {right};")
+        p.line(depth + 1, "for (ptrdiff_t j = 0; j < modes; ++j)")
         products = " + ".join(f"r{c} * {shape}" for c, shape in enumerate(_shapes(p.d, "j")))
-        p.line(
-            5,
-            f"K[({direct} + i) * {dofs_expression(p.d)} + {direct} + j] += {products};",
-        )
-    p.line(3, "}")
+        place = f"[({direct} + i) * {dofs_expression(p.d)} + {direct} + j]"
+        p.line(depth + 2, f"{p.output.format('K')}{place} += {products};")
+    p.line(depth, "}")
 
 
 Key = tuple[Slot, Slot | None]

@@ -119,11 +119,11 @@ def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
         p.line(3, "(void)b;")
     if p.d.interpolated:
         p.line(3, f"const double *restrict B = basis + {p.d.components} * modes * q;")
-        basis.gather(p, "p", "d")
+        basis.gather(p, 3, "p", "d")
         if task == abi.Task.PRODUCT:
-            basis.gather(p, "t", "t")
+            basis.gather(p, 3, "t", "t")
         if task == abi.Task.FIELDS_RATE:
-            basis.gather(p, "t", "t", design_width(p.d))
+            basis.gather(p, 3, "t", "t", design_width(p.d))
     p.block(3, loop.body)
     for s in loop.sums:
         p.line(3, f"{p.ref(s)} += {p.ref(s.args[0])};")
@@ -131,7 +131,7 @@ def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
     if here and task in abi.AT_POINTS:
         _store_fields(p, here)
     elif here:
-        basis.scatter(p, task, here)
+        basis.scatter(p, 3, task, here)
     p.line(2, "}")
 
 

@@ -34,7 +34,12 @@ class _Backwards:
 
     def block(self, statements: Sequence[Statement], live: frozenset[Node]) -> frozenset[Node]:
         for s in reversed(statements):
-            live = self.branch(s, live) if isinstance(s, If) else self.value(s, live)
+            if isinstance(s, If):
+                live = self.branch(s, live)
+            elif isinstance(s, Node):
+                live = self.value(s, live)
+            elif s.old in live:
+                live = (live - {s.old}) | _temporaries([s.new])
         return live
 
     def value(self, n: Node, live: frozenset[Node]) -> frozenset[Node]:

@@ -12,7 +12,7 @@ product that nothing else uses, so that a term is consumed where it arises.
 from __future__ import annotations
 
 from collections import Counter, OrderedDict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
@@ -65,26 +65,37 @@ class _Piece:
         return tuple(dict.fromkeys(a for a in self.operands if a.op not in (Op.CONST, Op.PI)))
 
 
-def arranged(g: Graph, roots: Sequence[Node]) -> tuple[list[Node], list[Node]]:
-    """Roots of the same values, and every value below them in the order of computation."""
-    pieces = _pieces(roots)
-    run = _Scheduler(g, pieces)
+def arranged(
+    g: Graph,
+    roots: Sequence[Node],
+    inside: Collection[Node] | None = None,
+    computed: Collection[Node] = (),
+) -> tuple[list[Node], list[Node]]:
+    """Roots of the same values, and every value below them in the order of computation.
+
+    inside: values that are to be computed (None: all); what lies below others is known.
+    computed: values that are known besides.
+    """
+    pieces = _pieces(roots, inside)
+    run = _Scheduler(g, pieces, set(computed))
     while run.ready:
         run.step()
     return [run.new.get(r, r) for r in roots], run.order
 
 
-def _pieces(roots: Sequence[Node]) -> list[_Piece]:
+def _pieces(roots: Sequence[Node], inside: Collection[Node] | None) -> list[_Piece]:
     """Everything below the roots taken apart: sums into terms, products of one use into sums."""
-    nodes = [n for n in reachable(roots) if n.op not in FREE]
+    within = None if inside is None else frozenset(inside)
+    below = reachable(roots, None if within is None else lambda n: n not in within)
+    nodes = [n for n in below if n.op not in FREE and (within is None or n in within)]
     uses, user = Counter(roots), {}
     for n in nodes:
         uses.update(n.args)
         user.update(dict.fromkeys(n.args, n))
-    kept = set(roots)
+    kept, own = set(roots), set(nodes)
 
     def inner(n: Node) -> bool:
-        alone = uses[n] == 1 and n not in kept and user[n].op in ADDITIONS
+        alone = n in own and uses[n] == 1 and n not in kept and user[n].op in ADDITIONS
         return alone and (n.op is Op.MUL or (n.op in ADDITIONS and not first_difference(n)))
 
     def terms(total: _Sum) -> list[_Piece]:
@@ -117,6 +128,7 @@ def _pieces(roots: Sequence[Node]) -> list[_Piece]:
 class _Scheduler:
     g: Graph
     pieces: list[_Piece]
+    printed: set[Node] = field(default_factory=set)
     new: dict[Node, Node] = field(default_factory=dict)
     order: list[Node] = field(default_factory=list)
     ready: dict[_Piece, None] = field(default_factory=dict)
@@ -126,7 +138,8 @@ class _Scheduler:
     def __post_init__(self) -> None:
         self._window = max(8, CANDIDATES // max(len(self.pieces), 1))
         self._later: list[tuple[float, _Piece]] = []
-        self._printed: set[Node] = set()
+        own = {p.node if p.total is None else p.total.head for p in self.pieces}
+        self.printed.update(a for p in self.pieces for a in p.fetched if a not in own)
         # how early the model's author, or the chain rule, wrote a value
         ids = sorted(self.pieces, key=lambda p: p.node.id)
         self._place = {p: k / len(ids) for k, p in enumerate(ids)}
@@ -136,7 +149,7 @@ class _Scheduler:
         self._uses: Counter[Node] = Counter()
         for p in self.pieces:
             self._uses.update(p.fetched)
-            missing = [a for a in p.fetched if a.op not in FREE]
+            missing = [a for a in p.fetched if a in own]
             self._missing[p] = len(missing)
             for a in missing:
                 self._waiting.setdefault(a, []).append(p)
@@ -217,11 +230,11 @@ class _Scheduler:
 
     def _print(self, n: Node) -> None:
         """Append a value, after those of its operands that folding has made new."""
-        if n.op in FREE or n in self._printed:
+        if n.op in FREE or n in self.printed:
             return
         for a in n.args:
             self._print(a)
-        self._printed.add(n)
+        self.printed.add(n)
         self.order.append(n)
 
     def _touch(self, value: Node | _Sum) -> None:

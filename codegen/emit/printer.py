@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from softehl.codegen import abi
-from softehl.codegen.emit.schedule import If, Statement
+from softehl.codegen.emit.schedule import If, Same, Statement
 from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine
 from softehl.codegen.language.definition import Definition
 
@@ -54,7 +54,9 @@ def number(value: float) -> str:
 
 
 class Printer:
-    """Lines of one function body."""
+    """Lines of one function body; `kind` is the type of a value, `output` the name of an array."""
+
+    kind, zero, output = "double", "0.0", "{}"
 
     def __init__(self, definition: Definition) -> None:
         self.d = definition
@@ -81,12 +83,29 @@ class Printer:
         for s in statements:
             if isinstance(s, If):
                 self.branch(depth, s)
+            elif isinstance(s, Same):
+                self.names[s.old] = self.same(s)
             elif isinstance(s.payload, Routine):
                 self.call(depth, s, s.payload)
             else:
-                right = self.expression(s)
-                kind = "int" if s.op in BOOLEAN else "double"
-                self.line(depth, f"const {kind} {self.fresh(s)} = {right};")
+                self.statement(depth, s)
+
+    def statement(self, depth: int, s: Node) -> None:
+        """A value of its own."""
+        right = self.expression(s)
+        kind = "int" if s.op in BOOLEAN else "double"
+        self.line(depth, f"const {kind} {self.fresh(s)} = {right};")
+
+    def same(self, s: Same) -> str:
+        """Reference to a value under another name."""
+        return self.ref(s.new)
+
+    def value(self, n: Node) -> str:
+        """Reference to a value that is of this printer's kind in any case."""
+        return self.ref(n)
+
+    def type_of(self, n: Node) -> str:
+        return self.kind
 
     def call(self, depth: int, n: Node, routine: Routine) -> None:
         """Run a routine on its operands; a failure is remembered."""
@@ -104,7 +123,11 @@ class Printer:
 
     def branch(self, depth: int, s: If) -> None:
         names = [self.fresh(n) for n in s.merged]
-        self.line(depth, f"double {', '.join(names)};")
+        for kind in dict.fromkeys(map(self.type_of, s.merged)):
+            alike = [
+                name for n, name in zip(s.merged, names, strict=True) if self.type_of(n) == kind
+            ]
+            self.line(depth, f"{kind} {', '.join(alike)};")
         for head, k, inner in (
             (f"if ({self.ref(s.condition)}) {{", 1, s.then),
             ("} else {", 2, s.otherwise),
@@ -112,7 +135,9 @@ class Printer:
             self.line(depth, head)
             self.block(depth + 1, inner)
             for n, name in zip(s.merged, names, strict=True):
-                self.line(depth + 1, f"{name} = {self.ref(n.args[k])};")
+                side = n.args[k]
+                right = self.ref(side) if self.type_of(n) == "double" else self.value(side)
+                self.line(depth + 1, f"{name} = {right};")
         self.line(depth, "}")
 
 

@@ -46,30 +46,35 @@ def _signature(d: Definition, r: Routine) -> str:
     return f"static int softehl_{d.name}_{r.name}(const double *restrict p, double *restrict s)\n"
 
 
-class _Body:
-    """Statements that compute localised values in a routine."""
+class Body:
+    """Statements that compute localised values in a routine; `called` are the routines in it."""
 
-    def __init__(self, d: Definition, g: Graph, roots: Sequence[Node]) -> None:
+    def __init__(self, d: Definition, g: Graph, roots: Sequence[Node], printer: Printer) -> None:
         self.roots, _ = passes.run(g, list(roots), passes.STANDARD)
-        self.printer = Printer(d)
-        self.before = texts(d, called(self.roots))
+        self.printer, self.called = printer, called(self.roots)
 
-    def lines(self, depth: int, targets: Sequence[str]) -> list[str]:
+    def text(self, depth: int, targets: Sequence[str]) -> str:
         """The values and their stores."""
         p = self.printer
         for stage in schedule(self.roots).stages:
             p.block(depth, stage.before)
         for target, n in zip(targets, self.roots, strict=True):
-            p.line(depth, f"{target} = {p.ref(n)};")
-        return p.lines
+            p.line(depth, f"{target} = {p.value(n)};")
+        return "\n".join(p.lines)
+
+
+def newton_values(r: Newton) -> tuple[list[Node], list[str]]:
+    """What every step of a local iteration computes, and where it goes."""
+    n, first = r.outputs, r.inputs - r.outputs
+    slopes = [a for rows in (r.by_local, r.by_external) for row in rows for a in row]
+    targets = [*(f"g[{i}]" for i in range(n)), *(f"A[{i}]" for i in range(n * n))]
+    return [*r.equations, *slopes], targets + [f"B[{i}]" for i in range(n * first)]
 
 
 def _newton(d: Definition, r: Newton) -> list[str]:
     n, first = r.outputs, r.inputs - r.outputs
-    slopes = [a for rows in (r.by_local, r.by_external) for row in rows for a in row]
-    body = _Body(d, d.graph, [*r.equations, *slopes])
-    targets = [*(f"g[{i}]" for i in range(n)), *(f"A[{i}]" for i in range(n * n))]
-    targets += [f"B[{i}]" for i in range(n * first)]
+    values, targets = newton_values(r)
+    body = Body(d, d.graph, values, Printer(d))
     control, size = r.control, number(float(r.control.size))
     text = f"""/* {r.name}: {n} local unknowns, at most {control.iterations} Newton steps */
 {_signature(d, r)}{{
@@ -79,7 +84,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
     for (int k = 0; k < {n}; ++k) s[k] = p[{first} + k], before[k] = HUGE_VAL;
     for (int step = 0; step < {control.iterations}; ++step) {{
         double g[{n}], A[{n * n}], B[{max(n * first, 1)}];
-{_joined(body.lines(2, targets))}
+{body.text(2, targets)}
         int far = 0;
         for (int i = 0; i < {n}; ++i)
             far |= softehl_unsolved(
@@ -97,7 +102,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
     return 1;
 }}
 """
-    return [_UNSOLVED, _ELIMINATE, *body.before, text]
+    return [_UNSOLVED, _ELIMINATE, *texts(d, body.called), text]
 
 
 def _inverse(d: Definition, r: Inverse) -> str:
@@ -113,7 +118,7 @@ def _inverse(d: Definition, r: Inverse) -> str:
 
 
 def _isotropic(d: Definition, r: Isotropic) -> list[str]:
-    body = _Body(d, d.graph, derivatives_of_energy(d.graph, r))
+    body = Body(d, d.graph, derivatives_of_energy(d.graph, r), Printer(d))
     name = f"softehl_{d.name}_{r.name}_of_eigenvalues"
     local = f"""/* {r.name}: {_CONTENT[r.order]} by the eigenvalues */
 static int {name}(
@@ -121,7 +126,7 @@ static int {name}(
 {{
     int failed = 0;
     (void)s, (void)p;
-{_joined(body.lines(1, [f"w[{k}]" for k in range(len(body.roots))]))}
+{body.text(1, [f"w[{k}]" for k in range(len(body.roots))])}
     return failed;
 }}
 """
@@ -134,11 +139,7 @@ static int {name}(
 {_ASSEMBLE[r.order].replace("OF_EIGENVALUES", name)}    return 0;
 }}
 """
-    return [*body.before, local, text]
-
-
-def _joined(lines: Sequence[str]) -> str:
-    return "\n".join(lines)
+    return [*texts(d, body.called), local, text]
 
 
 _CONTENT = ("energy", "first derivatives", "first and second derivatives")

@@ -24,7 +24,15 @@ class If:
     otherwise: list[Statement] = field(default_factory=list)
 
 
-Statement = Node | If
+@dataclass(frozen=True)
+class Same:
+    """`old` is the value that has just been computed as `new`."""
+
+    old: Node
+    new: Node
+
+
+Statement = Node | If | Same
 
 
 @dataclass(frozen=True)
@@ -80,6 +88,15 @@ def schedule(roots: Sequence[Node]) -> Schedule:
 def straight_line(order: Sequence[Node]) -> Schedule:
     """A kernel without loops and branches, in the given order."""
     return Schedule((Stage(list(order), None),), len(order), 0)
+
+
+def is_straight(plan: Schedule) -> bool:
+    """True for a kernel without loops, branches and routines."""
+    return (
+        len(plan.stages) == 1
+        and plan.stages[0].loop is None
+        and all(isinstance(s, Node) and s.op is not Op.CALL for s in plan.stages[0].before)
+    )
 
 
 def depth_first(nodes: Sequence[Node], roots: Sequence[Node]) -> list[Node]:

@@ -1,209 +1,340 @@
-"""Printing for several elements at once: every value is a vector with one lane per element.
+"""A kernel for several elements at once: every value is a vector with one lane per element.
 
-Only straight-line kernels (loops written out, no branch) are printed this way.  A `group` function
-handles as many elements as a vector has lanes; the public function walks over the batch and
-repeats the last element to fill the last group.  Values that depend on parameters alone stay
-scalars.
+A `group` function handles as many elements as a vector has lanes: pointers, stages, loops over the
+points, stores.  The public function walks over the batch; what is left is the last group once more,
+moved back so that it ends with the batch (the same values are written again), and a batch smaller
+than a group is filled up with its last element.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
-from softehl.codegen.emit.printer import Printer, direction_expression, number
-from softehl.codegen.emit.schedule import If, Schedule, Statement
-from softehl.codegen.graph.graph import ELEMENTARY, FREE, Input, Node, Op
+from softehl.codegen.emit import basis
+from softehl.codegen.emit.lanes import LanePrinter
+from softehl.codegen.emit.printer import (
+    data_expression,
+    design_width,
+    direction_expression,
+    dofs_expression,
+)
+from softehl.codegen.emit.schedule import If, Loop, Schedule, Statement
+from softehl.codegen.graph.graph import FREE, Input, Node, Op
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 
-_LETTERS = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
-FUNCTIONS = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS}) | ELEMENTARY
-
-
-def suits(plan: Schedule) -> bool:
-    """True for a kernel without loops, branches and routines."""
-    return (
-        len(plan.stages) == 1
-        and plan.stages[0].loop is None
-        and not any(isinstance(s, If) or s.op is Op.CALL for s in plan.stages[0].before)
-    )
-
-
-def wrappers(text: str) -> list[str]:
-    """Functions of vectors that `text` calls and that the header does not have."""
-    needed = [op for op in sorted(ELEMENTARY) if f"softehl_v{op}(" in text]
-    one = [
-        f"#if SOFTEHL_LANES == 4\nSOFTEHL_LANEWISE({op})\n#else\n"
-        f"#define softehl_v{op}(a) {op}(a)\n#endif\n"
-        for op in needed
-    ]
-    return one + ([_ATAN2] if "softehl_vatan2(" in text else [])
-
-
-_ATAN2 = """#if SOFTEHL_LANES == 4
-static inline softehl_vec softehl_vatan2(softehl_vec y, softehl_vec x)
-{
-    return (softehl_vec){
-        atan2(y[0], x[0]), atan2(y[1], x[1]), atan2(y[2], x[2]), atan2(y[3], x[3])};
-}
-#else
-#define softehl_vatan2(y, x) atan2(y, x)
-#endif
-"""
-
-
-class _LanePrinter(Printer):
-    """A printer that knows which values are vectors."""
-
-    def __init__(self, definition: Definition) -> None:
-        super().__init__(definition)
-        self.scalar: dict[Node, bool] = {}
-
-    def is_scalar(self, n: Node) -> bool:
-        """True when all lanes hold the same value."""
-        if n not in self.scalar:
-            for m in reachable([n], stop=self.scalar.__contains__):
-                if isinstance(m.payload, Input):
-                    self.scalar[m] = m.payload.array == "parameters"
-                elif m not in self.scalar:
-                    self.scalar[m] = all(self.scalar[a] for a in m.args)
-        return self.scalar[n]
-
-    def ref(self, n: Node) -> str:
-        if isinstance(n.payload, Input) and n.payload.array != "parameters":
-            return _LETTERS[n.payload.array] + str(n.payload.index)
-        return super().ref(n)
-
-    def statement(self, depth: int, s: Statement) -> None:
-        assert isinstance(s, Node)
-        if self.is_scalar(s):
-            super().block(depth, [s])
-            return
-        right = self.expression(s)
-        if s.op in FUNCTIONS:
-            right = f"softehl_v{s.op}({self.ref(s.args[0])})"
-        elif s.op is Op.ATAN2:
-            right = f"softehl_vatan2({', '.join(self.as_vector(a) for a in s.args)})"
-        elif s.op is Op.POW:
-            right = f"softehl_vpow({self.ref(s.args[0])}, {number(float(s.payload))})"  # type: ignore[arg-type]
-        self.line(depth, f"const V {self.fresh(s)} = {right};")
-
-    def as_vector(self, n: Node) -> str:
-        """Reference that is a vector in any case."""
-        return f"softehl_splat({self.ref(n)})" if self.is_scalar(n) else self.ref(n)
+GROUP = (
+    ("ptrdiff_t", "points"),
+    ("ptrdiff_t", "modes"),
+    ("const double *restrict", "X"),
+    ("const double *restrict", "d"),
+    ("const double *restrict", "a"),
+    ("const double *restrict", "t"),
+    ("const double *restrict", "parameters"),
+    ("const double *restrict", "rule"),
+    ("const double *restrict", "basis"),
+    ("double *restrict", "R"),
+    ("double *restrict", "K"),
+)
+_READ = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
 
 
 def function(
     definition: Definition, task: str, entries: Sequence[Entry], plan: Schedule
 ) -> tuple[str, int]:
     """C text of one kernel (group function and batch loop) and the number of its temporaries."""
-    p = _LanePrinter(definition)
-    _loads(p, task)
-    outputs = _Stores(p, task, entries)
-    for s in plan.stages[0].before:
-        p.statement(1, s)
-        outputs.flush()
+    p = LanePrinter(definition)
+    _Group(p, task, entries).write(plan)
     name = abi.function_name(definition.name, task)
-    body = "\n".join(p.lines)
-    group = f"static void {name}_group(\n    {_GROUP_ARGUMENTS})\n{{\n{_GROUP_UNUSED}\n{body}\n}}\n"
+    used = "\n".join(p.lines)
+    idle = ", ".join(f"(void){n}" for _, n in GROUP)
+    arguments = ",\n    ".join(
+        ", ".join(f"{kind} {n}".replace("* ", "*") for kind, n in GROUP[k : k + 3])
+        for k in range(0, len(GROUP), 3)
+    )
+    group = f"static void {name}_group(\n    {arguments})\n{{\n    {idle};\n{used}\n}}\n"
     return f"{group}\n{_batch(definition, task)}", p.temporaries
 
 
-_GROUP_ARGUMENTS = """const double *restrict X, const double *restrict d, const double *restrict a,
-    const double *restrict t, const double *restrict parameters,
-    double *restrict R, double *restrict K"""
-_GROUP_UNUSED = "    (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)R, (void)K;"
+def _widths(d: Definition, task: str) -> dict[str, str]:
+    """Values per element of each array, "0" for those that a task does not use."""
+    size = dofs_expression(d)
+    along = direction_expression(d, task) or "0"
+    values = {abi.Task.ENERGY: "1"}
+    values |= dict.fromkeys(abi.AT_POINTS, f"({len(d.fields)} * points)")
+    return {
+        "coordinates": str(d.coordinate_width),
+        "dofs": size,
+        "data": data_expression(d),
+        "direction": along,
+        "values": values.get(abi.Task(task), size) if task in set(abi.Task) else size,
+        "tangent": f"({size} * {size})" if task == abi.Task.TANGENT else "0",
+    }
 
 
-def _widths(d: Definition, task: str) -> dict[str, int]:
-    """Values per element of each array that a task reads."""
-    size = len(d.unknowns)
-    along = int(direction_expression(d, task) or 0)
-    coordinates = d.coordinate_width
-    data = len(d.data) + len(d.point_data) * len(d.rule.weights)
-    return {"coordinates": coordinates, "dofs": size, "data": data, "direction": along}
+def along_basis(x: Entry) -> bool:
+    """Whether an output is spread over the shape functions of an interpolated field."""
+    return x.row.basis or (x.column is not None and x.column.basis)
 
 
-def _loads(p: _LanePrinter, task: str) -> None:
-    for array, width in _widths(p.d, task).items():
-        letter = _LETTERS[array]
-        for start in range(0, width, 4):
-            names = [f"{letter}{k}" for k in range(start, min(start + 4, width))]
-            p.line(1, f"V {', '.join(names)};")
+class _Group:
+    """The body of a group function."""
+
+    def __init__(self, p: LanePrinter, task: str, entries: Sequence[Entry]) -> None:
+        self.p, self.task, self.entries = p, task, entries
+        self.widths = _widths(p.d, task)
+        self.scattered = any(map(along_basis, entries))
+        self.stores = _Stores(p, self._targets())
+        self.fallible = any(n.op is Op.CALL for n in reachable([x.node for x in entries]))
+
+    def write(self, plan: Schedule) -> None:
+        p = self.p
+        if self.fallible:
+            p.line(1, "M failed = softehl_mask(0);")
+        self._loads()
+        self.stores.start()
+        for stage in plan.stages:
+            for s in stage.before:
+                p.block(1, [s])
+                self.stores.known(_values(s))
+            if stage.loop is not None:
+                self._loop(stage.loop)
+                self.stores.known(stage.loop.sums)
+        self._finish()
+
+    def _loads(self) -> None:
+        p, d = self.p, self.p.d
+        fixed = {"coordinates": d.coordinate_width, "dofs": len(d.unknowns), "data": self._data()}
+        along: dict[str, int] = dict.fromkeys(abi.DESIGN, design_width(d))
+        fixed["direction"] = along.get(self.task, 0)
+        if self.task in (abi.Task.PRODUCT, abi.Task.FIELDS_RATE):
+            fixed["direction"] += len(d.unknowns)
+        for array, count in fixed.items():
+            self._load(1, _READ[array], count, self.widths[array], _READ[array])
+        if not d.interpolated:
+            return
+        arrays = {"d": self.widths["dofs"]}
+        if self.task in (abi.Task.PRODUCT, abi.Task.FIELDS_RATE):
+            arrays["t"] = self.widths["direction"]
+        for letter, size in arrays.items():
+            self._array("const V", letter, size)
+            p.lines += ["#if SOFTEHL_LANES > 1"]
+            p.line(1, f"softehl_gather({letter}_lanes, {letter}, {size});")
+            p.lines += ["#endif"]
+        if self.scattered:
+            for letter, width in self._written().items():
+                self._array("V", letter, width)
+                p.line(1, f"for (ptrdiff_t i = 0; i < {width}; ++i)")
+                p.line(2, f"{letter}_lanes[i] = {p.zero};")
+
+    def _data(self) -> int:
+        """Data to load before any loop: with those of the points where the loop is written out."""
+        inputs = [n.payload for n in reachable(x.node for x in self.entries)]
+        used = [i.index + 1 for i in inputs if isinstance(i, Input) and i.array == "data"]
+        return max([len(self.p.d.data), *used])
+
+    def _array(self, kind: str, letter: str, size: str) -> None:
+        """Lanes of an array whose size is known at run time; with one lane, the array itself."""
+        self.p.lines += [
+            "#if SOFTEHL_LANES > 1",
+            f"    V {letter}_lanes[{size}];",
+            "#else",
+            f"    {kind} *const {letter}_lanes = {letter};",
+            "#endif",
+        ]
+
+    def _load(self, depth: int, letter: str, count: int, width: str, pointer: str) -> None:
+        for start in range(0, count, 4):
+            names = [f"{letter}{k}" for k in range(start, min(start + 4, count))]
+            self.p.line(depth, f"V {', '.join(names)};")
             pointers = ", ".join(f"&{n}" for n in names)
-            p.line(1, f"softehl_load{len(names)}({letter} + {start}, {width}, {pointers});")
-            p.line(1, " ".join(f"(void){n};" for n in names))
+            source = f"{pointer} + {start}, {width}"
+            self.p.line(depth, f"softehl_load{len(names)}({source}, {pointers});")
+            self.p.line(depth, " ".join(f"(void){n};" for n in names))
 
+    def _written(self) -> dict[str, str]:
+        arrays = {"R": self.widths["values"], "K": self.widths["tangent"]}
+        return {letter: width for letter, width in arrays.items() if width != "0"}
 
-class _Stores:
-    """Outputs in groups of up to four neighbours, each stored as soon as it is complete."""
-
-    def __init__(self, p: _LanePrinter, task: str, entries: Sequence[Entry]) -> None:
-        size = 1 if task == abi.Task.ENERGY else len(p.d.unknowns)
+    def _targets(self) -> list[tuple[str, list[Node]]]:
+        """Outputs that are complete when all loops are done, by up to four neighbours."""
+        d = self.p.d
+        if self.task in abi.AT_POINTS or self.scattered:
+            return []
         flat: dict[str, dict[int, Node]] = {"R": {}, "K": {}}
-        for x in entries:
+        for x in self.entries:
             if x.column is None:
                 flat["R"][x.row.position] = x.node
             else:
-                flat["K"][x.row.position * size + x.column.position] = x.node
-        self.p = p
-        self.groups = [
+                flat["K"][x.row.position * len(d.unknowns) + x.column.position] = x.node
+        return [
             (f"{letter} + {start}, {len(values)}", [values[k] for k in range(start, stop)])
             for letter, values in flat.items()
             for start in range(0, len(values), 4)
             for stop in [min(start + 4, len(values))]
         ]
-        self.flush()
 
-    def flush(self) -> None:
-        """Print the groups whose values are all known by now."""
-        waiting = []
-        for target, nodes in self.groups:
-            if all(n in self.p.names or n.op in FREE for n in nodes):
-                chunk = ", ".join(self.p.as_vector(n) for n in nodes)
-                self.p.line(1, f"softehl_store{len(nodes)}({target}, {chunk});")
+    def _loop(self, loop: Loop) -> None:
+        p, d = self.p, self.p.d
+        for s in loop.sums:
+            kind, start = ("double", "0.0") if p.is_scalar(s) else ("V", p.zero)
+            p.line(1, f"{kind} {p.fresh(s, 's')} = {start};")
+        p.line(1, "for (ptrdiff_t q = 0; q < points; ++q) {")
+        p.line(2, f"const double *restrict w = rule + {d.rule.dimension + 1} * q;")
+        p.line(2, "(void)w;")
+        if d.point_data:
+            size = len(d.point_data)
+            p.line(2, f"const double *restrict b = a + {len(d.data)} + {size} * q;")
+            self._load(2, "b", size, self.widths["data"], "b")
+        if d.interpolated:
+            p.line(2, f"const double *restrict B = basis + {d.components} * modes * q;")
+            basis.gather(p, 2, "p", "d")
+            if self.task == abi.Task.PRODUCT:
+                basis.gather(p, 2, "tp", "t")
+            if self.task == abi.Task.FIELDS_RATE:
+                basis.gather(p, 2, "tp", "t", design_width(d))
+        self._body(loop)
+        here = [x for x in self.entries if x.node in loop.outputs]
+        if here and self.task in abi.AT_POINTS:
+            self._fields(here)
+        elif here:
+            basis.scatter(p, 2, self.task, here)
+        p.line(1, "}")
+
+    def _body(self, loop: Loop) -> None:
+        """Values at a point; each is added to its sum at once, or it would have to be kept."""
+        p = self.p
+        sums: dict[Node, list[Node]] = {}
+        for s in loop.sums:
+            sums.setdefault(s.args[0], []).append(s)
+        for n in [n for n in sums if n.op in FREE or not n.varying]:
+            self._add(sums.pop(n))
+        for statement in loop.body:
+            p.block(2, [statement])
+            for n in _values(statement):
+                self._add(sums.pop(n, []))
+
+    def _add(self, sums: Sequence[Node]) -> None:
+        for s in sums:
+            self.p.line(2, f"{self.p.ref(s)} += {self.p.ref(s.args[0])};")
+
+    def _fields(self, entries: Sequence[Entry]) -> None:
+        """Values at the point `q`: neighbours together."""
+        runs: list[list[Entry]] = []
+        for x in sorted(entries, key=lambda x: x.row.position):
+            if runs and runs[-1][-1].row.position + 1 == x.row.position and len(runs[-1]) < 4:
+                runs[-1].append(x)
             else:
-                waiting.append((target, nodes))
-        self.groups = waiting
+                runs.append([x])
+        for run in runs:
+            at = f"R + {len(self.p.d.fields)} * q + {run[0].row.position}"
+            values = ", ".join(self.p.value(x.node) for x in run)
+            self.p.line(2, f"softehl_store{len(run)}({at}, {self.widths['values']}, {values});")
+
+    def _finish(self) -> None:
+        """What does not vary, sums of the basis, and not-a-number where something failed."""
+        p = self.p
+        fixed = [x for x in self.entries if not x.node.varying]
+        if self.task in abi.AT_POINTS and fixed:
+            p.line(1, "for (ptrdiff_t q = 0; q < points; ++q) {")
+            self._fields(fixed)
+            p.line(1, "}")
+        if self.scattered:
+            size = dofs_expression(p.d)
+            for x in self.entries:
+                if not along_basis(x) and x.node is not p.d.graph.zero:
+                    k = x.row.position
+                    at = f"K_lanes[{k} * {size} + {x.column.position}]" if x.column else None
+                    p.line(1, f"{at or f'R_lanes[{k}]'} = {p.value(x.node)};")
+            p.lines += ["#if SOFTEHL_LANES > 1"]
+            for letter, width in self._written().items():
+                p.line(1, f"softehl_scatter({letter}, {letter}_lanes, {width});")
+            p.lines += ["#endif"]
+        if self.fallible:
+            p.line(1, "if (softehl_any(failed)) {")
+            for letter, width in self._written().items():
+                p.line(2, f"softehl_spoil(failed, {letter}, {width});")
+            p.line(1, "}")
+
+
+def _values(s: Statement) -> Sequence[Node]:
+    """What is known after a statement."""
+    if isinstance(s, If):
+        return s.merged
+    return [s if isinstance(s, Node) else s.old]
+
+
+class _Stores:
+    """Outputs in groups of neighbours, each stored as soon as all of its values are known."""
+
+    def __init__(self, p: LanePrinter, targets: Iterable[tuple[str, list[Node]]]) -> None:
+        self.p = p
+        self.targets = list(targets)
+        self.missing: list[int] = []
+        self.waiting: dict[Node, list[int]] = {}
+
+    def start(self) -> None:
+        """Print what is known from the beginning."""
+        for k, (_, nodes) in enumerate(self.targets):
+            needed = [n for n in dict.fromkeys(nodes) if n.op not in FREE]
+            self.missing.append(len(needed))
+            for n in needed:
+                self.waiting.setdefault(n, []).append(k)
+            if not needed:
+                self._print(k)
+
+    def known(self, nodes: Iterable[Node]) -> None:
+        """Print the groups that were waiting for the last of `nodes`."""
+        for n in nodes:
+            for k in self.waiting.pop(n, []):
+                self.missing[k] -= 1
+                if not self.missing[k]:
+                    self._print(k)
+
+    def _print(self, k: int) -> None:
+        target, nodes = self.targets[k]
+        values = ", ".join(map(self.p.value, nodes))
+        self.p.line(1, f"softehl_store{len(nodes)}({target}, {values});")
 
 
 def _batch(d: Definition, task: str) -> str:
-    """The public function: full groups, then one group padded with the last element."""
+    """The public function: full groups, the last one moved back, or one that is filled up."""
     name = abi.function_name(d.name, task)
-    size = 1 if task == abi.Task.ENERGY else len(d.unknowns)
-    square = size * size if task == abi.Task.TANGENT else 0
     widths = _widths(d, task)
-    at = {k: f"{k} + {w} * e" if w else "0" for k, w in widths.items()}
-    tangent = f"tangent + {square} * e" if square else "0"
+    letters = {**_READ, "values": "R", "tangent": "K"}
+
+    def call(at: str) -> str:
+        place = {letters[k]: f"{k} + {w} * {at}" if w != "0" else "0" for k, w in widths.items()}
+        given = [place.get(n, n) for _, n in GROUP]
+        return f"{name}_group({', '.join(given)});"
+
     lines = [
         abi.declaration(d.name, task),
         "{",
-        "    (void)points, (void)modes, (void)rule, (void)basis, (void)data, (void)tangent;",
-        f"    (void)parameters, (void)direction{'' if d.coordinates else ', (void)coordinates'};",
-        "    ptrdiff_t e = 0;",
-        "    for (; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)",
-        f"        {name}_group({', '.join(at.values())}, parameters,",
-        f"            values + {size} * e, {tangent});",
-        "    if (e == n) return;",
+        "    (void)coordinates, (void)data, (void)direction, (void)tangent;",
+        "    if (n < 1) return;",
+        "    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)",
+        f"        {call('e')}",
+        "#if SOFTEHL_LANES > 1",
+        "    if (n >= SOFTEHL_LANES) {",
+        f"        if (n % SOFTEHL_LANES) {call('(n - SOFTEHL_LANES)')}",
+        "        return;",
+        "    }",
     ]
-    for array, letter in _LETTERS.items():
-        lines.append(f"    double {letter}[SOFTEHL_LANES * {max(widths[array], 1)}];")
-        if widths[array]:
+    used = {k: w for k, w in widths.items() if w != "0"}
+    for array, width in used.items():
+        lines.append(f"    double {letters[array]}[SOFTEHL_LANES * {width}];")
+        if array in _READ:
+            lines.append(f"    softehl_pad({letters[array]}, {array}, {width}, n);")
+    names = [a.split()[-1].strip("*") for a in " ".join(abi.ARGUMENTS).split(",")]
+    arguments = [letters.get(k, k) if k in used or k not in widths else "0" for k in names]
+    lines.append(f"    {name}({', '.join(['SOFTEHL_LANES', *arguments[1:]])});")
+    for array in ("values", "tangent"):
+        if array in used:
+            letter, width = letters[array], widths[array]
             lines.append(
-                f"    softehl_pad({letter}, {array} + {widths[array]} * e, {widths[array]}, n - e);"
+                f"    for (ptrdiff_t i = 0; i < {width} * n; ++i) {array}[i] = {letter}[i];"
             )
-        else:
-            lines.append(f"    {letter}[0] = 0.0;")
-    lines += [
-        f"    double R[SOFTEHL_LANES * {size}], K[SOFTEHL_LANES * {max(square, 1)}];",
-        f"    {name}_group(X, d, a, t, parameters, R, K);",
-        f"    for (ptrdiff_t i = 0; i < {size} * (n - e); ++i) values[{size} * e + i] = R[i];",
-    ]
-    if square:
-        lines.append(
-            f"    for (ptrdiff_t i = 0; i < {square} * (n - e); ++i)"
-            f" tangent[{square} * e + i] = K[i];"
-        )
-    return "\n".join([*lines, "}", ""])
+    return "\n".join([*lines, "#endif", "}", ""])

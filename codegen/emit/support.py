@@ -1,10 +1,19 @@
-"""The hand-written part of the generated header: lanes, transposing loads and stores, roots."""
+"""The hand-written part of the generated header: lanes, their masks, transposing loads and stores.
+
+V is one value of every element of a group, M a mask of elements: all bits of a lane set, or none.
+With one lane both are scalars, and nothing is padded or transposed.
+"""
 
 LANES = r"""
-/* One lane per element.  Without vector extensions a group is one element. */
+/* One lane per element: 8 with AVX-512, else 4.  Without vector extensions a group is one element.
+   A file of kernels in which 8 lanes do not pay says SOFTEHL_MOST_LANES 4. */
 #if !defined(SOFTEHL_LANES) && defined(__GNUC__) && defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
+#if defined(__AVX512F__) && !defined(SOFTEHL_MOST_LANES)
+#define SOFTEHL_LANES 8
+#else
 #define SOFTEHL_LANES 4
+#endif
 #endif
 #endif
 #ifndef SOFTEHL_LANES
@@ -20,105 +29,253 @@ static inline double softehl_rcbrt(double a)
 }
 """
 
-VECTORS = r"""
-#if SOFTEHL_LANES == 4
-typedef double softehl_vec __attribute__((vector_size(32)));
-typedef long long softehl_bits __attribute__((vector_size(32)));
+_FOUR = r"""
+#if SOFTEHL_LANES > 1
+typedef double V __attribute__((vector_size(8 * SOFTEHL_LANES)));
+typedef long long M __attribute__((vector_size(8 * SOFTEHL_LANES)));
+typedef double softehl_four __attribute__((vector_size(32)));
 typedef double softehl_row __attribute__((vector_size(32), aligned(8)));
+typedef long long softehl_half __attribute__((vector_size(32)));
 
-typedef softehl_vec V;
-
-static inline softehl_vec softehl_splat(double a)
+/* Whether any lane of a mask is set. */
+static inline int softehl_any4(softehl_half m)
 {
-    return (softehl_vec){a, a, a, a};
+#ifdef __AVX__
+    return __builtin_ia32_movmskpd256((softehl_four)m) != 0;
+#else
+    return ((m[0] | m[1]) | (m[2] | m[3])) != 0;
+#endif
+}
+#endif
+
+#if SOFTEHL_LANES == 4
+#define SOFTEHL_EACH(F) {F(0), F(1), F(2), F(3)}
+#define SOFTEHL_EVEN 0, 4, 2, 6
+#define SOFTEHL_ODD 1, 5, 3, 7
+#define SOFTEHL_LOW 0, 1, 4, 5
+#define SOFTEHL_HIGH 2, 3, 6, 7
+#define softehl_any(m) softehl_any4(m)
+
+static inline V softehl_rows(const double *p, ptrdiff_t width)
+{
+    (void)width;
+    return *(const softehl_row *)p;
 }
 
-#define SOFTEHL_LANEWISE(NAME)                                           \
-    static inline softehl_vec softehl_v##NAME(softehl_vec a)             \
-    {                                                                    \
-        return (softehl_vec){NAME(a[0]), NAME(a[1]), NAME(a[2]), NAME(a[3])}; \
+static inline void softehl_put(double *p, ptrdiff_t width, V a)
+{
+    (void)width;
+    *(softehl_row *)p = a;
+}
+#elif SOFTEHL_LANES == 8
+#define SOFTEHL_EACH(F) {F(0), F(1), F(2), F(3), F(4), F(5), F(6), F(7)}
+#define SOFTEHL_EVEN 0, 8, 2, 10, 4, 12, 6, 14
+#define SOFTEHL_ODD 1, 9, 3, 11, 5, 13, 7, 15
+#define SOFTEHL_LOW 0, 1, 8, 9, 4, 5, 12, 13
+#define SOFTEHL_HIGH 2, 3, 10, 11, 6, 7, 14, 15
+
+static inline int softehl_any(M m)
+{
+    return softehl_any4(__builtin_shufflevector(m, m, 0, 1, 2, 3) |
+                        __builtin_shufflevector(m, m, 4, 5, 6, 7));
+}
+
+/* The rows of lanes l and l + 4, four values each. */
+static inline V softehl_rows(const double *p, ptrdiff_t width)
+{
+    const softehl_four a = *(const softehl_row *)p, b = *(const softehl_row *)(p + 4 * width);
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+static inline void softehl_put(double *p, ptrdiff_t width, V a)
+{
+    *(softehl_row *)p = __builtin_shufflevector(a, a, 0, 1, 2, 3);
+    *(softehl_row *)(p + 4 * width) = __builtin_shufflevector(a, a, 4, 5, 6, 7);
+}
+#endif
+"""
+
+_VECTORS = r"""
+#if SOFTEHL_LANES > 1
+static inline V softehl_splat(double a)
+{
+#define SOFTEHL_ONE(l) a
+    return (V)SOFTEHL_EACH(SOFTEHL_ONE);
+#undef SOFTEHL_ONE
+}
+
+/* A function of the C library, lane by lane. */
+#define SOFTEHL_LANEWISE(NAME)                              \
+    static inline V softehl_v##NAME(V a)                    \
+    {                                                       \
+        V out;                                              \
+        for (int l = 0; l < SOFTEHL_LANES; ++l) out[l] = NAME(a[l]); \
+        return out;                                         \
     }
-SOFTEHL_LANEWISE(sqrt)
-SOFTEHL_LANEWISE(log)
-SOFTEHL_LANEWISE(exp)
-SOFTEHL_LANEWISE(sin)
-SOFTEHL_LANEWISE(cos)
-SOFTEHL_LANEWISE(cbrt)
+#define SOFTEHL_LANEWISE2(NAME)                             \
+    static inline V softehl_v##NAME(V a, V b)               \
+    {                                                       \
+        V out;                                              \
+        for (int l = 0; l < SOFTEHL_LANES; ++l) out[l] = NAME(a[l], b[l]); \
+        return out;                                         \
+    }
 
-static inline softehl_vec softehl_vpow(softehl_vec a, double e)
+static inline V softehl_vpow(V a, double e)
 {
-    return (softehl_vec){pow(a[0], e), pow(a[1], e), pow(a[2], e), pow(a[3], e)};
+    V out;
+    for (int l = 0; l < SOFTEHL_LANES; ++l) out[l] = pow(a[l], e);
+    return out;
 }
+
+static inline M softehl_mask(int set)
+{
+    return (M)softehl_splat(0.0) - (long long)(set != 0);
+}
+
+static inline V softehl_blend(M m, V a, V b)
+{
+    return (V)((m & (M)a) | (~m & (M)b));
+}
+
+static inline V softehl_vfabs(V a)
+{
+    return (V)((M)a & ~(M)softehl_splat(-0.0));
+}
+
+#define softehl_lt(a, b) ((M)((a) < (b)))
+#define softehl_le(a, b) ((M)((a) <= (b)))
+#define softehl_eq(a, b) ((M)((a) == (b)))
+#define softehl_lane(a, l) ((a)[l])
 
 /* a^(-1/3): a guess from the exponent (5 %), then two steps of fourth order. */
-static inline softehl_vec softehl_vrcbrt(softehl_vec a)
+static inline V softehl_vrcbrt(V a)
 {
-    const softehl_bits magic = (softehl_bits)softehl_splat(0x1p52);
-    const softehl_vec high = (softehl_vec)(((softehl_bits)a >> 32) | magic) - 0x1p52;
-    const softehl_vec guess = 0x1p52 + (1430188287.0 - high * (1.0 / 3.0));
-    softehl_vec y = (softehl_vec)(((softehl_bits)guess) << 32);
+    const M magic = (M)softehl_splat(0x1p52);
+    const V high = (V)(((M)a >> 32) | magic) - 0x1p52;
+    const V guess = 0x1p52 + (1430188287.0 - high * (1.0 / 3.0));
+    V y = (V)(((M)guess) << 32);
     for (int k = 0; k < 2; ++k) {
-        const softehl_vec r = 1.0 - a * (y * y * y);
+        const V r = 1.0 - a * (y * y * y);
         y += y * (r * (1.0 / 3.0 + r * (2.0 / 9.0 + r * (14.0 / 81.0))));
     }
-    const softehl_bits valid = a > 0.0;
-    return (softehl_vec)((valid & (softehl_bits)y) | (~valid & (softehl_bits)softehl_splat(NAN)));
+    return softehl_blend(softehl_lt(0.0, a), y, softehl_splat(NAN));
 }
 
-static inline void softehl_transpose(
-    softehl_vec *a, softehl_vec *b, softehl_vec *c, softehl_vec *d)
+/* exp(a) = 2^k exp(r), |r| <= ln(2)/2, by Taylor's series: within 2 units of the last place. */
+static inline V softehl_vexp(V a)
 {
-    const softehl_vec p = __builtin_shufflevector(*a, *b, 0, 4, 2, 6);
-    const softehl_vec q = __builtin_shufflevector(*a, *b, 1, 5, 3, 7);
-    const softehl_vec r = __builtin_shufflevector(*c, *d, 0, 4, 2, 6);
-    const softehl_vec s = __builtin_shufflevector(*c, *d, 1, 5, 3, 7);
-    *a = __builtin_shufflevector(p, r, 0, 1, 4, 5);
-    *b = __builtin_shufflevector(q, s, 0, 1, 4, 5);
-    *c = __builtin_shufflevector(p, r, 2, 3, 6, 7);
-    *d = __builtin_shufflevector(q, s, 2, 3, 6, 7);
+    /* k + 2048 in the last bits of a large number: no compiler can reorder this away */
+    const M n = (M)(a * 0x1.71547652b82fep+0 + (0x1p52 + 2048.0)) & 0xfffLL, h = n >> 1;
+    const V k = (V)(n | (M)softehl_splat(0x1p52)) - (0x1p52 + 2048.0);
+    const V r = (a - k * 0x1.62e42fefap-1) - k * 0x1.cf79abc9e3b3ap-40;
+    V y = r * (1.0 / 6227020800.0) + 1.0 / 479001600.0;
+    y = y * r + 1.0 / 39916800.0;
+    y = y * r + 1.0 / 3628800.0;
+    y = y * r + 1.0 / 362880.0;
+    y = y * r + 1.0 / 40320.0;
+    y = y * r + 1.0 / 5040.0;
+    y = y * r + 1.0 / 720.0;
+    y = y * r + 1.0 / 120.0;
+    y = y * r + 1.0 / 24.0;
+    y = y * r + 1.0 / 6.0;
+    y = y * r + 0.5;
+    y = (y * r) * r + r + 1.0;
+    /* 2^k as a product of two factors: the one may be too large, or subnormal */
+    y *= (V)((h - 1) << 52);
+    y *= (V)((n - h - 1) << 52);
+    y = softehl_blend(softehl_lt(softehl_splat(709.782712893384), a), softehl_splat(HUGE_VAL), y);
+    y = softehl_blend(softehl_lt(a, softehl_splat(-745.2)), softehl_splat(0.0), y);
+    return softehl_blend(softehl_eq(a, a), y, a);
 }
 
-static inline softehl_vec softehl_column(const double *p, ptrdiff_t width)
+/* log(m 2^k) = k ln(2) + 2 artanh(s), s = (m - 1)/(m + 1), 1/sqrt(2) < m < sqrt(2). */
+static inline V softehl_vlog(V a)
 {
-    return (softehl_vec){p[0], p[width], p[2 * width], p[3 * width]};
+    const M small = softehl_lt(a, softehl_splat(0x1p-1022));
+    const V scaled = softehl_blend(small, a * 0x1p54, a);
+    const M bits = (M)scaled + (0x3ff0000000000000LL - 0x3fe6a09e667f3bcdLL);
+    const V power = (V)((bits >> 52) | (M)softehl_splat(0x1p52)) - (0x1p52 + 1023.0);
+    const V k = power - softehl_blend(small, softehl_splat(54.0), softehl_splat(0.0));
+    const V m = (V)((bits & 0x000fffffffffffffLL) + 0x3fe6a09e667f3bcdLL);
+    const V f = m - 1.0, s = f / (m + 1.0), z = s * s;
+    V y = z * (2.0 / 21.0) + 2.0 / 19.0;
+    y = y * z + 2.0 / 17.0;
+    y = y * z + 2.0 / 15.0;
+    y = y * z + 2.0 / 13.0;
+    y = y * z + 2.0 / 11.0;
+    y = y * z + 2.0 / 9.0;
+    y = y * z + 2.0 / 7.0;
+    y = y * z + 2.0 / 5.0;
+    y = y * z + 2.0 / 3.0;
+    /* 2 s = f - f s, and f is exact */
+    y = k * 0x1.62e42fefap-1 + (f - (f * s - (s * z * y + k * 0x1.cf79abc9e3b3ap-40)));
+    const V most = softehl_splat(HUGE_VAL), none = softehl_splat(NAN), zero = softehl_splat(0.0);
+    y = softehl_blend(softehl_lt(a, most), y, a);
+    y = softehl_blend(softehl_lt(zero, a), y, none);
+    return softehl_blend(softehl_eq(a, zero), -most, y);
 }
 
-static inline void softehl_load4(
-    const double *p, ptrdiff_t width, softehl_vec *a, softehl_vec *b, softehl_vec *c,
-    softehl_vec *d)
+static inline void softehl_transpose(V *a, V *b, V *c, V *d)
 {
-    *a = *(const softehl_row *)p;
-    *b = *(const softehl_row *)(p + width);
-    *c = *(const softehl_row *)(p + 2 * width);
-    *d = *(const softehl_row *)(p + 3 * width);
+    const V p = __builtin_shufflevector(*a, *b, SOFTEHL_EVEN);
+    const V q = __builtin_shufflevector(*a, *b, SOFTEHL_ODD);
+    const V r = __builtin_shufflevector(*c, *d, SOFTEHL_EVEN);
+    const V s = __builtin_shufflevector(*c, *d, SOFTEHL_ODD);
+    *a = __builtin_shufflevector(p, r, SOFTEHL_LOW);
+    *b = __builtin_shufflevector(q, s, SOFTEHL_LOW);
+    *c = __builtin_shufflevector(p, r, SOFTEHL_HIGH);
+    *d = __builtin_shufflevector(q, s, SOFTEHL_HIGH);
+}
+
+static inline V softehl_column(const double *p, ptrdiff_t width)
+{
+#define SOFTEHL_ONE(l) p[l * width]
+    return (V)SOFTEHL_EACH(SOFTEHL_ONE);
+#undef SOFTEHL_ONE
+}
+
+static inline void softehl_load4(const double *p, ptrdiff_t width, V *a, V *b, V *c, V *d)
+{
+    *a = softehl_rows(p, width);
+    *b = softehl_rows(p + width, width);
+    *c = softehl_rows(p + 2 * width, width);
+    *d = softehl_rows(p + 3 * width, width);
     softehl_transpose(a, b, c, d);
 }
 
-static inline void softehl_store4(
-    double *p, ptrdiff_t width, softehl_vec a, softehl_vec b, softehl_vec c, softehl_vec d)
+static inline void softehl_store4(double *p, ptrdiff_t width, V a, V b, V c, V d)
 {
     softehl_transpose(&a, &b, &c, &d);
-    *(softehl_row *)p = a;
-    *(softehl_row *)(p + width) = b;
-    *(softehl_row *)(p + 2 * width) = c;
-    *(softehl_row *)(p + 3 * width) = d;
+    softehl_put(p, width, a);
+    softehl_put(p + width, width, b);
+    softehl_put(p + 2 * width, width, c);
+    softehl_put(p + 3 * width, width, d);
 }
 
-static inline void softehl_store1(double *p, ptrdiff_t width, softehl_vec a)
+static inline void softehl_store1(double *p, ptrdiff_t width, V a)
 {
-    for (int l = 0; l < 4; ++l) p[l * width] = a[l];
+    for (int l = 0; l < SOFTEHL_LANES; ++l) p[l * width] = a[l];
 }
 #else
-typedef double softehl_vec, V;
+typedef double V;
+typedef long long M;
+#define softehl_any(m) ((m) != 0)
 #define softehl_splat(a) (a)
-#define softehl_vsqrt(a) sqrt(a)
-#define softehl_vlog(a) log(a)
-#define softehl_vexp(a) exp(a)
-#define softehl_vsin(a) sin(a)
-#define softehl_vcos(a) cos(a)
-#define softehl_vcbrt(a) cbrt(a)
+#define softehl_mask(set) ((set) ? -1LL : 0LL)
+#define softehl_blend(m, a, b) ((m) ? (a) : (b))
+#define softehl_lt(a, b) softehl_mask((a) < (b))
+#define softehl_le(a, b) softehl_mask((a) <= (b))
+#define softehl_eq(a, b) softehl_mask((a) == (b))
+#define softehl_lane(a, l) (a)
+#define softehl_vfabs(a) fabs(a)
 #define softehl_vpow(a, e) pow(a, e)
 #define softehl_vrcbrt(a) softehl_rcbrt(a)
+#define softehl_vexp(a) exp(a)
+#define softehl_vlog(a) log(a)
+#define SOFTEHL_LANEWISE(NAME) \
+    static inline double softehl_v##NAME(double a) { return NAME(a); }
+#define SOFTEHL_LANEWISE2(NAME) \
+    static inline double softehl_v##NAME(double a, double b) { return NAME(a, b); }
 
 static inline double softehl_column(const double *p, ptrdiff_t width)
 {
@@ -147,33 +304,62 @@ static inline void softehl_store1(double *p, ptrdiff_t width, double a)
 }
 #endif
 
-static inline void softehl_load1(const double *p, ptrdiff_t width, softehl_vec *a)
+SOFTEHL_LANEWISE(sqrt)
+SOFTEHL_LANEWISE(sin)
+SOFTEHL_LANEWISE(cos)
+SOFTEHL_LANEWISE(cbrt)
+
+static inline void softehl_load1(const double *p, ptrdiff_t width, V *a)
 {
     *a = softehl_column(p, width);
 }
 
-static inline void softehl_load2(
-    const double *p, ptrdiff_t width, softehl_vec *a, softehl_vec *b)
+static inline void softehl_load2(const double *p, ptrdiff_t width, V *a, V *b)
 {
     *a = softehl_column(p, width), *b = softehl_column(p + 1, width);
 }
 
-static inline void softehl_load3(
-    const double *p, ptrdiff_t width, softehl_vec *a, softehl_vec *b, softehl_vec *c)
+static inline void softehl_load3(const double *p, ptrdiff_t width, V *a, V *b, V *c)
 {
     softehl_load2(p, width, a, b);
     *c = softehl_column(p + 2, width);
 }
 
-static inline void softehl_store2(double *p, ptrdiff_t width, softehl_vec a, softehl_vec b)
+static inline void softehl_store2(double *p, ptrdiff_t width, V a, V b)
 {
     softehl_store1(p, width, a), softehl_store1(p + 1, width, b);
 }
 
-static inline void softehl_store3(
-    double *p, ptrdiff_t width, softehl_vec a, softehl_vec b, softehl_vec c)
+static inline void softehl_store3(double *p, ptrdiff_t width, V a, V b, V c)
 {
     softehl_store2(p, width, a, b), softehl_store1(p + 2, width, c);
+}
+"""
+
+_ARRAYS = r"""
+/* Rows of `width` values of the elements of a group, to one V for each value and back. */
+static inline void softehl_gather(V *to, const double *from, ptrdiff_t width)
+{
+    ptrdiff_t k = 0;
+    for (; k + 4 <= width; k += 4)
+        softehl_load4(from + k, width, to + k, to + k + 1, to + k + 2, to + k + 3);
+    for (; k < width; ++k) to[k] = softehl_column(from + k, width);
+}
+
+static inline void softehl_scatter(double *to, const V *from, ptrdiff_t width)
+{
+    ptrdiff_t k = 0;
+    for (; k + 4 <= width; k += 4)
+        softehl_store4(to + k, width, from[k], from[k + 1], from[k + 2], from[k + 3]);
+    for (; k < width; ++k) softehl_store1(to + k, width, from[k]);
+}
+
+/* Not-a-number for all values of the elements in which something failed. */
+static inline void softehl_spoil(M failed, double *p, ptrdiff_t width)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l)
+        for (ptrdiff_t k = 0; k < width && softehl_lane(failed, l) != 0; ++k)
+            p[l * width + k] = NAN;
 }
 
 /* Fill a group with `count` elements of `width` values and repeat the last one. */
@@ -185,4 +371,4 @@ static inline void softehl_pad(double *to, const double *from, ptrdiff_t width, 
 }
 """
 
-TEXT = LANES + ROOTS + VECTORS
+TEXT = LANES + ROOTS + _FOUR + _VECTORS + _ARRAYS

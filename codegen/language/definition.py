@@ -41,7 +41,7 @@ class Definition:
     data: tuple[Argument, ...]
     point_data: tuple[Argument, ...]
     rule: QuadratureRule
-    unroll: bool
+    unroll: bool | None
     graph: Graph
     potential: Node
     constant: tuple[Node, ...]

@@ -40,8 +40,9 @@ __all__ = ["Argument", "Definition", "Model"]
 class Model:
     """Builder of a `Definition`; every method declares or names something.
 
-    With `unroll` the loop over the points of `rule` is written out: faster, and the rule is then
-    part of the kernel.  Otherwise `rule` is the default of a kernel that takes any.
+    The generator writes the loop over the points of `rule` out where that saves operations; the
+    rule is then part of the kernel.  With unroll=False it never does, and `rule` is the default of
+    a kernel that takes any; with unroll=True it always does.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class Model:
         *,
         nodes: int,
         rule: QuadratureRule,
-        unroll: bool = False,
+        unroll: bool | None = None,
         doc: str | None = "",
     ) -> None:
         if not NAME.fullmatch(name):

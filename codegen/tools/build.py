@@ -32,6 +32,8 @@ FLAGS = (*COMMON, "-march=native")
 """For the processor of this machine."""
 PLAIN = (*COMMON, *(["-march=x86-64"] if platform.machine() in ("x86_64", "AMD64") else []))
 """For every processor of this platform: what a wheel carries."""
+LARGE, LIGHT = 20_000, "-O1"
+"""Values in a file above which more than -O1 costs minutes, and the code gets slower."""
 STRICT = ("-Wall", "-Wextra", "-Werror")
 """For our own tests alone: another compiler may warn of what ours does not."""
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
@@ -83,20 +85,22 @@ def build(
     """
     define = f'-DSOFTEHL_SIGNATURE="{signature(directory)}"'
     sources = sorted(directory.glob("*.c"))
-    command = [*compiler(), *flags, *extra]
+    command = [*compiler(), *flags]
     with tempfile.TemporaryDirectory(prefix=".part-", dir=directory) as scratch:
         objects = [Path(scratch) / f"{source.stem}.o" for source in sources]
-        compiling = [*(word for word in command if word != "-shared"), define, "-c"]
+        compiling = [word for word in command if word != "-shared"]
 
         def compiled(source: Path, to: Path) -> float:
             start = perf_counter()
-            _run([*compiling, str(source), "-o", str(to)], to)
+            large = source.read_text(encoding="utf-8").count(" const ") > LARGE
+            light = [LIGHT] if large else []
+            _run([*compiling, *light, *extra, define, "-c", str(source), "-o", str(to)], to)
             return perf_counter() - start
 
         with ThreadPoolExecutor(_processors()) as pool:
             seconds = list(pool.map(compiled, sources, objects))
         linked = Path(scratch) / LIBRARY
-        _run([*command, *map(str, objects), "-o", str(linked), "-lm"], linked)
+        _run([*command, *extra, *map(str, objects), "-o", str(linked), "-lm"], linked)
         data = linked.read_bytes()
     cache.write(directory / LIBRARY, data, mode=0o755)
     cache.write(directory / DIGEST, f"{_sha256(data)}  {LIBRARY}\n".encode(), mode=0o644)

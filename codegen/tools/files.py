@@ -10,6 +10,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from rich.table import Column, Table
 
 from softehl.codegen.abi import Target, Task
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.tools import build, cache, library, targets, user, verify
+from softehl.codegen.tools import build, cache, library, targets, timing, user, verify
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.codegen.tools.samples import NoStateError
 from softehl.codegen.tools.trace import show as show_trace
@@ -67,7 +68,7 @@ def _generate(paths: Sequence[Path], folder: Path) -> int:
     names = " ".join(p.name for p in paths)
     print(f"{names}: {len(made.files) + 2} files in {folder}, {changed} of them new or changed")
     errors, unchecked = _errors(paths, definitions, made)
-    Console().print(_table(made, errors))
+    Console().print(_table(made, errors, _times(definitions, made)))
     for d in (d for d in definitions if d.given):
         print(f"{d.name} gives derivatives of its own: residual and tangent were not compared")
     for d in definitions:
@@ -96,6 +97,16 @@ def _errors(
     return errors, unchecked
 
 
+def _times(definitions: Sequence[Definition], made: library.Library) -> dict[str, dict[str, float]]:
+    """Nanoseconds of one element by kernel and task; none where no state is known."""
+    times = {}
+    for d in definitions:
+        with suppress(NoStateError):
+            tasks = _entries(made.files)[d.name]["tasks"]
+            times[d.name] = timing.nanoseconds(d, tasks, made.folder / build.LIBRARY)
+    return times
+
+
 def _entries(files: Mapping[str, str]) -> dict[str, Any]:
     kernels: dict[str, Any] = json.loads(files["manifest.json"])["kernels"]
     return kernels
@@ -112,9 +123,13 @@ def _judge(name: str, errors: Mapping[str, float]) -> int:
     return 1 if wrong else 0
 
 
-def _table(made: library.Library, errors: Mapping[str, Mapping[str, float]]) -> Table:
-    # the operations of each task, the rest of the whole family
-    right = ("ops", "C bytes", "derive s", "compile s", "tangent error", "other errors")
+def _table(
+    made: library.Library,
+    errors: Mapping[str, Mapping[str, float]],
+    times: Mapping[str, Mapping[str, float]],
+) -> Table:
+    # operations and nanoseconds of one element for each task, the rest of the whole family
+    right = ("ops", "ns", "C bytes", "derive s", "compile s", "tangent error", "other errors")
     table = Table(
         *(Column(t, no_wrap=True) for t in ("kernel", "tasks")),
         *(Column(t, justify="right") for t in right),
@@ -128,6 +143,7 @@ def _table(made: library.Library, errors: Mapping[str, Mapping[str, float]]) -> 
             name,
             "\n".join(tasks),
             "\n".join(str(cost["operations"]) for cost in tasks.values()),
+            "\n".join(f"{times[name][t]:.0f}" if name in times else "-" for t in tasks),
             str(entry["bytes"]),
             _seconds(made.derived, name),
             _seconds(made.compiled, name),

@@ -62,7 +62,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "history": list(d.history),
         "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],
         "fields": [name for name, _ in d.fields],
-        "unrolled": d.unroll,
+        "unrolled": any(f.chosen.unrolled for f in kernel.functions.values()),
         "rule": {"points": points, "weights": [float(w.evalf(30)) for w in d.rule.weights]},
         "tasks": {t: _cost(f, len(points)) for t, f in kernel.functions.items()},
         "bytes": len(kernel.text.encode()),

@@ -36,7 +36,8 @@ def _stages(d: Definition, f: Function) -> Iterator[tuple[str, str]]:
     yield "interfaces", _interfaces(d, f.found)
     yield "invariants", _invariants(f.found)
     for k, a in enumerate(f.attempts, 1):
-        yield f"chain rule {k}", f"{a.rule}: {a.operations} operations of one element"
+        how = ", loop over the points written out" if a.unrolled else ""
+        yield f"chain rule {k}", f"{a.rule}{how}: {a.operations} operations of one element"
     if len(f.attempts) > 1:
         yield "choice", f"chain rule {f.attempts.index(f.chosen) + 1}"
     plan = f.plan
@@ -68,10 +69,13 @@ def _count(n: int, thing: str) -> str:
 
 
 def _passes(f: Function) -> Table:
-    """Nodes and operations that each pass left, for each chain rule."""
+    """Nodes and operations that each pass left, for each chain rule with the passes of the chosen.
+
+    The loop over the points, written out or not, decides which passes there are.
+    """
     table = Table("pass", box=box.SIMPLE_HEAD)
-    rules = f.attempts
-    for k, a in enumerate(rules, 1):
+    rules = [a for a in f.attempts if a.unrolled is f.chosen.unrolled]
+    for k, a in ((k, a) for k, a in enumerate(f.attempts, 1) if a in rules):
         label = f"rule {k}{'*' if a is f.chosen else ''}" if len(rules) > 1 else ""
         table.add_column(f"{label} nodes".strip(), justify="right")
         table.add_column("operations", justify="right")

@@ -18,7 +18,7 @@ from __future__ import annotations
 import ctypes
 import math
 import random
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +58,7 @@ def errors(
     rng = random.Random(f"{definition.name} direction")
     ndof = len(states[0].dofs)
     along = [[rng.choice((-1, 1)) * rng.uniform(0.5, 1) for _ in range(ndof)] for _ in states]
-    called = _Batch(definition, ctypes.CDLL(str(library)), states, along)
+    called = Batch(definition, ctypes.CDLL(str(library)), states, along)
     if any(called.silent(t) for t in tasks):
         raise samples.NoStateError(
             f"{definition.name} cannot be checked: its local iteration finds no solution at random "
@@ -85,7 +85,7 @@ def _finite(error: float) -> float:
     return error if math.isfinite(error) else math.inf
 
 
-class _Batch:
+class Batch:
     """The kernels of one family called on all states at once."""
 
     def __init__(
@@ -109,6 +109,13 @@ class _Batch:
 
     def call(self, task: str) -> tuple[list[Vector], list[Vector]]:
         """Values and, of the task `tangent`, tangents of every state, flat."""
+        (wide, values), (square, tangent), run = self.prepared(task)
+        run()
+        n = len(self.states)
+        return _split(values, wide, n), _split(tangent, square, n)
+
+    def prepared(self, task: str) -> tuple[Any, Any, Callable[[], None]]:
+        """Width and array of values and of tangents, and the call that fills them."""
         fields = self.points * len(self.d.fields)
         width = {abi.Task.ENERGY: 1, **dict.fromkeys(abi.AT_POINTS, fields)}
         wide = width.get(abi.Task(task), self.ndof) if task in set(abi.Task) else self.ndof
@@ -119,8 +126,8 @@ class _Batch:
         function.restype = None
         sizes = (ctypes.c_ssize_t(v) for v in (n, self.points, self.modes))
         self.arrays[4] = _doubles(v for e in range(n) for v in self.direction(task, e))
-        function(*sizes, *self.arrays, values, tangent)
-        return _split(values, wide, n), _split(tangent, square, n)
+        arguments = (*sizes, *self.arrays, values, tangent)
+        return (wide, values), (square, tangent), lambda: function(*arguments)
 
     def direction(self, task: str, e: int) -> Vector:
         """What a task follows in one element: its unknowns, or a random variation of all else."""
@@ -165,7 +172,7 @@ class _Compared:
         d: Definition,
         states: Sequence[State],
         along: Sequence[Vector],
-        called: _Batch,
+        called: Batch,
         walked: Definition,
     ) -> None:
         self.d, self.states, self.along, self.called = d, states, along, called

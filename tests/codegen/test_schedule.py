@@ -23,7 +23,7 @@ def nodes_of(statements: Sequence[Statement]) -> Iterator[Node]:
     for s in statements:
         if isinstance(s, Node):
             yield s
-        else:
+        elif isinstance(s, If):
             yield from s.merged
             yield from nodes_of(s.then)
             yield from nodes_of(s.otherwise)
@@ -38,6 +38,7 @@ def assert_operands_first(statements: Sequence[Statement], known: set[Node]) -> 
             assert not [a for a in s.args if a in everything and a not in done], s
             done.add(s)
             continue
+        assert isinstance(s, If)
         assert s.condition in done or s.condition not in everything
         for k, side in ((1, s.then), (2, s.otherwise)):
             inside = assert_operands_first(side, done)

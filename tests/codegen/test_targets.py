@@ -69,11 +69,12 @@ def test_scalar_c_has_no_vectors(scalar: Path) -> None:
 
 
 def test_the_default_is_simd_where_it_suits() -> None:
-    """A branch (contact) and a field at the points are printed one element at a time."""
+    """Few operations (contact) are printed one element at a time, loops and branches are not."""
     kernel = pipeline.compile_model(ALL["contact"]())
     assert all("const V " not in f.text for f in kernel.functions.values())
-    solid = pipeline.compile_model(ALL["axial_spring"]())
-    assert all("const V " in f.text for f in solid.functions.values())
+    for name in ("axial_spring", "film"):
+        several = pipeline.compile_model(ALL[name]())
+        assert all("const V " in f.text for f in several.functions.values())
 
 
 # ------------------------------------------------------------------------------- the command line

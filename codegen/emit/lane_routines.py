@@ -1,0 +1,159 @@
+"""Routines that a kernel calls for several elements at once, as static functions in front of it.
+
+`void f(M active, const V *in, V *out, M *lost)` computes the results for the lanes of `active`;
+those in which there is none are not-a-number, and are added to `lost`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from softehl.codegen.emit import routines
+from softehl.codegen.emit.lanes import LanePrinter
+from softehl.codegen.emit.printer import number
+from softehl.codegen.graph.graph import Routine
+from softehl.codegen.graph.routines import Inverse, Isotropic, Newton
+from softehl.codegen.language.definition import Definition
+
+
+def texts(d: Definition, wanted: Iterable[Routine]) -> list[str]:
+    """C functions of the routines and what they need, each once, callees first."""
+    out: dict[str, None] = {}
+    for r in wanted:
+        out.update(dict.fromkeys(_text(d, r)))
+    return list(out)
+
+
+def _text(d: Definition, r: Routine) -> list[str]:
+    match r:
+        case Newton():
+            return _newton(d, r)
+        case Inverse():
+            return [_ELIMINATE, _inverse(d, r)]
+        case Isotropic():
+            return [*routines.texts(d, [r]), _one_by_one(d, r)]
+    raise TypeError(f"no C for {r}")
+
+
+def _signature(d: Definition, r: Routine) -> str:
+    name = f"softehl_{d.name}_{r.name}_lanes"
+    return f"static void {name}(\n    M active, const V *restrict p, V *restrict s, M *lost)\n"
+
+
+def _newton(d: Definition, r: Newton) -> list[str]:
+    """Lanes that are done keep their solution while others go on."""
+    n, first = r.outputs, r.inputs - r.outputs
+    values, targets = routines.newton_values(r)
+    body = routines.Body(d, d.graph, values, LanePrinter(d, "active"))
+    control, size = r.control, number(float(r.control.size))
+    text = f"""/* {r.name}: {n} local unknowns, at most {control.iterations} Newton steps */
+{_signature(d, r)}{{
+    const double tolerance = {number(float(control.tolerance))};
+    M spoilt = softehl_mask(0);
+    V before[{n}];
+    for (int k = 0; k < {n}; ++k) s[k] = p[{first} + k], before[k] = softehl_splat(HUGE_VAL);
+    for (int step = 0; step < {control.iterations} && softehl_any(active); ++step) {{
+        M failed = softehl_mask(0), far = failed;
+        V g[{n}], A[{n * n}], B[{max(n * first, 1)}];
+{body.text(2, targets)}
+        for (int i = 0; i < {n}; ++i)
+            far |= softehl_unsolved_lanes(
+                g[i], tolerance, {n}, A + {n} * i, s, {first}, B + {first} * i, p);
+        failed |= softehl_eliminate_lanes({n}, A, 1, g);
+        spoilt |= active & failed;
+        active &= ~failed;
+        for (int k = 0; k < {n}; ++k) {{
+            s[k] = softehl_blend(active, s[k] - g[k], s[k]);
+            const V change = softehl_vfabs(g[k]);
+            const V close = tolerance * ({size} + softehl_vfabs(s[k]));
+            far |= ~(softehl_le(change, close) | softehl_lt(0.9 * before[k], change));
+            before[k] = change;
+        }}
+        active &= far;
+    }}
+    spoilt |= active;
+    for (int k = 0; k < {n}; ++k) s[k] = softehl_blend(spoilt, softehl_splat(NAN), s[k]);
+    *lost |= spoilt;
+}}
+"""
+    return [_UNSOLVED, _ELIMINATE, *texts(d, body.called), text]
+
+
+def _inverse(d: Definition, r: Inverse) -> str:
+    n = r.size
+    return f"""{_signature(d, r)}{{
+    V A[{n * n}];
+    for (int k = 0; k < {n * n}; ++k) A[k] = p[k], s[k] = softehl_splat(k % {n + 1} == 0);
+    const M spoilt = active & softehl_eliminate_lanes({n}, A, {n}, s);
+    for (int k = 0; k < {n * n}; ++k) s[k] = softehl_blend(spoilt, softehl_splat(NAN), s[k]);
+    *lost |= spoilt;
+}}
+"""
+
+
+def _one_by_one(d: Definition, r: Routine) -> str:
+    """A routine of one element called for each lane that wants it."""
+    return f"""{_signature(d, r)}{{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {{
+        double one[{max(r.inputs, 1)}], out[{r.outputs}];
+        for (int k = 0; k < {r.inputs}; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < {r.outputs}; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_{d.name}_{r.name}(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < {r.outputs}; ++k) softehl_lane(s[k], l) = out[k];
+    }}
+}}
+"""
+
+
+_UNSOLVED = """/* Lanes in which an equation g is far from zero: compared with the sum of
+   |slope * value| over the local unknowns and all that comes from outside. */
+static M softehl_unsolved_lanes(V g, double tolerance, int n, const V *A, const V *s,
+    int m, const V *B, const V *p)
+{
+    V terms = softehl_splat(0.0);
+    for (int k = 0; k < n; ++k) terms += softehl_vfabs(A[k] * s[k]);
+    for (int k = 0; k < m; ++k) {
+        const V term = softehl_vfabs(B[k] * p[k]);
+        terms += softehl_blend(softehl_lt(term, softehl_splat(HUGE_VAL)), term, softehl_splat(0.0));
+    }
+    return ~softehl_le(softehl_vfabs(g), tolerance * terms);
+}
+"""
+
+_ELIMINATE = """/* Solve A x = b for `count` columns b in place, with partial pivoting in every lane
+   for itself; returns the lanes in which A is singular. */
+static M softehl_eliminate_lanes(int n, V *A, int count, V *b)
+{
+    M singular = softehl_mask(0);
+    for (int k = 0; k < n; ++k) {
+        for (int i = k + 1; i < n; ++i) {
+            const M larger = softehl_lt(softehl_vfabs(A[k * n + k]), softehl_vfabs(A[i * n + k]));
+            if (!softehl_any(larger)) continue;
+            for (int j = k; j < n; ++j) {
+                const V x = A[k * n + j], y = A[i * n + j];
+                A[k * n + j] = softehl_blend(larger, y, x);
+                A[i * n + j] = softehl_blend(larger, x, y);
+            }
+            for (int j = 0; j < count; ++j) {
+                const V x = b[k * count + j], y = b[i * count + j];
+                b[k * count + j] = softehl_blend(larger, y, x);
+                b[i * count + j] = softehl_blend(larger, x, y);
+            }
+        }
+        singular |= ~softehl_lt(softehl_splat(0.0), softehl_vfabs(A[k * n + k]));
+        A[k * n + k] = 1.0 / A[k * n + k];
+        for (int i = k + 1; i < n; ++i) {
+            const V factor = A[i * n + k] * A[k * n + k];
+            for (int j = k + 1; j < n; ++j) A[i * n + j] -= factor * A[k * n + j];
+            for (int j = 0; j < count; ++j) b[i * count + j] -= factor * b[k * count + j];
+        }
+    }
+    for (int k = n - 1; k >= 0; --k)
+        for (int j = 0; j < count; ++j) {
+            for (int i = k + 1; i < n; ++i) b[k * count + j] -= A[k * n + i] * b[i * count + j];
+            b[k * count + j] *= A[k * n + k];
+        }
+    return singular;
+}
+"""
