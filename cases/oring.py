@@ -7,7 +7,7 @@ from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
-from softehl.cases.seal import plan
+from softehl.cases.seal import catalogue, plan
 from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import PICTURES, write_plots
@@ -76,6 +76,12 @@ class ORingCase(Case[ORing, FilmRow]):
         if parameters.sensitivity:
             words += _not_differentiated(rows)
         return words
+
+    def warnings(self, parameters: ORing) -> list[str]:
+        """See :class:`Case`."""
+        p = parameters
+        ring = catalogue.Ring("", p.inner_diameter, p.section_diameter)
+        return list(catalogue.warnings(ring, p.rod_diameter, p.housing_diameter, p.groove_width))
 
     def notes(self, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""

@@ -90,6 +90,10 @@ class Case(Generic[P, R]):
         """
         return [f"not a result: {self.named(rejected)}. {advice}"] if rejected else []
 
+    def warnings(self, parameters: P) -> list[str]:
+        """What is unusual about a run before it begins; it runs all the same."""
+        return []
+
     def notes(self, rows: Sequence[R]) -> list[str]:
         """What is to be known of rows that are results, but not plain ones."""
         return []

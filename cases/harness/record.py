@@ -182,6 +182,7 @@ class RunRecord:
             "case": self.run.case.name,
             "status": status,
             "message": message,
+            "warnings": self.run.case.warnings(self.run.parameters),
             "parameters": self.run.parameters.model_dump(),
             "versions": _versions(),
             **self._size,

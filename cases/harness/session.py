@@ -34,6 +34,8 @@ def run_case(run: Run, folder: Path, existing: Existing, *, jobs: int, quiet: bo
     with RunRecord(folder, run, existing) as record:
         for doubt in record.doubts:
             click.echo(f"softehl: {doubt}", err=True)
+        for warning in () if quiet else run.case.warnings(run.parameters):
+            click.echo(f"softehl: {warning}", err=True)
         with make_display(quiet=quiet) as display:
             complaints = compute(record, jobs=jobs, display=display)
         with _writing(folder):

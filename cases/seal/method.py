@@ -43,6 +43,7 @@ from softehl.cases.seal.results import (
     contact_state,
     film_numbers,
     film_state,
+    unsealed,
 )
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import resolved
@@ -232,6 +233,7 @@ class SealRun:
         ratios = INLET_RATIO if p.mesh == "graded" else ANY_RATIO
         coarser = _thicknesses(*self.coarser, stroke) if self.coarser else {}
         verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
+        verdict = replace(verdict, unsealed=unsealed(self.system, self.x))
         progress = StrokeState(verdict, set(p.speeds))
 
         def on_speed(film: FilmLoads, point: Point) -> None:

@@ -13,7 +13,16 @@ from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.state import ContactState, FilmState, Profile, Section
 from softehl.cases.seal.surfaces import regime
-from softehl.cases.seal.system import AIR_WALL, FACET, FILM, SEALED_WALL, SOLID
+from softehl.cases.seal.system import (
+    AIR_WALL,
+    BORE,
+    FACET,
+    FILM,
+    ROD,
+    SEALED_WALL,
+    SOLID,
+    WALLS,
+)
 from softehl.cases.seal.verdict import FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
@@ -195,6 +204,16 @@ def contact_pressure(system: SealSystem, sealed_pressure: float, x: Array) -> Ar
     pressure[: system.section.lowest] += sealed_pressure
     pressure[system.section.lowest] += 0.5 * sealed_pressure  # the pressure ends at this node
     return np.asarray(pressure)
+
+
+def unsealed(system: SealSystem, x: Array) -> str:
+    """Where the sealed pressure ends outside the contact of the state x; empty if nowhere."""
+    if system.parameters.sealed_pressure == 0.0:
+        return ""
+    if not system.pressing(ROD, x)[system.section.lowest] > 0.0:
+        return "at the lowest point of the section"
+    crown = system.section.chains[WALLS[BORE]][0] == system.section.pressed_ends[1]
+    return "" if (system.pressing(BORE, x)[crown] > 0.0).all() else "at its crown"
 
 
 def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:

@@ -106,6 +106,7 @@ class Verdict:
     are judged for each film alone. fewest: segments that the inlet needs. ratios: credible
     inlet_ratio. error: estimated error of the last film's h*, %, None where none is wanted. rough:
     between rough surfaces friction may rise while the speed falls, and h may be negative.
+    unsealed: where the sealed pressure ends although nothing is touched there.
     """
 
     reference: float
@@ -115,6 +116,7 @@ class Verdict:
     ratios: tuple[float, float] = ANY_RATIO
     error: float | None = None
     rough: bool = False
+    unsealed: str = ""
 
     def after(self, film: FilmNumbers) -> Verdict:
         """The verdict that includes one more film; `collapsed` says what gave it away."""
@@ -136,6 +138,8 @@ class Verdict:
             return UNDER_RESOLVED
         if self.error is not None and not abs(self.error) <= LARGEST_ERROR:
             return UNCERTAIN
+        if self.unsealed:
+            return UNCERTAIN
         return OSCILLATING if self.last.oscillation > STRONG_OSCILLATION else OK
 
     @property
@@ -152,6 +156,11 @@ class Verdict:
             else:
                 where = f"the arc cuts off {100.0 * last.lacking:.2g} % of the inlet's pressure"
             return f"{where}; leave arc_start and arc_end out, or move them outwards"
+        if word == UNCERTAIN and self.unsealed:
+            return (
+                f"the sealed pressure is taken to end {self.unsealed}, where the ring touches "
+                "nothing; try more squeeze or a narrower groove"
+            )
         if word == UNCERTAIN:
             known = self.error is not None and isfinite(self.error)
             size = f"is {self.error:+.2g} %" if known else "is not known"

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.contact import lean_stage, load_stage, squeeze_stage
+from softehl.cases.oring import CASE
+from softehl.cases.seal.contact import along, lean_stage, load_stage, squeeze_stage
 from softehl.cases.seal.equations import build_system
 from softehl.cases.seal.failure import explained
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathSettings, StageFailed
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.results import unsealed
 from softehl.cases.seal.state import CLIPPED, COLLAPSED, UNDER_RESOLVED, Outcome, Silent
+from softehl.cases.seal.system import BORE, ROD
 from softehl.runtime.solve.solution import Branch, Status
 from tests.cases.gland_matrix import drawn
 
@@ -65,6 +69,45 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
         assert says in message
         assert "squeeze 12.9 %, width 4.699 mm" in message
         assert "norm" not in message
+
+
+def test_a_ring_that_overfills_its_gland_is_warned_of() -> None:
+    narrow = ORing(ring="AS568-210", rod=19.0, groove_width=3.6, housing_diameter=23.9)
+    assert CASE.warnings(narrow) == [
+        "the ring fills 115 % of its gland; handbooks advise 60 to 95 %"
+    ]
+    assert CASE.warnings(ORing(ring="AS568-210", rod=19.0)) == []
+
+
+def test_a_path_from_rest_takes_few_steps_however_incompressible_the_rubber() -> None:
+    """Gland 0 of the sample, kappa 1280 mu: Newton's own tangent takes minutes there."""
+    p = drawn(0)
+    system = build_system(p.model_copy(update={"mesh": "uniform", "density": 1}))
+    driver = PathDriver(Silent())
+    stage = squeeze_stage(system, PathSettings())
+    x = driver.follow(replace(stage, corrector=along(system, driver.newton)), system.at_rest())
+    assert not isinstance(x, StageFailed)
+    assert driver.records[-1].iterations < 60
+
+
+def test_pressure_that_ends_where_nothing_touches_is_told() -> None:
+    system = build_system(ORing(density=1, mesh="uniform", arc_start=-34.0, arc_end=43.0))
+    x = system.at_rest()
+    assert "lowest point" in unsealed(system, x)
+    x[system.layout.part(ROD)] = -1.0
+    assert "crown" in unsealed(system, x)
+    x[system.layout.part(BORE)] = -1.0
+    assert unsealed(system, x) == ""
+
+
+def test_an_inlet_that_is_cut_off_lacks_pressure() -> None:
+    """h* lacks about a tenth of that share; the arc from -34 degrees is whole."""
+    whole, cut = (
+        run(ORing(arc_start=a, arc_end=43.0, speeds=(400.0,), stroke="out"), Silent()).states[0]
+        for a in (-34.0, -25.0)
+    )
+    assert (whole.verdict, cut.verdict) == (OK, OK)
+    assert cut.h_star_um / whole.h_star_um == pytest.approx(0.997, abs=0.002)
 
 
 @pytest.mark.slow
