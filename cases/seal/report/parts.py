@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from io import BytesIO
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
@@ -17,6 +17,8 @@ from softehl.cases.seal.report.interactive import curve_plot, film_plot, frictio
 from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.rubber import shore_band
 from softehl.cases.seal.telling import read_profile, read_section
+from softehl.cases.seal.tolerances import ToleranceRow
+from softehl.runtime.io import read_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -124,13 +126,17 @@ def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
     """Film thickness over roughness and the regime, where the runs have columns of it."""
     tables = []
     for run in runs:
-        names = [f.name for f in fields(run.rows[0])]
-        own = [n for n in names if n.startswith("lambda") or n == "regime"]
-        if own:
-            rows = [(row.rod_speed_mm_s, *(getattr(row, n) for n in own)) for row in run.rows]
-            tables.append(Table(run.name, ("rod_speed_mm_s", *own), rows))
+        if any(isfinite(row.lambda_ratio) for row in run.rows):
+            rows = [[getattr(row, name) for name in _SURFACE] for row in run.rows]
+            tables.append(Table(run.name, _SURFACE, rows))
     text = "Lambda is the film thickness over the roughness of both surfaces."
     return [Part("Surfaces", text, tables=tables)] if tables else []
+
+
+_SURFACE = (
+    *("rod_speed_mm_s", "lambda_ratio", "regime", "mean_gap_um"),
+    *("asperity_load_percent", "boundary_friction_percent"),
+)
 
 
 def _tolerances(runs: Sequence[FinishedRun]) -> Part:
@@ -155,9 +161,25 @@ def _tolerances(runs: Sequence[FinishedRun]) -> Part:
             )
         if p.oil and "VG" in p.oil.upper():
             rows.append((run.name, f"oil = {p.oil}", "viscosity +- 10 % (ISO 3448)"))
-    text = "" if rows else "No key of these runs has a tolerance that is known here."
-    table = Table("Of what was given", ("run", "key", "tolerance"), rows)
-    return Part("Tolerances", text, tables=[table] if rows else [])
+    tables = [Table("Of what was given", ("run", "key", "tolerance"), rows)] if rows else []
+    tables += [table for run in runs for table in _bands(run)]
+    text = "" if tables else "No key of these runs has a tolerance that is known here."
+    return Part("Tolerances", text, pictures=_tornados(runs), tables=tables)
+
+
+def _bands(run: FinishedRun) -> list[Table]:
+    """What the tolerances make of the results, where the run has sensitivities."""
+    try:
+        cells = read_csv(run.folder / "tolerances.csv", ToleranceRow.header())
+        rows = [ToleranceRow.parse(row).cells() for row in cells]
+    except (OSError, ValueError):
+        return []
+    return [Table(f"{run.name}: changes that follow", ToleranceRow.header(), rows)]
+
+
+def _tornados(runs: Sequence[FinishedRun]) -> list[Picture]:
+    paths = [(run.name, run.folder / "tornado.png") for run in runs]
+    return [Picture(name, path.read_bytes()) for name, path in paths if path.exists()]
 
 
 def _png(figure: Figure) -> bytes:
