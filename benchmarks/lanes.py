@@ -23,6 +23,8 @@ from typing import Any
 
 import numpy as np
 
+from softehl.codegen.tools import build
+
 ELEMENTS = 32
 MODES = 5
 DIFFERENT = 32
@@ -34,7 +36,7 @@ def write(names: Sequence[str], folder: Path, target: str) -> None:
     """The C of some pages by the generator that is first on the path, and what it cost."""
     from softehl.codegen import pipeline
     from softehl.codegen.abi import Target
-    from softehl.codegen.tools import build, product, user
+    from softehl.codegen.tools import product, user
 
     models = {d.name: d for d in user.definitions(PAGES)}
     kernels = [pipeline.compile_model(models[name], Target(target)) for name in names]

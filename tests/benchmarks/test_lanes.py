@@ -1,0 +1,32 @@
+"""The benchmark of lanes compares results before it tells times."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from benchmarks import lanes
+
+NAMES = ("maxwell", "contact")
+
+
+def test_two_targets_are_compared_and_timed(tmp_path: Path) -> None:
+    before, now = tmp_path / "before", tmp_path / "now"
+    lanes.made(NAMES, before, "scalar", None)
+    operations, _ = lanes.made(NAMES, now, "simd", None)
+    assert operations == {"maxwell": 23, "contact": 42}
+    (a, b), ratio = lanes.measure("maxwell", [before, now], 3)
+    assert min(a, b, ratio) > 0
+
+
+def test_another_result_is_refused(tmp_path: Path) -> None:
+    right, wrong = tmp_path / "right", tmp_path / "wrong"
+    lanes.made(NAMES[:1], right, "scalar", None)
+    shutil.copytree(right, wrong)
+    source = wrong / "maxwell.c"
+    source.write_text(source.read_text().replace("3.0 *", "3.001 *"))
+    lanes.build.build(wrong)
+    with pytest.raises(SystemExit, match="maxwell: the results differ by"):
+        lanes.measure("maxwell", [right, wrong], 1)
