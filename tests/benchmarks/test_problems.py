@@ -11,7 +11,7 @@ from benchmarks import problems
 
 @pytest.mark.parametrize(("problem", "expected"), [("cook", 11.53022336), ("block", 0.03265384257)])
 def test_our_side_finds_what_felupe_finds(problem: str, expected: float) -> None:
-    """FElupe 11.3 by `benchmarks/rivals.py` on the same mesh; scikit-fem agrees to 1e-14 with it."""
+    """FElupe 11.3 by `benchmarks/rivals.py` on the same mesh; scikit-fem agrees with it."""
     found = problems.ours(problem, 4)
     assert found.iterations >= problems.STEPS[problem]
     assert found.assembly < found.total
