@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import lanes
+from softehl.codegen.tools import build
 
 NAMES = ("maxwell", "contact")
 
@@ -27,6 +28,6 @@ def test_another_result_is_refused(tmp_path: Path) -> None:
     shutil.copytree(right, wrong)
     source = wrong / "maxwell.c"
     source.write_text(source.read_text().replace("3.0 *", "3.001 *"))
-    lanes.build.build(wrong)
+    build.build(wrong)
     with pytest.raises(SystemExit, match="maxwell: the results differ by"):
         lanes.measure("maxwell", [right, wrong], 1)
