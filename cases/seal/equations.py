@@ -256,12 +256,20 @@ class SealSystem:
         if film.moment is not None:
             fixed.append(self.layout.dofs(ROTATION))
             values.append(film.moment)
-        fluxes = {name: self.flux_scales(film.speed, film.gap, name) for name in fields}
+        fluxes = {
+            name: self.flux_scales(max(film.speed, film.least_speed), film.gap, name)
+            for name in fields
+        }
         return replace(
             problem.with_fixed(fixed, values),
             scales={**problem.scales, **fluxes},
             guards=(*problem.guards, self.film_guard()),
         )
+
+    def squeeze_values(self, rate: float) -> dict[str, Values]:
+        """Parameters of the block of what the film holds; rate: coefficient of d/dt, 1/s."""
+        given = {"rod_radius": self.rod_radius, "rate": rate, **self.parameters.surfaces.values()}
+        return {b.name: self._chosen(b, given) for b in self.blocks if b.group == "squeeze"}
 
     def film_guard(self) -> Guard:
         """Film thickness at the nodes of the arc: positive in every iterate between smooth

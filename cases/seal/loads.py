@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from softehl.cases.seal.surfaces import SLIP
 from softehl.runtime.arrays import Array
 
 Stroke = Literal["out", "in"]
@@ -38,6 +39,8 @@ class FilmLoads:
     the rod in it, mm. moment: moment on the section (N mm) if it is free to roll, None if its
     rotation is held. place: as of the contact state. rate: coefficient of time derivatives, 1/s, 0
     where nothing changes. inflow: void fractions at the sealed and the air end, where oil comes in.
+    slip: speed at which the friction of asperities has 0.7 of its value, mm/s. least_speed: that
+    the sizes of fluxes are taken at, mm/s.
     """
 
     sealed_pressure: float
@@ -52,6 +55,8 @@ class FilmLoads:
     place: float | None = None
     rate: float = 0.0
     inflow: tuple[float, float] = (0.0, 0.0)
+    slip: float = SLIP
+    least_speed: float = 0.0
 
     @property
     def rod_speed(self) -> float:

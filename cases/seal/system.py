@@ -214,6 +214,7 @@ def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
         "upwinding": p.upwinding * copysign(1.0, film.rod_speed),
         "rate": film.rate,
         **p.surfaces.values(),
+        "boundary_speed": film.slip,
         **void_values(p.cavitation_pressure),
     }
 

@@ -1,0 +1,133 @@
+"""How a rod moves and the sealed pressure changes: tables over time that repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+
+_POINTS = 240  # of a sine: its speed is then right to 1e-4 of the largest
+
+
+@dataclass(frozen=True)
+class Table:
+    """Values over time, straight in between, the same again after the last time."""
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+    @classmethod
+    def of(cls, rows: Sequence[Sequence[float]]) -> Table:
+        """From rows (time, value).  ValueError for times that do not rise from 0."""
+        times, values = (tuple(float(v) for v in column) for column in zip(*rows, strict=True))
+        if times[0] != 0.0 or len(times) < 2 or not np.all(np.diff(times) > 0.0):
+            raise ValueError(f"times {list(times)[:4]}...: at least two, rising from 0, in seconds")
+        return cls(times, values)
+
+    @property
+    def period(self) -> float:
+        """Time after which it repeats, s."""
+        return self.times[-1]
+
+    def at(self, t: float) -> float:
+        """Value at a time."""
+        return float(np.interp(t % self.period, self.times, self.values))
+
+    def next_corner(self, t: float) -> float:
+        """The first time after t at which its slope may jump."""
+        start = self.period * np.floor(t / self.period + 1e-12)
+        later = start + np.array([*self.times[1:], self.period + self.times[1]])
+        return float(later[later > t + 1e-12 * self.period][0])
+
+    @cached_property
+    def largest(self) -> float:
+        """Largest magnitude."""
+        return max(abs(v) for v in self.values)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A rod that moves at U(t), mm/s, + to the air side, under p_s(t), MPa.
+
+    corners: whether U or p_s have corners that a step must not pass.
+    """
+
+    speed: Table
+    pressure: Table
+    corners: bool = True
+
+    @classmethod
+    def sine(cls, stroke: float, frequency: float, pressure: float) -> Motion:
+        """U = pi f S cos(2 pi f t): the rod starts in the middle of its way, at outstroke."""
+        t = np.linspace(0.0, 1.0 / frequency, _POINTS + 1)
+        speed = pi * frequency * stroke * np.cos(2.0 * pi * frequency * t)
+        return cls(Table(tuple(t), tuple(speed)), _constant(pressure, 1.0 / frequency), False)
+
+    @classmethod
+    def trapezoid(cls, stroke: float, frequency: float, ramp: float, pressure: float) -> Motion:
+        """Constant speeds with ramps of a share of the period each, from the middle of a way."""
+        T = 1.0 / frequency
+        U = stroke / (T * (0.5 - ramp))
+        shares = (0.0, 0.25 - ramp / 2, 0.25 + ramp / 2, 0.75 - ramp / 2, 0.75 + ramp / 2, 1.0)
+        values = (U, U, -U, -U, U, U)
+        return cls(Table(tuple(T * s for s in shares), values), _constant(pressure, T))
+
+    @property
+    def period(self) -> float:
+        """Time of a cycle, s."""
+        return self.speed.period
+
+    def place(self, t: float) -> float:
+        """Way of the rod since t = 0, mm."""
+        times, values = np.array(self.speed.times), np.array(self.speed.values)
+        way = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(times) * (values[1:] + values[:-1]))])
+        cycles, rest = divmod(t, self.period)
+        k = min(int(np.searchsorted(times, rest, side="right")) - 1, len(times) - 2)
+        part = 0.5 * (values[k] + self.speed.at(rest)) * (rest - times[k])
+        return float(cycles * way[-1] + way[k] + part)
+
+
+def _constant(value: float, period: float) -> Table:
+    return Table((0.0, period), (value, value))
+
+
+@dataclass
+class RodFilm:
+    """What an outstroke leaves on the rod, for the instroke that brings it back.
+
+    places: of the rod, mm, where it passed the air side; films: thickness there, as h* of (16), mm.
+    """
+
+    places: list[float]
+    films: list[float]
+
+    def leave(self, place: float, film: float) -> None:
+        """A film at a new place; what was there before is forgotten."""
+        while self.places and self.places[-1] >= place:
+            self.places.pop()
+            self.films.pop()
+        self.places.append(place)
+        self.films.append(max(film, 0.0))
+
+    def found(self, place: float) -> float | None:
+        """The film at a place, None where nothing was left: the rod is new there."""
+        if not self.places or not self.places[0] <= place <= self.places[-1]:
+            return None
+        return float(np.interp(place, self.places, self.films))
+
+
+def differences(steps: Sequence[float]) -> Array:
+    """Weights of d/dt at the newest of two (backward Euler) or three times (BDF2).
+
+    steps: the last step and, for BDF2, the one before. Newest first.
+    """
+    dt = steps[0]
+    if len(steps) == 1:
+        return np.array([1.0, -1.0]) / dt
+    r = dt / steps[1]
+    return np.array([(1.0 + 2.0 * r) / (1.0 + r), -(1.0 + r), r**2 / (1.0 + r)]) / dt
