@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # so that `softehl run --help` loads nothing heavy
 SHIPPED = {
     "oring": "softehl.cases.oring",
     "slider": "softehl.cases.slider",
+    "cycle": "softehl.cases.cycle",
 }
 """Name of a case -> the module that declares it, imported when the case is needed."""
 

@@ -30,7 +30,7 @@ ORDER = {
         *("share", "statement", "system", "equations output", "result", "watch engines"),
         *("follow load march", "study"),
     ),
-    "cases": ("harness", "seal", "oring slider", "paper", "shipped", "cli document"),
+    "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "cli document"),
 }
 """Folders and files of a room, each of which imports only those before it; some are one level."""
 PENDING: dict[str, str] = {}

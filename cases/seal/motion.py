@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.io import read_table
 
 _POINTS = 240  # of a sine: its speed is then right to 1e-4 of the largest
 
@@ -72,7 +75,7 @@ class Motion:
     def trapezoid(cls, stroke: float, frequency: float, ramp: float, pressure: float) -> Motion:
         """Constant speeds with ramps of a share of the period each, from the middle of a way."""
         T = 1.0 / frequency
-        U = stroke / (T * (0.5 - ramp))
+        U = stroke / (T * 0.5 * (1.0 - ramp))
         shares = (0.0, 0.25 - ramp / 2, 0.25 + ramp / 2, 0.75 - ramp / 2, 0.75 + ramp / 2, 1.0)
         values = (U, U, -U, -U, U, U)
         return cls(Table(tuple(T * s for s in shares), values), _constant(pressure, T))
@@ -131,3 +134,44 @@ def differences(steps: Sequence[float]) -> Array:
         return np.array([1.0, -1.0]) / dt
     r = dt / steps[1]
     return np.array([(1.0 + 2.0 * r) / (1.0 + r), -(1.0 + r), r**2 / (1.0 + r)]) / dt
+
+
+def motion_keys(given: dict[str, Any]) -> dict[str, Any]:
+    """Keys in which `motion` is a list or left out: words and files are read.  ValueError."""
+    motion = given.get("motion")
+    if isinstance(motion, dict):
+        known = {"stroke": "travel", "frequency": "frequency", "shape": "shape", "ramp": "ramp"}
+        wrong = [name for name in motion if name not in known]
+        if wrong:
+            raise ValueError(f"motion: {wrong[0]!r} is not known; there are {', '.join(known)}")
+        words = {known[name]: value for name, value in motion.items()}
+        return {**{k: v for k, v in given.items() if k != "motion"}, **words}
+    if isinstance(motion, str):
+        try:
+            table = read_table(Path(motion))
+            rows = list(zip(table["t_s"].tolist(), table["U_mm_s"].tolist(), strict=True))
+        except (OSError, KeyError, ValueError) as error:
+            raise ValueError(f"motion = {motion!r}: no CSV with t_s, U_mm_s ({error})") from None
+        return {**given, "motion": rows}
+    return given
+
+
+def motion_of(
+    rows: Sequence[Sequence[float]] | None,
+    pressure: Sequence[Sequence[float]] | float,
+    travel: float,
+    frequency: float,
+    ramp: float | None,
+) -> Motion:
+    """A motion from a table, or by travel (mm), frequency (1/s) and shape.  ValueError."""
+    constant = pressure if isinstance(pressure, (int, float)) else 0.0
+    if rows is not None:
+        speed = Table.of(rows)
+        motion = Motion(speed, _constant(constant, speed.period))
+    elif ramp is None:
+        motion = Motion.sine(travel, frequency, constant)
+    else:
+        motion = Motion.trapezoid(travel, frequency, ramp, constant)
+    if isinstance(pressure, (int, float)):
+        return motion
+    return replace(motion, pressure=Table.of(pressure))

@@ -94,10 +94,12 @@ class March:
     dt: float = 0.0
     _layer: Layer | None = None
 
-    def begin(self, x: Array, t: float = 0.0) -> None:
-        """From the film x (n,) at a time."""
+    def begin(self, x: Array, t: float = 0.0) -> Reading:
+        """From the steady film x (n,) at a time; its reading."""
         self.behind = [Instant(t, x, self._content(x), np.zeros(2))]
         self.dt = self.steps.first * self.motion.period
+        film = self._loads(t)
+        return self._reading(self.system.film_problem(film), film, self.behind[0], 0)
 
     def until(self, end: float, on_step: Callable[[Instant, Reading], None]) -> None:
         """March to a time; every step is told.  Raises StuckError."""
@@ -216,7 +218,8 @@ class March:
         system, x = self.system, instant.x
         at = problem.fields(FILM, x)
         rows = problem.assembler.residual(x, problem.parameters)[system.layout.part(PRESSURE)]
-        content = problem.fields(SQUEEZE, x)
+        squeezed = problem.with_parameters(**self.system.squeeze_values(0.0))
+        content = squeezed.fields(SQUEEZE, x)
         held = (content["dx"] * content["h_T"] * (1.0 - content["v"])).sum()
         share = rough_numbers(system, at).get("asperity_load", 0.0)
         return Reading(

@@ -1,0 +1,205 @@
+"""The O-ring on a rod that goes to and fro: film, friction and leakage in time, cycle by cycle."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from math import nan, pi
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from softehl.cases.harness.case import Case
+from softehl.cases.harness.observer import Observer, Outcome, State
+from softehl.cases.harness.parameters import key
+from softehl.cases.harness.pictures import draw_columns
+from softehl.cases.harness.row import OK, Row, column
+from softehl.cases.seal.motion import Motion, motion_keys, motion_of
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.arrays import Array
+from softehl.runtime.io import read_table
+
+TRANSIENT = "transient"
+"""Verdict of a cycle that differs from the one before by more than PERIODIC."""
+PERIODIC = 1.0  # per cent
+
+Points = tuple[tuple[float, float], ...]
+
+
+class Cycle(ORing):
+    """An O-ring and how its rod moves; the film conserves mass. `speeds`, `stroke` are not used."""
+
+    motion: Points | None = key(
+        None,
+        "speed of the rod over time, repeated: [[t, U], ...]; {stroke = 20, frequency = 2} and a "
+        "CSV file with the columns t_s, U_mm_s are understood too",
+        bounds="t rising from 0; left out = by travel, frequency and shape",
+        strict=False,
+    )
+    travel: float = key(20.0, "way of the rod from end to end", unit="mm", gt=0)
+    frequency: float = key(2.0, "cycles in a second", unit="1/s", gt=0)
+    shape: Literal["sine", "trapezoidal"] = key("sine", "speed over time")
+    ramp: float = key(0.1, "trapezoidal: share of the cycle of each ramp", gt=0, lt=0.5)
+    pressures: Points | None = key(
+        None,
+        "sealed pressure over time, repeated: [[t, p_s], ...]",
+        bounds="t rising from 0, in s and MPa; left out = sealed_pressure",
+        strict=False,
+    )
+    supply: Literal["flooded", "returned"] = key(
+        "flooded", "what the instroke finds: oil, or what the outstroke left on the rod"
+    )
+    cycles: int = key(3, "cycles to compute", ge=1, le=1000)
+    time_order: Literal[1, 2] = key(2, "1: backward Euler, 2: BDF2", bounds="1 or 2")
+    time_tolerance: float = key(0.02, "error of h in a step, relative to it", gt=0, le=0.5)
+
+    @classmethod
+    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """As for the O-ring, and motion by words or from a file.  ValueError."""
+        return super().completed(motion_keys(given))
+
+    @model_validator(mode="after")
+    def _moves(self) -> Self:
+        if self.cavitation == "penalty":
+            raise ValueError('cavitation = "penalty" loses oil in time; leave cavitation out')
+        if not self.path.speed.largest > 0.0 or not self.path.speed.values[0] > 0.0:
+            raise ValueError("motion: the rod must begin with an outstroke, U > 0 at t = 0")
+        return self
+
+    @property
+    def conserving(self) -> bool:
+        """Always."""
+        return True
+
+    @property
+    def path(self) -> Motion:
+        """The motion of the rod."""
+        return motion_of(
+            self.motion,
+            self.pressures or self.sealed_pressure,
+            *(self.travel, self.frequency),
+            self.ramp if self.shape == "trapezoidal" else None,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleRow(Row):
+    """A row of curve.csv: one cycle."""
+
+    files = ("loop_{}.csv", "film_{}.csv")
+    cycle: float = column("", "number of the cycle", head="cycle", shown="g")
+    leak_mm3: float = column("mm3", "oil past the air end, + = out", head="leak", shown=".4g")
+    leak_sealed_mm3: float = column("mm3", "oil past the sealed end, + = to the air side")
+    friction_out_N: float = column("N", "largest friction", head="friction", shown=".4g")
+    friction_in_N: float = column("N", "least friction", head="friction", shown=".4g")
+    energy_mJ: float = column("mJ", "work of friction on the rod", head="energy", shown=".4g")
+    h_min_um: float = column("um", "least film thickness at a node", head="h min", shown=".4g")
+    p_max_MPa: float = column("MPa", "largest film pressure")
+    asperity_load_percent: float = column("%", "largest share of asperities in the load")
+    change_percent: float = column(
+        "%", "of energy and leaks against the cycle before", head="change", shown=".2g", default=nan
+    )
+    mass_error: float = column("", "largest defect of the balance of oil over what the film holds")
+    steps: int = column("", "steps in time", head="steps")
+    newton_iterations: int = column("", "iterations of Newton's method")
+    verdict: str = column("", "`ok`; `transient` where the change is above 1 % or not known")
+
+    @property
+    def order(self) -> tuple[float]:
+        """As they follow each other."""
+        return (self.cycle,)
+
+
+@dataclass
+class CycleLog:
+    """Readings of the cycle that is computed, and what its film was."""
+
+    readings: list[Any] = field(default_factory=list)
+    films: list[dict[str, Array]] = field(default_factory=list)
+
+    def row(self, number: int, radius: float, before: Any, last: CycleRow | None) -> CycleRow:
+        """The cycle in numbers; before: the reading at its start, last: the row before it."""
+        all_of_them, around = [before, *self.readings], 2.0 * pi * radius
+        t, U, F = (
+            np.array([getattr(r, name) for r in all_of_them])
+            for name in ("t_s", "rod_speed_mm_s", "friction_N")
+        )
+        end, names = all_of_them[-1], ("content_mm2", "volume_air_mm2", "volume_sealed_mm2")
+        held, out, came = (np.array([getattr(r, n) for r in all_of_them]) for n in names)
+        balance = held + out - came
+        row = CycleRow(
+            cycle=float(number),
+            leak_mm3=around * (end.volume_air_mm2 - before.volume_air_mm2),
+            leak_sealed_mm3=around * (end.volume_sealed_mm2 - before.volume_sealed_mm2),
+            friction_out_N=float(F.max()),
+            friction_in_N=float(F.min()),
+            energy_mJ=float(0.5 * ((F * U)[1:] + (F * U)[:-1]) @ np.diff(t)),
+            h_min_um=min(r.h_min_um for r in self.readings),
+            p_max_MPa=max(r.p_max_MPa for r in self.readings),
+            asperity_load_percent=max(r.asperity_load_percent for r in self.readings),
+            mass_error=float(np.ptp(balance) / before.content_mm2),
+            steps=len(self.readings),
+            newton_iterations=sum(r.iterations for r in self.readings),
+            verdict=TRANSIENT,
+        )
+        if last is None:
+            return row
+        through = max(abs(row.leak_mm3), 1e-3 * around * before.content_mm2)
+        leak = abs(row.leak_mm3 - last.leak_mm3) / through
+        change = 100.0 * max(leak, abs(row.energy_mJ / last.energy_mJ - 1.0))
+        return replace(row, change_percent=change, verdict=OK if change < PERIODIC else TRANSIENT)
+
+    def tables(self) -> list[dict[str, Array]]:
+        """The friction loop with all readings, and the film over time and place."""
+        names = asdict(self.readings[0])
+        loop = {n: np.array([getattr(r, n) for r in self.readings], dtype=float) for n in names}
+        film = {n: np.concatenate([f[n] for f in self.films]) for n in self.films[0]}
+        return [loop, film]
+
+
+class CycleCase(Case[Cycle, CycleRow]):
+    """Cycles of a reciprocating rod, one after the other."""
+
+    name = "cycle"
+    title = "reciprocating O-ring seal in time: friction loop and leakage of every cycle"
+    parameters, row = Cycle, CycleRow
+    selection = ("cycles",)
+    files = ("rows.png",)
+
+    def requested(self, parameters: Cycle) -> list[float]:
+        """See :class:`Case`."""
+        return [float(n + 1) for n in range(parameters.cycles)]
+
+    def pieces(self, parameters: Cycle, rows: Sequence[CycleRow], jobs: int) -> list[Cycle]:
+        """See :class:`Case`; a run that goes on computes the cycles again that are there."""
+        return [] if len(rows) >= parameters.cycles else [parameters]
+
+    def piece_name(self, piece: Cycle) -> str:
+        """See :class:`Case`."""
+        return f"{piece.cycles} cycles"
+
+    def solve(self, parameters: Cycle, observer: Observer, shared: Path | None) -> Outcome:
+        """See :class:`Case`."""
+        from softehl.cases.seal.cycles import run_cycles
+
+        def log(number: int, readings: Any, films: Any, before: Any, last: Any) -> CycleRow:
+            cycle = CycleLog(readings, films)
+            row = cycle.row(number, 0.5 * parameters.rod_diameter, before, last)
+            observer.state(State(row, cycle.tables()))
+            return row
+
+        return run_cycles(parameters, parameters.path, observer, log)
+
+    def draw(
+        self,
+        parameters: Cycle,
+        folder: Path,
+        rows: Sequence[CycleRow],
+        rejected: Sequence[CycleRow],
+    ) -> None:
+        """See :class:`Case`: the friction loops."""
+        tables = {row.label(row.key): read_table(folder / row.file_names()[0]) for row in rows}
+        draw_columns(folder / "rows.png", tables, ("place_mm", "friction_N", "flux_air_mm2_s"))
+
+
+CASE = CycleCase()

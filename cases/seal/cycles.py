@@ -1,0 +1,115 @@
+"""From contact to a film that moves, then cycle by cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.equations import build_system
+from softehl.cases.seal.failure import explained
+from softehl.cases.seal.film import FastFilm
+from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.method import BuiltFilm, FilmPath
+from softehl.cases.seal.motion import Motion
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.telling import Teller
+from softehl.cases.seal.transient import Instant, March, Reading, StuckError, TimeSteps
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import Point, Status
+
+Log = Callable[[int, list[Reading], list[dict[str, Array]], Reading, Any], Any]
+
+
+def steady_start(path: FilmPath, x: Array, speed: float) -> BuiltFilm | None:
+    """The steady film of the outstroke at a speed, from the contact state x."""
+    found: list[BuiltFilm] = []
+
+    def keep(film: FilmLoads, point: Point) -> None:
+        if film.speed == speed:
+            found[:] = [(film, point.solution.x)]
+
+    if path.system.parameters.rough:
+        path.rise("out", path.settled(x), keep)
+    else:
+        path.fast(path.first("out", x), x, keep)
+    return found[0] if found else None
+
+
+@dataclass
+class Films:
+    """What happened in the cycle so far."""
+
+    readings: list[Reading] = field(default_factory=list)
+    films: list[dict[str, Array]] = field(default_factory=list)
+
+
+def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) -> Outcome:
+    """All cycles of a case; log: makes a row of each.  Failure is in the outcome's status."""
+    speed = motion.speed.at(0.0)
+    changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}
+    p: ORing = parameters.model_copy(update={**changes, "sealed_pressure": motion.pressure.at(0.0)})
+    newton = Newton(max_iterations=10, linear=choose(p.linear))
+    driver, settings = PathDriver(Teller(observer), newton), PathSettings()
+    contact = ContactRoute(settings, driver.follow, driver.newton).contact(p)
+    if isinstance(contact, StageFailed):
+        return _outcome(p, *explained(contact, "contact", p))
+    path = FilmPath(contact[0], settings, driver)
+    begun = steady_start(path, contact[1], speed)
+    if begun is None or not isinstance(newton.linear, Condenser):
+        words = f"no steady film at U = {speed:g} mm/s to begin with; use a finer mesh (density)"
+        return _outcome(p, Status.MAX_ITERATIONS, words)
+    corrector = FastFilm.of(path.system, newton.linear).corrector
+    steps = TimeSteps(tolerance=parameters.time_tolerance, order=parameters.time_order)
+    returned = parameters.supply == "returned"
+    march = March(path.system, motion, begun[0], corrector, steps, returned)
+    try:
+        _cycles(march, begun[1], parameters.cycles, observer, log)
+    except StuckError as error:
+        return _outcome(p, Status.MAX_ITERATIONS, f"{error}; try a smaller time_tolerance")
+    return _outcome(p, Status.CONVERGED, "all cycles")
+
+
+def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> None:
+    period, last = march.motion.period, None
+    before = march.begin(x)
+    for number in range(1, count + 1):
+        films = Films()
+        name = f"cycle {number}"
+        observer.stage(name, title=name, where={})
+
+        def told(instant: Instant, reading: Reading, films: Films = films) -> None:
+            films.readings.append(reading)
+            films.films.append(_film(march, instant))
+            observer.step(
+                label="t",
+                parameter=reading.t_s,
+                iterations=reading.iterations,
+                residuals=(),
+                fraction=(reading.t_s / period) % 1.0,
+            )
+
+        march.until(number * period, told)
+        last = log(number, films.readings, films.films, before, last)
+        before = films.readings[-1]
+
+
+def _film(march: March, instant: Instant) -> dict[str, Array]:
+    z, h = march.system.arc_film(instant.x)
+    p = march.system.pressures(instant.x)[:: march.system.parameters.pressure_order]
+    t = np.full(len(z), instant.t)
+    return {"t_s": t, "x_mm": z, "h_um": 1e3 * h, "p_MPa": p}
+
+
+def _outcome(p: ORing, status: Status, message: str) -> Outcome:
+    system = build_system(p)
+    kernels = {b.kernel.name: b.kernel.signature for b in system.problem.assembler.blocks}
+    return Outcome((), status, message, system.counts, kernels)

@@ -1,0 +1,209 @@
+"""Films in time: squeeze against closed forms, and cycles of the O-ring."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+import softehl
+from softehl.cases.cycle import Cycle
+from softehl.cases.seal.motion import Motion, RodFilm, Table, differences
+from softehl.cases.seal.strip import Oil, Strip
+from softehl.cases.seal.system import FILM, PRESSURE, SQUEEZE, VOID
+from softehl.runtime.arrays import Array
+from softehl.runtime.io import read_table
+from softehl.runtime.solve.newton import Newton
+from tests.reference.calling import fitted_order
+
+ETA = 6.59e-8
+Gap = Callable[[float], float]
+
+
+def strip(h: float, segments: int = 8, length: float = 1.0) -> Strip:
+    """A film between parallel plates."""
+    nodes = np.linspace(0.0, length, segments + 1)
+    x = np.stack([nodes[:-1], nodes[1:]], axis=1)
+    return Strip(x, np.full_like(x, h), 4, Oil(ETA))
+
+
+def march(gap: Gap, times: Array, order: int, ends: float) -> list[tuple[Array, Array, float]]:
+    """Pressures, void fractions and the defect of mass at every time, of plates h(t) apart."""
+    one, found = strip(gap(float(times[0]))), []
+    x = np.zeros(one.problem(0.0).layout.total)
+    contents: list[Array] = []
+    volumes = [0.0]
+    for k, t in enumerate(times):
+        now = strip(gap(float(t)))
+        problem = now.between(now.problem(1.0), np.array([ends, ends]), np.zeros(2))
+        content = problem.with_parameters(**{SQUEEZE: {"rod_radius": 0.0, "rate": 0.0}})
+        if k:
+            steps = [times[k] - times[k - 1]]
+            steps += [times[k - 1] - times[k - 2]] if order == 2 and k > 1 else []
+            w = differences(steps)
+            before = sum(a * c for a, c in zip(w[1:], contents, strict=False))
+            problem = now.moving(problem, float(w[0]), np.asarray(before))
+            problem = problem.with_parameters(**{FILM: {"rod_speed": 0.0}})
+            solution = Newton(tolerance=1e-13, stagnation=1e5, max_iterations=200).solve(problem, x)
+            assert solution.converged
+            x = solution.x
+            rows = problem.assembler.residual(x, problem.parameters)[problem.layout.part(PRESSURE)]
+            before = sum(a * v for a, v in zip(w[1:], volumes, strict=False))
+            volumes = [(rows[-1] + rows[0] - before) / w[0], *volumes[:1]]
+        contents = [content.fields(SQUEEZE, x)["content"], *contents[:1]]
+        at = content.fields(SQUEEZE, x)
+        held = float((at["dx"] * at["h_T"] * (1.0 - at["v"])).sum())
+        found.append(
+            (x[problem.layout.part(PRESSURE)], x[problem.layout.part(VOID)], held + volumes[0])
+        )
+    return found
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_squeezed_strip_converges_with_the_order_of_its_differences(order: int) -> None:
+    """A load w brings plates together by 1 / h^2 = 1 / h0^2 + 2 w t / (eta L^3)."""
+    w, h0, L = 1.0, 2e-3, 1.0
+
+    def gap(t: float) -> float:
+        return 1.0 / math.sqrt(h0**-2 + 2.0 * w * t / (ETA * L**3))
+
+    end, counts = 0.02, (16, 32, 64)
+    errors: list[float] = []
+    for n in counts:
+        p, _, _ = march(gap, np.linspace(0.0, end, n + 1), order, 0.0)[-1]
+        places = strip(h0).places
+        load = float(0.5 * (p[1:] + p[:-1]) @ np.diff(places))
+        # linear pressures on subcells carry a little less of the parabola, whatever the steps
+        share = np.trapezoid(places * (L - places), places) * 6.0 / L**3
+        errors.append(float(abs(load / share / w - 1.0)))
+    assert order - 0.25 < -fitted_order(counts, errors) < order + 0.4
+
+
+def test_plates_that_swing_rupture_and_keep_their_oil() -> None:
+    """h = 0.375 + 0.125 cos 4 pi t between 0.025 at both ends; void from t = 0.2500791572.
+
+    In d/dx (h^3 p') = 2 d(theta h)/dt p is in 6 eta (lengths and times are one).
+    """
+    scale = 6.0 * ETA
+
+    def gap(t: float) -> float:
+        return 0.375 + 0.125 * math.cos(4.0 * math.pi * t)
+
+    times = np.linspace(0.0, 0.35, 701)
+    found = march(gap, times, 1, 0.025 * scale)
+    masses = np.array([mass for _, _, mass in found])
+    assert np.ptp(masses) < 1e-12 * masses[0]
+    torn = np.array([v.max() > 1e-9 for _, v, _ in found])
+    assert times[torn][0] == pytest.approx(0.2500791572, abs=1e-3)
+    # the front stands within segments of 1/8: least half-width of the full film at either end
+    k = int(np.argmin(abs(times - 0.3148258613)))
+    _, v, _ = found[k]
+    x = strip(1.0).places
+    first = int(np.flatnonzero(v > 1e-9)[0])
+    assert 0.0 < x[first] < 0.125
+    assert 0.005 < x[first] < 0.06  # 0.0230077051, on subcells of 0.02 to 0.04
+
+
+def test_the_frame_does_not_matter() -> None:
+    """A surface that moves with w over a rod of U + w is one at rest over a rod of U."""
+    nodes = np.linspace(0.0, 1.0, 9)
+    x = np.stack([nodes[:-1], nodes[1:]], axis=1)
+    h = 2e-3 * (2.0 - x)
+    one = Strip(x, h, 4, Oil(ETA))
+    results = []
+    for w in (0.0, 137.0):
+        problem = one.between(one.problem(400.0 + w), np.zeros(2), np.zeros(2))
+        moving = problem.assembler.with_data(FILM, data=np.full((8, 2), w))
+        results.append(
+            Newton(tolerance=1e-12, stagnation=1e4, max_iterations=60)
+            .solve(replace(problem, assembler=moving), np.zeros(problem.layout.total))
+            .x
+        )
+    np.testing.assert_allclose(results[1], results[0], rtol=0, atol=1e-9 * abs(results[0]).max())
+
+
+def test_differences_are_exact_for_straight_lines_and_parabolas() -> None:
+    t = np.array([1.0, 0.7, 0.2])
+    assert differences([0.3]) @ t[:2] == pytest.approx(1.0)
+    assert differences([0.3, 0.5]) @ t**2 == pytest.approx(2.0)
+    assert differences([0.3, 0.5]).sum() == pytest.approx(0.0)
+
+
+def test_motions_repeat_and_stop_at_their_corners() -> None:
+    sine = Motion.sine(20.0, 2.0, 1.0)
+    assert sine.speed.largest == pytest.approx(40.0 * math.pi)
+    assert sine.place(0.125) == pytest.approx(10.0, rel=2e-4)
+    assert sine.place(5.125) == pytest.approx(sine.place(0.125), abs=1e-9)
+    trapezoid = Motion.trapezoid(20.0, 2.0, 0.1, 1.0)
+    assert trapezoid.place(0.125) == pytest.approx(10.0)
+    assert trapezoid.speed.next_corner(0.0) == pytest.approx(0.1)
+    assert trapezoid.speed.next_corner(0.1) == pytest.approx(0.15)
+    with pytest.raises(ValueError, match="rising"):
+        Table.of([(0.0, 1.0), (0.0, 2.0)])
+
+
+def test_the_rod_brings_back_what_was_left_on_it() -> None:
+    rod = RodFilm([], [])
+    for place, film in ((0.0, 1.0), (1.0, 3.0), (2.0, 5.0)):
+        rod.leave(place, film)
+    assert rod.found(0.5) == 2.0
+    assert rod.found(2.5) is None
+    rod.leave(1.0, 7.0)
+    assert rod.found(1.5) is None
+    assert rod.found(1.0) == 7.0
+
+
+def cycle(folder: Path, *settings: str) -> dict[str, Array]:
+    """The table of a run at density 1."""
+    keys = [f"--set={s}" for s in ("density=1", "roughness=0.3", *settings)]
+    assert softehl.main(["run", "cycle", *keys, "--out", str(folder), "--quiet"]) == 0
+    text = (folder / "curve.csv").read_text().splitlines()
+    names = text[0].split(",")
+    cells = [line.split(",") for line in text[1:]]
+    return {n: np.array([float(c[k]) for c in cells]) for k, n in enumerate(names[:-1])}
+
+
+def test_a_cycle_balances_and_becomes_periodic(tmp_path: Path) -> None:
+    table = cycle(tmp_path / "c", "cycles=3", "motion={stroke = 20, frequency = 2}")
+    assert table["mass_error"].max() < 1e-9
+    assert table["change_percent"][-1] < 1.0
+    assert table["leak_mm3"][-1] == pytest.approx(table["leak_sealed_mm3"][-1], rel=2e-3)
+    assert table["friction_in_N"][-1] < 0.0 < table["friction_out_N"][-1]
+    loop = read_table(tmp_path / "c" / "loop_3.csv")
+    film = read_table(tmp_path / "c" / "film_3.csv")
+    assert len(film["t_s"]) % len(loop["t_s"]) == 0
+    assert np.all(np.diff(loop["t_s"]) > 0.0)
+
+
+@pytest.mark.slow
+def test_long_periods_give_the_steady_curve(tmp_path: Path) -> None:
+    """The mean leak over the period tends to that of steady strokes as one over it."""
+    leaks = []
+    for n, frequency in enumerate((0.2, 0.02, 0.002)):
+        shares = ((0.0, 100), (0.24, 100), (0.26, -100), (0.74, -100), (0.76, 100), (1.0, 100))
+        motion = ",".join(f"[{share / frequency},{speed}]" for share, speed in shares)
+        table = cycle(tmp_path / str(n), "cycles=2", f"motion=[{motion}]")
+        leaks.append(table["leak_mm3"][-1] * frequency)
+    assert abs(leaks[2] - leaks[1]) < 0.2 * abs(leaks[1] - leaks[0])
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"motion": {"stroke": 20, "speed": 2}}, "'speed' is not known"),
+        ({"motion": "nowhere.csv"}, "no CSV"),
+        ({"motion": [[0, 0], [1, 5]]}, "begin with an outstroke"),
+        ({"motion": [[0, 1], [0, 5]]}, "rising from 0"),
+        ({"cavitation": "penalty"}, "leave cavitation out"),
+        ({"frequency": 0}, "greater than 0"),
+    ],
+)
+def test_what_does_not_fit_is_said(keys: dict[str, Any], words: str) -> None:
+    with pytest.raises((ValidationError, ValueError), match=words):
+        Cycle.model_validate(Cycle.completed(keys))
