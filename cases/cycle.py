@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from math import nan, pi
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -23,7 +23,7 @@ TRANSIENT = "transient"
 """Verdict of a cycle that differs from the one before by more than PERIODIC."""
 PERIODIC = 1.0  # per cent
 
-Points = tuple[tuple[float, float], ...]
+Points = tuple[Annotated[tuple[float, float], Field(strict=False)], ...]
 
 
 class Cycle(ORing):
