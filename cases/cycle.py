@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome, State

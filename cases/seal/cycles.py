@@ -40,7 +40,9 @@ def steady_start(path: FilmPath, x: Array, speed: float) -> BuiltFilm | None:
     if path.system.parameters.rough:
         path.rise("out", path.settled(x), keep)
     else:
-        path.fast(path.first("out", x), x, keep)
+        start = path.begun("out", x, keep)
+        if start is not None:
+            path.slower(path.build(*start), (speed,), keep)
     return found[0] if found else None
 
 
