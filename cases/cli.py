@@ -176,6 +176,33 @@ def keys(case: str) -> int:
     return 0
 
 
+@click.command(
+    help="""The value of one key that gives a film of CASE a wanted change.
+
+    As in `softehl design oring "friction -10%" --by rod_diameter`: by exact sensitivities, checked
+    by a nonlinear solve. The film is that of the first speed, at outstroke unless stroke = in. Exit
+    code: 0 done, 2 bad input or out of reach.
+    """
+)
+@click.argument("case", metavar="CASE")
+@click.argument("target", metavar="TARGET")
+@click.option("--by", "key", metavar="KEY", required=True, help="The key that is to be changed.")
+@click.option(
+    "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
+)
+def design(case: str, target: str, key: str, assignments: tuple[str, ...]) -> int:
+    """Find the value of a key."""
+    from softehl.cases.harness.case_file import read_case
+    from softehl.cases.harness.errors import BadInput
+    from softehl.cases.seal.design_command import design_case
+    from softehl.cases.seal.parameters import ORing
+
+    read = read_case(case, SHIPPED, assignments)
+    if not isinstance(read.parameters, ORing):
+        raise BadInput(f"{read.case.name} has no sensitivities; allowed: a seal, such as oring")
+    return design_case(read.parameters, target, key)
+
+
 @click.command()
 @click.argument("items", metavar="[ITEM]...", nargs=-1)
 @click.option(

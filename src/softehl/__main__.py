@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _commands() -> "click.Group":
     import click
 
-    from softehl.cases.cli import keys, report_runs, reproduce, run
+    from softehl.cases.cli import design, keys, report_runs, reproduce, run
 
     @click.group(no_args_is_help=False)
     @click.version_option(__version__, prog_name="softehl")
@@ -98,6 +98,7 @@ def _commands() -> "click.Group":
         click.echo(f"{library.kind} library{why}: {library.path}")
         return code
 
+    commands.add_command(design)
     commands.add_command(run)
     commands.add_command(keys)
     commands.add_command(report_runs)
