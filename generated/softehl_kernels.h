@@ -691,6 +691,27 @@ void softehl_contact_friction_tangent(
     const double *restrict direction,
     const double *restrict rule, const double *restrict basis,
     double *restrict values, double *restrict tangent);
+void softehl_contact_corner_energy(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_contact_corner_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
+void softehl_contact_corner_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *restrict coordinates, const double *restrict dofs,
+    const double *restrict data, const double *restrict parameters,
+    const double *restrict direction,
+    const double *restrict rule, const double *restrict basis,
+    double *restrict values, double *restrict tangent);
 void softehl_film_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *restrict coordinates, const double *restrict dofs,

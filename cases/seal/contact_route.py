@@ -42,6 +42,9 @@ the residual: that helps where the ring is squeezed into the corners of its groo
 COARSE = 1
 """Density on which a path from rest is followed first: it is cheap there."""
 
+_JUMPS = (0.003, 0.006, 0.015, 0.04)
+"""Steps of the pressure over a kink of the path, one after the other, in shear moduli."""
+
 GUIDE = 2
 """Least density of a mesh whose contact shows where another one is to be fine."""
 
@@ -120,7 +123,24 @@ class ContactRoute:
                 return free
             x = free
         stage = load_stage(system, self.settings, p_s, force)
-        return self.follow(replace(stage, corrector=along(system, self.newton)), x)
+        return self._over_kinks(system, replace(stage, corrector=along(system, self.newton)), x)
+
+    def _over_kinks(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
+        """To the end of a stage in which nodes slide round the edge of an open gap.
+
+        Where no step is small enough a longer one may be: a node that slides from fillet to bore
+        makes a kink in the path, and Newton's method alternates between its sides.
+        """
+        found, mu = self.follow(stage, x), system.parameters.shear_modulus
+        jumps = list(_JUMPS) if system.parameters.opens else []
+        while jumps and isinstance(found, StageFailed) and found.branch.points:
+            start = found.branch.points[-1].parameter + jumps.pop(0) * mu
+            if start >= stage.stop:
+                break
+            beyond = self.follow(replace(stage, start=start), found.branch.last.x)
+            if not isinstance(beyond, StageFailed) or beyond.branch.points:
+                found, jumps = beyond, list(_JUMPS)
+        return found
 
     def _graded(self, p: ORing) -> State | StageFailed:
         """Graded at a low density, from the uniform mesh of that density, then refined."""

@@ -31,7 +31,7 @@ WITHOUT_INFLUENCE = (
     *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
     *("viscosity", "pressure_viscosity", "shear_traction", "cavitation_penalty"),
     *("cavitation", "cavitation_pressure", "roughness", "asperity_stiffness", "boundary_friction"),
-    *("ring", "rod", "squeeze", "gland", "backup", "extrusion_gap"),  # diameters follow from them
+    *("ring", "rod", "squeeze", "gland", "backup"),  # diameters follow from them
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
     *("rotation", "solver", "linear", "upwinding", "error_estimate", "tolerance"),
 )

@@ -14,12 +14,12 @@ from softehl.cases.seal.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection, disc_section
 from softehl.cases.seal.system import (
+    AIR_WALL,
     AXIAL,
     BLOCKS,
     BORE,
     DISPLACEMENT,
     FIELDS,
-    FRICTION,
     PRESSURE,
     ROD,
     ROTATION,
@@ -40,6 +40,7 @@ from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
 from softehl.runtime.fem.layered import Layer
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.sections import Disc, SectionMesh
 
 _STEP = 0.9  # of its thickness a film may lose in an iteration
@@ -191,7 +192,10 @@ class SealSystem:
         return np.maximum(-x[self.layout.part(name)], 0.0)
 
     def reaction(self, name: str, x: Array) -> float:
-        """Sum of the normal forces of a wall on the section, N."""
+        """Axial force of a wall on the section, the sum of normal forces on the bore, N."""
+        if name == AIR_WALL and self.parameters.opens:
+            block = self.problem.assembler.block(name)
+            return float(block.residual(x, self.problem.parameters[name])[:, 0].sum())
         nodes, segments = self.section.chains[WALLS[name]]
         areas = tributary_areas(self.mesh.points, segments, nodes)
         return float(self.pressing(name, x) @ areas)
@@ -381,11 +385,10 @@ def _contact_constants(
     obstacles, found = obstacles_of(p), {}
     for block in (b for b in blocks if b.group == "contact"):
         chain = section.chains[block.elements]
-        constants = contact_data(
-            obstacles[block.name], section.mesh.points, *chain, p.shear_modulus
-        )
-        slip = 2 if block.kernel == FRICTION else 0
-        found[block.name] = np.pad(constants, ((0, 0), (0, slip)))
+        values = contact_data(obstacles[block.name], section.mesh.points, *chain, p.shear_modulus)
+        known = dict(zip(("n_z", "n_r", "c", "area", "rho"), values.T, strict=True))
+        names, none = load_kernel(block.kernel_of(p)).data, np.zeros(len(values))
+        found[block.name] = np.stack([known.get(name, none) for name in names], axis=1)
     return found
 
 

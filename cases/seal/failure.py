@@ -19,6 +19,11 @@ _PRESSURE = (
     "the rubber is driven into the corner between wall and rod there; try a lower sealed_pressure, "
     "a harder rubber (mu_1, mu_2) or a finer mesh (larger density)"
 )
+_EXTRUSION = (
+    "the rubber is driven into the gap of {:g} mm between rod and housing there (fillet {:g} mm); "
+    "try a back-up ring (backup = true), a smaller extrusion_gap, a larger corner_fillet or a "
+    "harder rubber (mu_1, mu_2)"
+)
 _FILM = (
     "the film is hardest to build on the instroke at p_s above twice the shear modulus; try a "
     "finer mesh (larger density), a lower sealed_pressure or a harder rubber"
@@ -52,11 +57,16 @@ def _contact(failed: StageFailed, p: ORing) -> str:
     if name == "sealed pressure":
         return (
             f"sealed pressure {p.sealed_pressure:g} MPa was not reached, only {reached:.4g} MPa "
-            f"({reached / p.shear_modulus:.2g} times the shear modulus, {_gland(p)}); {_PRESSURE}"
+            f"({reached / p.shear_modulus:.2g} times the shear modulus, {_gland(p)}); {_corner(p)}"
         )
     if name.startswith("contact") and name != "contact to film":
-        return f"{name} was not found ({_gland(p)}, p_s = {p.sealed_pressure:g} MPa); {_PRESSURE}"
+        return f"{name} was not found ({_gland(p)}, p_s = {p.sealed_pressure:g} MPa); {_corner(p)}"
     return ""
+
+
+def _corner(p: ORing) -> str:
+    """What happens between wall and rod at too high a pressure."""
+    return _EXTRUSION.format(p.extrusion_gap, p.corner_fillet) if p.opens else _PRESSURE
 
 
 def _film_advice(failed: StageFailed) -> str:

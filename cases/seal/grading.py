@@ -20,7 +20,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection, uniform_disc
 from softehl.cases.seal.system import ROD
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.sections import LONG, Disc
+from softehl.runtime.mesh.sections import LONG, SHORT, Disc
 from softehl.runtime.mesh.spacing import Spot, graded
 
 PASSES = 3
@@ -100,6 +100,11 @@ def placed_disc(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGMENT
         rates = RATE * k**0.5, RATE * min(1.0 / k, 1.5)
         place = min(max(edge.place - ends[0], 0.0), length)
         spots.append(Spot(place, k**-0.3, rates if side == 0 else rates[::-1]))
+    growth, top = _ROW_GROWTH, max(_TOP, end + _SIDES, _SIDES - start)
+    if p.opens:
+        spots.append(_edge_spot(system, x, p, ends))
+        side = old.radius * np.radians(top - end)
+        growth = _growth_to(0.25 * p.corner_fillet / side, SHORT * _DENSITY)
     for long in range(disc.long, max(most, disc.long) + 1, _MULTIPLE):
         coarsest = length / _PLACED_COARSEST
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
@@ -109,11 +114,30 @@ def placed_disc(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGMENT
         disc,
         spacing=spacing,
         long=long,
-        top=max(_TOP, end + _SIDES, _SIDES - start),
+        top=top,
         corner_radius=_CORNERS,
         layer_growth=_LAYER_GROWTH,
-        row_growth=_ROW_GROWTH,
+        row_growth=growth,
     )
+
+
+def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:
+    """Where the section meets the edge of the gap, on an arc between `ends`, mm, or its air end."""
+    nodes = system.mesh.arc_nodes
+    centre = np.array([p.groove_centre + 0.5 * p.groove_width, 0.5 * p.rod_diameter])
+    centre += p.corner_fillet + np.array([0.0, p.extrusion_gap])
+    away = np.linalg.norm(system.deformed(x)[nodes] - centre, axis=1)
+    place = arc_positions(system.section)[int(np.argmin(away))]
+    fine = 0.25 * p.corner_fillet
+    return Spot(min(place, ends[1]) - ends[0], np.inf, most=fine)
+
+
+def _growth_to(first: float, count: int) -> float:
+    """Ratio of the last to the first of `count` parts of a line, the first of them this part."""
+    growth = _ROW_GROWTH
+    while np.expm1(np.log(growth) / count) / (growth - 1.0) > first:
+        growth *= 1.1
+    return growth
 
 
 def inlet_length(p: ORing, rise: float) -> float:

@@ -135,17 +135,26 @@ class ORing(Parameters):
         "a standard gland, for housing_diameter and groove_width where they are not given",
         bounds='"dynamic" (reciprocating rod), left out = none, or "dynamic" with a ring',
     )
-    backup: bool = key(
-        True,
+    backup: bool | None = key(
+        None,
         "whether a back-up ring closes the gap between rod and housing on the air side",
-        bounds="true (an open gap cannot be computed yet)",
+        bounds="true, false (then extrusion_gap too), left out = true without extrusion_gap",
     )
     extrusion_gap: float = key(
         0.0,
         "radial gap between rod and housing on the air side",
         unit="mm",
-        bounds="0 (an open gap cannot be computed yet: backup = true)",
+        bounds="0 = closed, to 0.5",
         ge=0,
+        le=0.5,
+    )
+    corner_fillet: float = key(
+        0.1,
+        "fillet of the edge of the housing at the extrusion gap",
+        unit="mm",
+        bounds="0.02 to 2, used where there is an extrusion_gap",
+        ge=0.02,
+        le=2,
     )
 
     inner_diameter: float = key(
@@ -299,6 +308,11 @@ class ORing(Parameters):
         return Surfaces.of(self.roughness, stiffness, self.boundary_friction)
 
     @property
+    def opens(self) -> bool:
+        """Whether there is a gap between rod and housing on the air side."""
+        return self.extrusion_gap > 0.0
+
+    @property
     def shear_modulus(self) -> float:
         """Shear modulus in the initial configuration, mu of (3) [MPa]."""
         return materials.shear_modulus(materials.MATERIALS[self.material], self._rubber)
@@ -394,12 +408,27 @@ class ORing(Parameters):
         return self
 
     @model_validator(mode="after")
-    def _air_side_is_closed(self) -> Self:
-        if not self.backup or self.extrusion_gap:
+    def _air_side_is_closed_or_open(self) -> Self:
+        gap, depth = self.extrusion_gap, 0.5 * (self.housing_diameter - self.rod_diameter)
+        if self.backup and gap:
             raise ValueError(
-                "an open gap on the air side (backup = false, extrusion_gap) cannot be computed "
-                "yet: the wall of the air side reaches down to the rod, as with a back-up ring; "
-                "leave both keys out"
+                f"backup = true and extrusion_gap = {gap:g} contradict each other: a back-up ring "
+                "closes the gap; leave one of them out"
+            )
+        if self.backup is False and not gap:
+            raise ValueError(
+                "backup = false leaves a gap whose width is not given: add extrusion_gap, 0.02 to "
+                "0.1 mm is usual, or leave backup out"
+            )
+        if gap and gap + self.corner_fillet > 0.5 * depth:
+            raise ValueError(
+                f"extrusion_gap = {gap:g} and corner_fillet = {self.corner_fillet:g} mm leave too "
+                f"little of a wall that is {depth:g} mm high; both together at most half of it"
+            )
+        if gap and self.rubs:
+            raise ValueError(
+                f"extrusion_gap = {gap:g} and housing_friction = {self.housing_friction:g}: the "
+                "edge of the gap has no friction; give one of them"
             )
         return self
 

@@ -7,16 +7,17 @@ crown and the sealed side. Sealed pressure acts from the sealed end of the arc r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from math import pi
+from math import pi, radians
 
 import numpy as np
 
 from softehl.cases.seal.parameters import ORing
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.sections import Disc, SectionMesh, disc_mesh
+from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,12 @@ class SealSection:
 GUIDE_ARC, GUIDE_TOP = 75.0, 118.0
 """Half the angle of the arc on which contact is first looked for, and where the top begins."""
 
+EDGE_ANGLES = range(27, 70, 3)
+"""Where a section meets the edge of the gap under pressure, degrees from the bottom."""
+
+LONG_OPEN = 42
+"""The same where the edge of an open gap is to be resolved too."""
+
 LONG_PLACED = 33
 """Segments at density 1 of an arc that the contact has placed."""
 
@@ -106,7 +113,17 @@ def uniform_disc(p: ORing) -> Disc:
     centre = 0.0, 0.5 * p.inner_diameter + radius
     if p.given_arc:
         return Disc(*centre, radius, *p.given_arc)
-    return Disc(*centre, radius, -GUIDE_ARC, GUIDE_ARC, top=GUIDE_TOP, long=LONG_PLACED)
+    long = LONG_OPEN if p.opens else LONG_PLACED
+    guide = Disc(*centre, radius, -GUIDE_ARC, GUIDE_ARC, top=GUIDE_TOP, long=long)
+    return replace(guide, spacing=_fine_at_edge(guide)) if p.opens else guide
+
+
+def _fine_at_edge(guide: Disc) -> Spacing:
+    """Of a guide: fine where the section may meet the edge of an open gap, wherever that is."""
+    degree = radians(1.0) * guide.radius
+    spots = [Spot((GUIDE_ARC + angle) * degree) for angle in EDGE_ANGLES]
+    length = 2.0 * GUIDE_ARC * degree
+    return graded(length, spots, 2 * guide.long, coarsest=0.05 * length, rate=0.3)
 
 
 def disc_section(

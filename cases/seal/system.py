@@ -7,7 +7,7 @@ and nobody else knows how fields are called and where their unknowns stand.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from math import copysign
 from typing import TypeAlias
 
@@ -54,13 +54,9 @@ BORE, SEALED_WALL, AIR_WALL = "housing", "sealed_wall", "air_wall"
 WALLS: dict[str, Place] = {BORE: "outer_nodes", SEALED_WALL: "wall_nodes", AIR_WALL: "wall_nodes"}
 """The other obstacles, and what may touch them; each has a field of multipliers of its own."""
 
-FRICTION = "contact_friction"
+FRICTION, CORNER = "contact_friction", "contact_corner"
 SHEAR = {name: f"{name}_shear" for name in WALLS}
 """Tangential stresses of the obstacles that have friction."""
-
-
-def _slides(p: ORing) -> bool:
-    return not p.rubs
 
 
 def _rubs(p: ORing) -> bool:
@@ -71,6 +67,21 @@ _RUPTURING: tuple[tuple[str, Callable[[ORing], bool]], ...] = (
     ("conserving", lambda p: p.conserving and not p.rough),
     ("rough", lambda p: p.rough),
 )
+
+
+def _walls() -> Iterator[Block]:
+    """Contact with each wall: plain, or with friction, or with the edge of an open gap."""
+    for name, on in WALLS.items():
+        cornered, fields = name == AIR_WALL, (DISPLACEMENT, name)
+
+        def plain(p: ORing, cornered: bool = cornered) -> bool:
+            return not p.rubs and not (cornered and p.opens)
+
+        yield Block(name, "contact", on, fields, "contact", needed=plain)
+        yield Block(name, FRICTION, on, (*fields, SHEAR[name]), "contact", needed=_rubs)
+        if cornered:
+            yield Block(name, CORNER, on, fields, "contact", needed=lambda p: p.opens)
+
 
 FIELDS = (
     Field(DISPLACEMENT, "nodes", scales.force),
@@ -88,14 +99,7 @@ BLOCKS = (
     Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
     Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
     Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
-    *(
-        Block(name, "contact", on, (DISPLACEMENT, name), "contact", needed=_slides)
-        for name, on in WALLS.items()
-    ),
-    *(
-        Block(name, FRICTION, on, (DISPLACEMENT, name, SHEAR[name]), "contact", needed=_rubs)
-        for name, on in WALLS.items()
-    ),
+    *_walls(),
     Block(
         *(FILM, "film", "arc", (DISPLACEMENT, PRESSURE), "film"),
         layer=True,
@@ -167,7 +171,9 @@ def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | Non
     if block.group == "load":
         return {"pressure": 0.0}
     if block.group == "contact":
-        return {"offset": 0.0, "force_weight": 1.0, "friction": p.housing_friction}
+        wall = {"wall": p.groove_centre + 0.5 * p.groove_width, "fillet": p.corner_fillet}
+        edge = {**wall, "lip": 0.5 * p.rod_diameter + p.extrusion_gap}
+        return {"offset": 0.0, "force_weight": 1.0, "friction": p.housing_friction, **edge}
     if block.name == "rotation":
         centre = {"centre_z": 0.0, "centre_r": section.disc.centre_r}
         return {**centre, "polar_moment": section.polar_moment, "angle": 0.0}

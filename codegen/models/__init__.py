@@ -34,6 +34,7 @@ ALL: dict[str, Callable[[], Definition]] = {
     "follower_pressure": boundary.follower_pressure,
     "contact": contact.augmented_lagrangian,
     "contact_friction": contact.coulomb,
+    "contact_corner": contact.corner,
     "film": film.reynolds_segment,
     "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,

@@ -1,4 +1,4 @@
-"""Unilateral contact with rigid cylinders and planes, (9)-(10), without and with friction."""
+"""Unilateral contact with rigid obstacles, (9)-(10): cylinders, planes, a corner; friction."""
 
 from __future__ import annotations
 
@@ -89,4 +89,42 @@ def coulomb() -> Definition:
             (area * (stress - tau) / rho, tau),
         ]
     )
+    return m.finish()
+
+
+def corner() -> Definition:
+    """Node against a wall that ends at a gap, its corner rounded, without friction.
+
+    The wall is the plane z = `wall` from the radius `lip` outwards; behind it, at that radius,
+    begins a bore. Both meet in a fillet about (wall + fillet, lip + fillet). The gap is the signed
+    distance: smooth where the fillet ends, and of the nearest surface inside the wall. Augmented
+    Lagrangian as in `contact`; the curvature of the fillet is in the tangent.
+    """
+    m = Model(
+        "contact_corner",
+        nodes=1,
+        rule=quadrature.point_rule(),
+        unroll=True,
+        doc=corner.__doc__ or "",
+    )
+    (z,), (r,) = m.coordinates("Z", "R")
+    (u_z,), (u_r,) = m.nodal_unknowns("u_z", "u_r")
+    lam = m.unknown("lambda")
+    area, rho = m.data(
+        area="reference tributary area of the node [mm^2]",
+        rho="augmentation parameter [MPa/mm]",
+    )
+    wall, lip, fillet = m.parameters(
+        wall="axial position of the wall, which faces -z [mm]",
+        lip="radius of the edge of the wall [mm]",
+        fillet="radius of the fillet [mm]",
+    )
+    # towards the body, from the centre of the fillet
+    a = m.define("a", wall + fillet - (z + u_z))
+    b = m.define("b", lip + fillet - (r + u_r))
+    round_off = sp.Piecewise((m.norm([a, b]), b > 0), (a, True))
+    behind = sp.Piecewise((b, b > 0), (sp.Max(a, b), True))
+    gap = m.define("gap", sp.Piecewise((round_off, a > 0), (behind, True)) - fillet, interface=True)
+    trial = m.define("trial", lam + rho * gap)
+    m.potential(area / (2 * rho) * (sp.Min(trial, 0) ** 2 - lam**2))
     return m.finish()

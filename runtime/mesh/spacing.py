@@ -2,7 +2,7 @@
 
 A line of length L is to have `count` segments whose size at s is
 
-    dx(s) = min(coarsest, min_k [a_k finest + rate |s - s_k|])
+    dx(s) = min(coarsest, min_k [min(a_k finest, most_k) + rate |s - s_k|])
 
 (the rate may differ from place to place and between the two sides of one) with `finest` chosen such
 that they fill it. The map is that of the limit of many segments, so that the nodes of a mesh are
@@ -29,12 +29,14 @@ _STEPS = 27 * 64  # of the table of a map: nodes of every density up to 64 are e
 class Spot:
     """A place to be resolved: s_k in mm, a_k the size there relative to that of other spots.
 
-    rates: growth of the size before and behind it, None for that of the line.
+    rates: growth of the size before and behind it, None for that of the line. most: largest size
+    there, mm.
     """
 
     place: float
     size: float = 1.0
     rates: tuple[float, float] | None = None
+    most: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,8 @@ def graded(
     def segments(log_finest: float) -> Array:
         """Number of segments (stations,) from the beginning of the line to s."""
         finest = np.exp(log_finest)
-        wanted = [spot.size * finest + more for spot, more in zip(spots, away, strict=True)]
+        sizes = [min(spot.size * finest, spot.most) for spot in spots]
+        wanted = [least + more for least, more in zip(sizes, away, strict=True)]
         size = np.minimum(coarsest, np.min(wanted, axis=0))
         return np.asarray(cumulative_trapezoid(1.0 / size, s, initial=0))
 

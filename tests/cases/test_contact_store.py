@@ -53,7 +53,7 @@ ROUGH: dict[str, Any] = {
 """The same for a film that the ones above do not go together with."""
 
 OTHER_WORDS = {
-    *("ring", "rod", "squeeze", "gland", "backup", "extrusion_gap"),
+    *("ring", "rod", "squeeze", "gland", "backup"),
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
 }
 """Other words for the diameters and the width, for rubber and oil, which are what matters."""
@@ -82,6 +82,8 @@ CHANGED = {
     "density": 2,
     "solid": "fbar",
     "housing_friction": 0.1,
+    "extrusion_gap": 0.05,
+    "corner_fillet": 0.2,
     "sealed_pressure": 0.25,
     "inner_diameter": 50.4,
     "section_diameter": 3.54,

@@ -43,8 +43,10 @@ def test_what_is_used_can_be_given_again() -> None:
         ({"ring": "ISO 3601 50x2.2", "rod": 51}, "give squeeze and groove_width"),
         ({"ring": "AS568-210", "rod": 30}, "stretches inner_diameter"),
         ({"gland": "rotary"}, "gland"),
-        ({"backup": False}, "leave both keys out"),
-        ({"extrusion_gap": 0.05}, "leave both keys out"),
+        ({"backup": False}, "add extrusion_gap"),
+        ({"backup": True, "extrusion_gap": 0.05}, "contradict each other: a back-up ring"),
+        ({"extrusion_gap": 0.45, "corner_fillet": 1.2}, "together at most half"),
+        ({"extrusion_gap": 0.05, "housing_friction": 0.2}, "give one of them"),
         ({"arc_start": -30.0}, "give both, or none"),
     ],
 )

@@ -104,6 +104,18 @@ def rubbers(rng: np.random.Generator) -> Iterator[Case]:
         yield _case(f"sheet_{name}", "pulled", [[0.1, 25.4]], [0.5, -0.2], given)
 
 
+CORNERED = [1.8, 25.05, 0.2]
+CORNER = (
+    ("in the wall", 1.86, 25.9, -2.0),
+    ("before the wall, open", 1.6, 25.9, 2.0),
+    ("in the fillet", 1.93, 25.1, -2.0),
+    ("in the lip", 2.3, 25.09, -2.0),
+    ("deep behind the wall", 2.2, 25.9, -2.0),
+    ("deep above the lip", 2.6, 25.5, -2.0),
+)
+"""Places about a wall at 1.8 mm with a lip at 25.05 and a fillet of 0.2 mm; the multiplier."""
+
+
 def boundaries(rng: np.random.Generator) -> Iterator[Case]:
     """Follower pressure of both signs and none; contact closed and open, sticking and slipping."""
     for label, pressure in (("pressed", 2.5), ("pulled", -0.8), ("no pressure", 0.0)):
@@ -123,6 +135,9 @@ def boundaries(rng: np.random.Generator) -> Iterator[Case]:
         c = n @ (X + u) - offset - gap
         data = [*n, c, rng.uniform(1, 20), 200.0]
         yield _case("contact", label, X, [*u, multiplier], [offset, rng.uniform(0.2, 1)], data)
+    for label, z, r, multiplier in CORNER:
+        X, place = np.array([1.6, 25.3]), np.array([z, r])
+        yield _case("contact_corner", label, X, [*(place - X), multiplier], CORNERED, [8.1, 200.0])
     for label, gap, slip in (
         ("open", 0.1, 0.02),
         ("sticking", -0.02, 1e-4),

@@ -130,7 +130,13 @@ def test_fields(name: str) -> None:
 
 def test_cases_meet_every_family_and_every_branch() -> None:
     assert {c.family for c in CASES.values()} == set(ALL)
-    for family in set(ALL) - {"contact", "contact_friction", "film", "film_upwind"}:
+    for family in set(ALL) - {
+        "contact",
+        "contact_corner",
+        "contact_friction",
+        "film",
+        "film_upwind",
+    }:
         for branch in branches(definition(family)):
             assert outcomes(family, branch) == {True, False}, f"{family}: a branch is never taken"
     closed = {bool(called(c)[0][:2].any()) for c in CASES.values() if c.family == "contact"}

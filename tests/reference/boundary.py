@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mpf
+from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
 from tests.reference.rules import gauss
 
 
@@ -80,3 +80,49 @@ def tangent_friction(
 ) -> Matrix:
     """Differences of the residual (the state must not sit on a switch)."""
     return jacobian(lambda v: residual_friction(X, v, data, parameters), dofs)
+
+
+def distance(z: Number, r: Number, wall: Number, lip: Number, fillet: Number) -> Vector:
+    """Signed distance of (z, r) from the corner and its gradient, case by case."""
+    to_z, to_r = z - (wall + fillet), r - (lip + fillet)  # from the centre of the fillet
+    if to_z < 0 and to_r < 0:
+        radius = mp.sqrt(to_z**2 + to_r**2)
+        return [radius - fillet, to_z / radius, to_r / radius]
+    before_wall, below_lip = wall - z, lip - r
+    nearer = before_wall > below_lip if to_z >= 0 and to_r >= 0 else to_z < 0
+    return [before_wall, mpf(-1), mpf(0)] if nearer else [below_lip, mpf(0), mpf(-1)]
+
+
+def residual_corner(
+    X: Sequence[Number],
+    dofs: Sequence[Number],
+    data: Sequence[Number],
+    parameters: Sequence[Number],
+) -> Vector:
+    """(u_z, u_r, lambda) of a node against the rounded corner."""
+    area, rho = data
+    gap, n_z, n_r = distance(X[0] + dofs[0], X[1] + dofs[1], *parameters)
+    augmented = dofs[2] + rho * gap
+    if augmented > 0:
+        return [mpf(0), mpf(0), -area * dofs[2] / rho]
+    return [area * augmented * n_z, area * augmented * n_r, area * gap]
+
+
+def tangent_corner(
+    X: Sequence[Number], dofs: Vector, data: Sequence[Number], parameters: Sequence[Number]
+) -> Matrix:
+    """Differences of the residual (the state must not sit on a switch)."""
+    return jacobian(lambda v: residual_corner(X, v, data, parameters), dofs)
+
+
+def energy_corner(
+    X: Sequence[Number],
+    dofs: Sequence[Number],
+    data: Sequence[Number],
+    parameters: Sequence[Number],
+) -> Number:
+    """lambda g + rho g^2 / 2 in contact, else -lambda^2 / (2 rho), times the area."""
+    area, rho = data
+    gap = distance(X[0] + dofs[0], X[1] + dofs[1], *parameters)[0]
+    closed = dofs[2] + rho * gap <= 0
+    return area * (dofs[2] * gap + rho * gap**2 / 2 if closed else -(dofs[2] ** 2) / (2 * rho))

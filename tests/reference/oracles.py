@@ -73,6 +73,7 @@ RESIDUALS: dict[str, Oracle] = {
     "follower_pressure": _single(boundary.residual_pressure),
     "contact": _contact(boundary.residual_contact),
     "contact_friction": _contact(boundary.residual_friction),
+    "contact_corner": _contact(boundary.residual_corner),
     "film": _film(film.residual_film),
     "film_upwind": _plain(upwind.residual_upwind),
     "film_facet": _plain(facet.residual_facet),
@@ -94,6 +95,7 @@ TANGENTS: dict[str, Oracle] = {
     "follower_pressure": _single(boundary.tangent_pressure),
     "contact": _contact(boundary.tangent_contact),
     "contact_friction": _contact(boundary.tangent_friction),
+    "contact_corner": _contact(boundary.tangent_corner),
     "film": _film(film.tangent_film),
     "film_upwind": _plain(upwind.tangent_upwind),
     "film_facet": _plain(facet.tangent_facet),
@@ -111,6 +113,7 @@ ENERGIES: dict[str, Oracle] = {
         for n, law in OTHERS.items()
     },
     **{f"sheet_{n}": _sheet(sheet.energy, law) for n, law in LAWS.items()},
+    "contact_corner": _contact(boundary.energy_corner),
     "mean_rotation": _plain(section.energy_rotation),
     "mean_axial": _plain(section.energy_axial),
     "axial_spring": _single(section.energy_spring),
@@ -163,7 +166,14 @@ PAIRS = ("film_conserving", "film_rough", "film_squeeze", "film_squeeze_rough")
 
 def blocks(family: str, count: int) -> tuple[Block, ...]:
     """Groups of unknowns of one kind: displacements, and pressures or multipliers."""
-    known = {"contact": 2, "contact_friction": 2, "film": 4, "film_upwind": 4, "film_facet": 6}
+    known = {
+        "contact": 2,
+        "contact_friction": 2,
+        "contact_corner": 2,
+        "film": 4,
+        "film_upwind": 4,
+        "film_facet": 6,
+    }
     known |= {"mean_rotation": 8, "mean_axial": 8, "film_upwind_rough": 4}
     if family in PAIRS:
         middle = 4 + (count - 4) // 2

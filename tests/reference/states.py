@@ -122,6 +122,18 @@ def rubber_states() -> Iterator[State]:
                 yield State(f"sheet_{name}", label, (0.1, 25.4), e, tuple(own))
 
 
+CORNER = (
+    ("before-the-wall", 1.75, 25.9),
+    ("in-the-wall", 1.86, 25.9),
+    ("at-the-fillet", 1.84, 25.12),
+    ("in-the-fillet", 1.93, 25.1),
+    ("under-the-lip", 2.3, 25.0),
+    ("in-the-lip", 2.3, 25.09),
+    ("deep-behind-the-wall", 2.2, 25.9),
+    ("deep-above-the-lip", 2.6, 25.5),
+)
+"""Where nodes are about a wall at 1.8 mm, with a lip at 25.05 and a fillet of 0.2 mm."""
+
 FRICTION = (
     ("open", 0.4, 0.11, 1.5),
     ("sticking", -0.3, 0.1, 0.5),
@@ -154,6 +166,10 @@ def boundary_states() -> Iterator[State]:
             (0.0125, weight),
             (0.28, 0.96, 24.25, 18.7, 130.0),
         )
+    for label, z, r in CORNER:
+        for pressed, multiplier in (("", -3.0), ("-open", 40.0)):
+            given = (1.6, 25.3), (z - 1.6, r - 25.3, multiplier), (1.8, 25.05, 0.2), (18.7, 130.0)
+            yield State("contact_corner", label + pressed, *given)
     for label, u_r, u_z, tau in FRICTION:
         dofs, data = (u_z, u_r, -4.0, tau), (0.28, 0.96, 24.25, 18.7, 130.0, 0.1, -0.31)
         yield State("contact_friction", label, (0.2, 25.2), dofs, (0.0125, 0.4), data)
