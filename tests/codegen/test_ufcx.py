@@ -155,7 +155,7 @@ def test_the_comparison_sees_a_wrong_order_of_vertices(
 
 def looped() -> Definition:
     """A loop that stays a loop, data, a parameter derivative, a nodal and a free unknown."""
-    m = Model("looped", nodes=2, rule=quadrature.gauss(3, 1))
+    m = Model("looped", nodes=2, rule=quadrature.gauss(3, 1), unroll=False)
     X = m.coordinates("Z", "R")
     (u,) = m.nodal_unknowns("u")
     lam = m.unknown("lambda")
