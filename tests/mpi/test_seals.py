@@ -82,7 +82,8 @@ if __name__ == "__main__":
     with MPIPoolExecutor() as executor:
         curves = softehl.solve_cases(cases, sys.argv[1] + "/mpi", executor)
     here = softehl.solve_cases(cases, sys.argv[1] + "/here")
-    print(*(curve.rows == other.rows and len(curve.rows) for curve, other in zip(curves, here)))
+    same = [repr(a.rows) == repr(b.rows) for a, b in zip(curves, here)]  # rows may have nan
+    print(*(equal and len(a.rows) for equal, a in zip(same, curves)))
 """
 
 
