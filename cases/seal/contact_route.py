@@ -158,7 +158,8 @@ class ContactRoute:
         """On an arc that the contact places, from the coarsest guide that leads there."""
         density = min(GUIDE, p.density)
         state: State | StageFailed
-        for guide in _doublings(COARSE, density):
+        # what sticks keeps the rotation of the mesh on which it began to
+        for guide in _doublings(density if p.rubs else COARSE, density):
             state = self._guided(p, guide)
             if not isinstance(state, StageFailed) and guide < density:
                 state = self._finer(state, density)

@@ -24,12 +24,12 @@ def solved(**changes: Any) -> Outcome:
 
 @pytest.mark.slow
 def test_friction_carries_a_part_of_the_pressure_and_holds_the_section() -> None:
-    """Forces are in balance without a hold, and h* is that of density 2, about."""
-    outcome = solved(housing_friction=0.3)
+    """Forces are in balance without a hold; h* is 0.4 % below that without friction."""
+    outcome = solved(density=2, housing_friction=0.3)
     assert outcome.converged, outcome.message
     (state,) = outcome.states
     assert state.verdict == OK
-    assert state.h_star_um == pytest.approx(2.080, rel=2e-2)  # of density 2
+    assert state.h_star_um == pytest.approx(2.080, rel=5e-3)
     assert state.moment_N_mm == 0.0
     numbers = outcome.numbers
     assert abs(numbers["axial_sum_N"]) < 1e-9 * numbers["sealed_pressure_N"]
