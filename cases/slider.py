@@ -101,14 +101,17 @@ class SliderCase(RowByRow[Slider, SliderRow]):
     def state(self, parameters: Slider, key: float, problem: Problem, solution: Solution) -> State:
         """h is linear between the nodes: an error of second order, seen from half the segments."""
 
-        def found(problem: Problem, solution: Solution) -> tuple[SliderRow, dict[str, Array]]:
-            if parameters.conserving:
-                return conserving_results(parameters, problem, solution)
+        def found(
+            p: Slider, problem: Problem, solution: Solution
+        ) -> tuple[SliderRow, dict[str, Array]]:
+            if p.conserving:
+                return conserving_results(p, problem, solution)
             return results(problem, solution)
 
         half = parameters.model_copy(update={"segments": parameters.segments // 2})
         coarser = self.solution(half, key)
-        (row, profile), (other, _) = found(problem, solution), found(*coarser)
+        row, profile = found(parameters, problem, solution)
+        other, _ = found(half, *coarser)
         fine, coarse = (np.array([r.flux_mm2_s, r.load_N_per_mm]) for r in (row, other))
         error = 100.0 / 3.0 * float((np.abs(coarse - fine) / np.maximum(np.abs(fine), 1e-99)).max())
         verdict = OK if error <= 2.0 else "coarse"

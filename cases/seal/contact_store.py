@@ -34,6 +34,7 @@ WITHOUT_INFLUENCE = (
     *("ring", "rod", "squeeze", "gland", "backup"),  # diameters follow from them
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
     *("rotation", "solver", "linear", "upwinding", "error_estimate", "tolerance"),
+    *("sensitivity", "tolerances"),
 )
 """Parameters that the contact stage does not know."""
 

@@ -9,6 +9,7 @@ import pytest
 from benchmarks import problems
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("problem", "expected"), [("cook", 11.53022336), ("block", 0.03265384257)])
 def test_our_side_finds_what_felupe_finds(problem: str, expected: float) -> None:
     """FElupe 11.3 by `benchmarks/rivals.py` on the same mesh; scikit-fem agrees with it."""

@@ -53,7 +53,7 @@ ROUGH: dict[str, Any] = {
 """The same for a film that the ones above do not go together with."""
 
 OTHER_WORDS = {
-    *("ring", "rod", "squeeze", "gland", "backup"),
+    *("ring", "rod", "squeeze", "gland", "backup", "sensitivity", "tolerances"),
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
 }
 """Other words for the diameters and the width, for rubber and oil, which are what matters."""

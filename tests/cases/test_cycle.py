@@ -169,6 +169,7 @@ def cycle(folder: Path, *settings: str) -> dict[str, Array]:
     return {n: np.array([float(c[k]) for c in cells]) for k, n in enumerate(names[:-1])}
 
 
+@pytest.mark.slow
 def test_a_cycle_balances_and_becomes_periodic(tmp_path: Path) -> None:
     table = cycle(tmp_path / "c", "cycles=3", "motion={stroke = 20, frequency = 2}")
     assert table["mass_error"].max() < 1e-9

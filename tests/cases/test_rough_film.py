@@ -40,6 +40,7 @@ def test_the_mass_conserving_film_is_that_of_the_penalty_where_nothing_forms_aga
     assert conserving[400.0].rod_friction_N < penalty[400.0].rod_friction_N
 
 
+@pytest.mark.slow
 def test_a_stribeck_curve_from_dry_sliding_unattended() -> None:
     states = solved(roughness=0.3, speeds=SPEEDS)
     assert sorted(states) == sorted([*SPEEDS, *(-u for u in SPEEDS)])
@@ -64,6 +65,7 @@ def test_a_stribeck_curve_from_dry_sliding_unattended() -> None:
     assert 40.0 < dry.rod_friction_N < 70.0
 
 
+@pytest.mark.slow
 def test_little_roughness_is_the_smooth_film() -> None:
     given: dict[str, Any] = {"speeds": (1000.0,), "stroke": "out"}
     smooth = solved(cavitation="mass-conserving", **given)[1000.0]

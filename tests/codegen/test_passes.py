@@ -349,6 +349,10 @@ def test_a_wrong_pass_is_seen() -> None:
     assert operations([wrong]) != operations([root])
 
 
+TRADES = ("assume", "powers")
+"""Passes that may write more operations for cheaper ones: one side of a branch, roots of roots."""
+
+
 @pytest.mark.parametrize("name", ALL)
 def test_graphs_of_shipped_models_stay_legal_and_get_cheaper(name: str) -> None:
     d = ALL[name]()
@@ -361,6 +365,8 @@ def test_graphs_of_shipped_models_stay_legal_and_get_cheaper(name: str) -> None:
             roots = p.apply(d.graph, roots)
             check(roots, names=False)
             assert len(roots) == len(varying)
+            if p.name in TRADES:
+                first = max(first, operations(roots))
         assert operations(roots) <= first
         if task is Task.TANGENT:
             assert operations(roots) < first or name == "axial_spring"

@@ -106,15 +106,19 @@ def call(case: Case, task: str) -> str:
     table = np.column_stack([rule.points.reshape(len(rule.weights), -1), rule.weights])
     basis = np.empty(0) if rule.basis is None else rule.basis
     variation = np.concatenate([case.coordinates, case.data, case.parameters, case.dofs]) / 7
-    along = {
+    others: dict[str, npt.NDArray[np.float64]] = {
         Task.PRODUCT: case.dofs[::-1],
         Task.PSEUDO_LOAD: variation[: variation.size - case.dofs.size],
         Task.FIELDS_RATE: variation,
-    }.get(Task(task), np.empty(0))
-    inputs = [case.coordinates, case.dofs, case.data, case.parameters, along, table, basis]
+    }
+    along = others.get(task, np.empty(0))
+    held = [] if case.point_data is None else [case.point_data.ravel()]
+    data = np.concatenate([case.data, *held])
+    inputs = [case.coordinates, case.dofs, data, case.parameters, along, table, basis]
     ndof, points = len(case.dofs), len(rule.weights)
-    at_points = dict.fromkeys(AT_POINTS, points * len(kernel.fields))
-    out = {Task.ENERGY: 1, **at_points}.get(Task(task), ndof)
+    at_points: dict[str, int] = {task: points * len(kernel.fields) for task in AT_POINTS}
+    lengths: dict[str, int] = {Task.ENERGY: 1} | at_points
+    out = lengths.get(task, ndof)
     sizes = [*(a.size for a in inputs), out, ndof * ndof if task == Task.TANGENT else 0]
     modes = basis.shape[1] if basis.size else 0
     name = function_name(case.family, task)

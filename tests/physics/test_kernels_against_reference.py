@@ -108,11 +108,13 @@ def test_batches_of_every_size_repeat_the_single_element(state: State) -> None:
         scatter = 1e-3 * rng.uniform(-1, 1, (size, len(state.dofs)))
         scatter[-1] = 0.0
         data = np.array([state.data] * size) if state.data else None
+        points = np.array([state.point_data] * size)[:, :, None] if state.point_data else None
         residual, tangent = kernel.tangent(
             np.array([state.coordinates] * size),
             np.array(state.dofs) + scatter,
             data=data,
             parameters=np.array(state.parameters),
+            point_data=points,
             rule=rule_of(state),
         )
         for values, expected in ((residual[-1], single[0][0]), (tangent[-1], single[1][0])):
