@@ -144,7 +144,7 @@ def test_stiffness_of_asperities_is_that_of_the_rubber() -> None:
 
 @pytest.mark.slow
 def test_densities_agree_on_a_rough_film() -> None:
-    """Mean gap and friction within 1 % between densities 2 and 4; thinner ones do not start at 4."""
+    """Mean gap and friction within 1 % between densities 2 and 4; thinner: 2 alone."""
     coarse, fine = (solved(roughness=0.4, speeds=SPEEDS, density=d) for d in (2, 4))
     for speed, state in fine.items():
         assert coarse[speed].mean_gap_um == pytest.approx(state.mean_gap_um, rel=1e-2)
