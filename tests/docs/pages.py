@@ -90,5 +90,5 @@ class Reader:
 
 
 def words(text: str) -> list[str]:
-    """Words of a text without the numbers in it."""
-    return _NUMBER.sub("#", text).split()
+    """Words of a text without the numbers in it; rules of tables are as wide as these."""
+    return [w for w in _NUMBER.sub("#", text).split() if w.strip("─")]
