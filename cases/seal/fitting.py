@@ -7,10 +7,10 @@ catalogue the rest. What is given twice must agree.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isclose
 from typing import Any
 
 from softehl.cases.seal import catalogue
+from softehl.cases.seal.given import number, put
 
 _SAME = 1e-9
 
@@ -24,11 +24,11 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     values = dict(given)
     if isinstance(values.get("ring"), int):
         values["ring"] = str(values["ring"])  # "-226" is a number to a reader of TOML
-    if _number(values.get("rod")):
-        _put(values, "rod_diameter", float(values["rod"]), "rod")
+    if number(values.get("rod")):
+        _follow(values, "rod_diameter", float(values["rod"]), "rod")
     if isinstance(values.get("ring"), str):
         _with_ring(values)
-    if isinstance(values.get("gland"), str) or _number(values.get("squeeze")):
+    if isinstance(values.get("gland"), str) or number(values.get("squeeze")):
         _with_gland(values)
     return values
 
@@ -40,8 +40,8 @@ def _with_ring(values: dict[str, Any]) -> None:
         raise ValueError(
             f'ring = "{values["ring"]}" needs the rod that it seals, as in rod = {rod:g}'
         )
-    _put(values, "inner_diameter", ring.inner_diameter, "ring")
-    _put(values, "section_diameter", ring.section_diameter, "ring")
+    _follow(values, "inner_diameter", ring.inner_diameter, "ring")
+    _follow(values, "section_diameter", ring.section_diameter, "ring")
     known = [values.get(k) is not None for k in ("housing_diameter", "squeeze", "gland")]
     if not any(known) or values.get("groove_width") is None:
         values["gland"] = values.get("gland") or "dynamic"
@@ -49,11 +49,11 @@ def _with_ring(values: dict[str, Any]) -> None:
 
 def _with_gland(values: dict[str, Any]) -> None:
     section, rod = values.get("section_diameter", 3.53), values.get("rod_diameter", 50.0)
-    if not (_number(section) and _number(rod)):
+    if not (number(section) and number(rod)):
         return
-    if _number(values.get("squeeze")):
+    if number(values.get("squeeze")):
         depth = section * (1.0 - values["squeeze"] / 100.0)
-        _put(values, "housing_diameter", rod + 2.0 * depth, "squeeze")
+        _follow(values, "housing_diameter", rod + 2.0 * depth, "squeeze")
     if isinstance(values.get("gland"), str):
         gland = catalogue.gland(section, values["gland"])
         if values.get("housing_diameter") is None:
@@ -62,16 +62,6 @@ def _with_gland(values: dict[str, Any]) -> None:
             values["groove_width"] = round(gland.width.middle, 4)
 
 
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _put(values: dict[str, Any], key: str, value: float, source: str) -> None:
-    """Set a key, or see that it agrees."""
-    before = values.get(key)
-    if isinstance(before, int | float) and not isclose(before, value, rel_tol=_SAME, abs_tol=_SAME):
-        raise ValueError(
-            f"{key} = {before:g} and {source} = {values[source]} contradict: "
-            f"the {source} gives {value:g} mm; leave one of them out"
-        )
-    values[key] = value
+def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None:
+    """`put` of a length that follows from another key."""
+    put(values, key, value, f"{source} = {values[source]}", _SAME)

@@ -10,7 +10,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isclose, log, log10
-from typing import Any, TypeGuard
+from typing import Any
+
+from softehl.cases.seal.given import number, put
 
 GRADES = {
     **{10: 2.6, 15: 3.4, 22: 4.3, 32: 5.4, 46: 6.8, 68: 8.6},
@@ -129,10 +131,10 @@ def with_oil(given: Mapping[str, Any]) -> dict[str, Any]:
         raise ValueError(
             f'oil_density = {values["oil_density"]} needs an oil, as in oil = "ISO VG 46"'
         )
-    if _number(z) and z >= 0.0:
+    if number(z) and z >= 0.0:
         eta = values.get("viscosity", 6.59e-8)
-        if _number(eta) and eta > 0.0:
-            _put(values, "pressure_viscosity", barus_of_roelands(eta, z), f"roelands = {z:g}")
+        if number(eta) and eta > 0.0:
+            put(values, "pressure_viscosity", barus_of_roelands(eta, z), f"roelands = {z:g}")
     return values
 
 
@@ -140,13 +142,13 @@ def _with_grade(values: dict[str, Any], oil: str, heat: Any) -> None:
     law = read_oil(oil)
     if heat is None:
         raise ValueError(f'oil = "{oil}" needs its temperature, as in temperature = "40 degC"')
-    if not _number(heat) or not -60.0 <= heat <= 200.0:
+    if not number(heat) or not -60.0 <= heat <= 200.0:
         return
     at_15 = values.get("oil_density")
-    rho = density(heat, at_15 if _number(at_15) else DENSITY)
+    rho = density(heat, at_15 if number(at_15) else DENSITY)
     eta = law(heat) * rho * 1e-12
     before = values.get("viscosity")
-    if _number(before) and not isclose(before, eta, rel_tol=_SAME):
+    if number(before) and not isclose(before, eta, rel_tol=_SAME):
         raise ValueError(
             f'viscosity = {before:g} and oil = "{oil}" contradict: at {heat:g} degC '
             f"it has {eta * 1e9:.4g} mPa s; leave one of them out"
@@ -154,17 +156,3 @@ def _with_grade(values: dict[str, Any], oil: str, heat: Any) -> None:
     values.setdefault("viscosity", eta)
     if values.get("pressure_viscosity") is None and values.get("roelands") is None:
         values["pressure_viscosity"] = barus(eta)
-
-
-def _put(values: dict[str, Any], key: str, value: float, source: str) -> None:
-    before = values.get(key)
-    if _number(before) and not isclose(before, value, rel_tol=_SAME, abs_tol=1e-12):
-        raise ValueError(
-            f"{key} = {before:g} and {source} contradict: the latter gives {value:.4g}; "
-            "leave one of them out"
-        )
-    values[key] = before if _number(before) else value
-
-
-def _number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -7,10 +7,10 @@ keys.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isclose
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
+from softehl.cases.seal.given import number, put, shown
 from softehl.cases.seal.materials import KEYS, MATERIALS, Material, shear_modulus, unstable_at
 from softehl.cases.seal.rubber_data import fit, read_data
 
@@ -18,7 +18,6 @@ SHORE = (20.0, 90.0)
 """Hardness Shore A between which Gent's rule is taken."""
 
 _PAPER = {"mu_1": 3.04, "mu_2": 0.62}
-_SAME = 1e-6
 
 
 def youngs_modulus(shore_A: float) -> float:
@@ -56,7 +55,7 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
         return values
     source = _source(values, material)
     _require_own(values, material, source)
-    if _number(shore) and SHORE[0] <= shore <= SHORE[1]:
+    if number(shore) and SHORE[0] <= shore <= SHORE[1]:
         _with_shore(values, material)
     if isinstance(table, str):
         _with_fit(values, material, Path(table))
@@ -87,7 +86,7 @@ def _require_own(values: dict[str, Any], material: Material, source: str) -> Non
         if values.get(key) is not None:
             own = " and ".join(material.keys)
             raise ValueError(
-                f"{key} = {_shown(values[key])} and {source} contradict: it has {own}; "
+                f"{key} = {shown(values[key])} and {source} contradict: it has {own}; "
                 "leave one of them out"
             )
         values[key] = None
@@ -96,16 +95,16 @@ def _require_own(values: dict[str, Any], material: Material, source: str) -> Non
 def _with_shore(values: dict[str, Any], material: Material) -> None:
     mu = youngs_modulus(float(values["shore_A"])) / 3.0
     others = [key for key in material.keys if key != "mu"]
-    if any(not _number(values.get(key)) for key in others):
+    if any(not number(values.get(key)) for key in others):
         return
     unit = shear_modulus(material, {**values, "mu": 1.0})
-    _put(values, "mu", mu / unit, f"shore_A = {values['shore_A']:g}")
+    put(values, "mu", mu / unit, f"shore_A = {values['shore_A']:g}")
 
 
 def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
     name, terms, heat = values["material"], values.get("ogden_terms"), values.get("temperature")
     terms = terms if isinstance(terms, int) and 1 <= terms <= 3 else 3
-    found = fit(name, read_data(path), terms, float(heat) if _number(heat) else None)
+    found = fit(name, read_data(path), terms, float(heat) if number(heat) else None)
     if found.unstable:
         test, stretch = found.unstable
         raise ValueError(
@@ -113,26 +112,7 @@ def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
             f"tension at a stretch of {stretch:.3g}; take another material or more tests"
         )
     for key, value in found.values.items():
-        _put(values, key, value, f'fit = "{path}"')
-
-
-def _put(values: dict[str, Any], key: str, value: Any, source: str) -> None:
-    """Set a key, or see that it agrees."""
-    before = values.get(key)
-    if before is not None and not _agree(before, value):
-        raise ValueError(
-            f"{key} = {_shown(before)} and {source} contradict: the latter gives "
-            f"{_shown(value)}; leave one of them out"
-        )
-    values[key] = before if before is not None else value
-
-
-def _agree(a: Any, b: Any) -> bool:
-    first, second = (list(x) if isinstance(x, list | tuple) else [x] for x in (a, b))
-    return len(first) == len(second) and all(
-        _number(x) and isclose(x, y, rel_tol=_SAME, abs_tol=1e-12)
-        for x, y in zip(first, second, strict=True)
-    )
+        put(values, key, value, f'fit = "{path}"')
 
 
 def _require_complete(values: dict[str, Any], material: Material) -> None:
@@ -153,7 +133,7 @@ def require_stable(name: str, given: Mapping[str, Any]) -> None:
         return  # with moduli that are not negative it always is
     if name == "ogden":
         _require_pairs(given["ogden_mu"], given["ogden_alpha"])
-    keys = ", ".join(f"{key} = {_shown(given[key])}" for key in material.keys)
+    keys = ", ".join(f"{key} = {shown(given[key])}" for key in material.keys)
     found = unstable_at(material, material.kernel_values(given))
     if found:
         raise ValueError(
@@ -169,13 +149,3 @@ def _require_pairs(mu: tuple[float, ...], alpha: tuple[float, ...]) -> None:
         )
     if 0.0 in alpha:
         raise ValueError("ogden_alpha has a 0: an exponent of 0 is no term; leave it out")
-
-
-def _number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_shown, value))}]"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from softehl.cases.seal.given import times
 from softehl.cases.seal.materials import (
     MATERIALS,
     SECOND,
@@ -189,10 +190,7 @@ def _factor(factors: Mapping[float, float], temperature: float | None) -> float:
 
 
 def _scaled(material: Material, given: Mapping[str, Any], factor: float) -> dict[str, Any]:
-    def times(value: Any) -> Any:
-        return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
-
-    return {k: times(v) if k in material.moduli else v for k, v in given.items()}
+    return {k: times(v, factor) if k in material.moduli else v for k, v in given.items()}
 
 
 def _listed(numbers: list[float]) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 from softehl.cases.seal import materials
 from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.given import number, times
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection, uniform_disc
@@ -59,7 +60,7 @@ class FilmCase:
             return replace(self, film=replace(film, speed=(1.0 + by) * film.speed))
         if name == PRESSURE_KEY:
             film = replace(film, sealed_pressure=(1.0 + by) * film.sealed_pressure)
-        value = _times(getattr(p, name), 1.0 + by)
+        value = times(getattr(p, name), 1.0 + by)
         return FilmCase(frozen(self.system, p.model_copy(update={name: value})), film)
 
     def inputs(self) -> Inputs:
@@ -78,12 +79,7 @@ class FilmCase:
 def _varies(value: Any) -> bool:
     """Whether a value is a number, or numbers, other than zero."""
     numbers = value if isinstance(value, tuple) else (value,)
-    return any(isinstance(v, float | int) and not isinstance(v, bool) and v for v in numbers)
-
-
-def _times(value: Any, factor: float) -> Any:
-    """A number, or each of several, times a factor."""
-    return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+    return any(number(v) and v for v in numbers)
 
 
 def frozen(system: SealSystem, p: ORing) -> SealSystem:

@@ -39,6 +39,8 @@ def test_what_is_used_can_be_given_again() -> None:
         ({"ring": "AS568-210", "rod": 19, "inner_diameter": 20.0}, "contradict"),
         ({"ring": "AS568-210", "rod": 19, "rod_diameter": 20.0}, "contradict"),
         ({"squeeze": 12, "housing_diameter": 57.0}, "contradict"),
+        ({"rod": 51, "rod_diameter": "wide"}, "rod_diameter"),
+        ({"roelands": 0.6, "pressure_viscosity": "thick"}, "pressure_viscosity"),
         ({"ring": "AS568-299", "rod": 19}, 'nearest: "AS568-284" and "AS568-309"'),
         ({"ring": "ISO 3601 50x2.2", "rod": 51}, "give squeeze and groove_width"),
         ({"ring": "AS568-210", "rod": 30}, "stretches inner_diameter"),
