@@ -1,7 +1,7 @@
 """The O-ring on a rod that goes to and fro: film, friction and leakage in time, cycle by cycle."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from math import nan, pi
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -110,51 +110,48 @@ class CycleRow(Row):
         return (self.cycle,)
 
 
-@dataclass
-class CycleLog:
-    """Readings of the cycle that is computed, and what its film was."""
+def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) -> CycleRow:
+    """A cycle in numbers; films: what happened in it, see `cases.seal.cycles.Films`.
 
-    readings: list[Any] = field(default_factory=list)
-    films: list[dict[str, Array]] = field(default_factory=list)
+    before: the reading at its start, last: the row before it or None.
+    """
+    all_of_them, around = [before, *films.readings], 2.0 * pi * radius
+    t, U, F = (
+        np.array([getattr(r, name) for r in all_of_them])
+        for name in ("t_s", "rod_speed_mm_s", "friction_N")
+    )
+    end, names = all_of_them[-1], ("content_mm2", "volume_air_mm2", "volume_sealed_mm2")
+    held, out, came = (np.array([getattr(r, n) for r in all_of_them]) for n in names)
+    balance = held + out - came
+    row = CycleRow(
+        cycle=float(number),
+        leak_mm3=around * (end.volume_air_mm2 - before.volume_air_mm2),
+        leak_sealed_mm3=around * (end.volume_sealed_mm2 - before.volume_sealed_mm2),
+        friction_out_N=float(F.max()),
+        friction_in_N=float(F.min()),
+        energy_mJ=float(0.5 * ((F * U)[1:] + (F * U)[:-1]) @ np.diff(t)),
+        h_min_um=min(r.h_min_um for r in films.readings),
+        p_max_MPa=max(r.p_max_MPa for r in films.readings),
+        asperity_load_percent=max(r.asperity_load_percent for r in films.readings),
+        mass_error=float(np.ptp(balance) / before.content_mm2),
+        steps=len(films.readings),
+        newton_iterations=sum(r.iterations for r in films.readings),
+        verdict=TRANSIENT,
+    )
+    if last is None:
+        return row
+    through = max(abs(row.leak_mm3), 1e-3 * around * before.content_mm2)
+    leak = abs(row.leak_mm3 - last.leak_mm3) / through
+    change = 100.0 * max(leak, abs(row.energy_mJ / last.energy_mJ - 1.0))
+    return replace(row, change_percent=change, verdict=OK if change < PERIODIC else TRANSIENT)
 
-    def row(self, number: int, radius: float, before: Any, last: CycleRow | None) -> CycleRow:
-        """The cycle in numbers; before: the reading at its start, last: the row before it."""
-        all_of_them, around = [before, *self.readings], 2.0 * pi * radius
-        t, U, F = (
-            np.array([getattr(r, name) for r in all_of_them])
-            for name in ("t_s", "rod_speed_mm_s", "friction_N")
-        )
-        end, names = all_of_them[-1], ("content_mm2", "volume_air_mm2", "volume_sealed_mm2")
-        held, out, came = (np.array([getattr(r, n) for r in all_of_them]) for n in names)
-        balance = held + out - came
-        row = CycleRow(
-            cycle=float(number),
-            leak_mm3=around * (end.volume_air_mm2 - before.volume_air_mm2),
-            leak_sealed_mm3=around * (end.volume_sealed_mm2 - before.volume_sealed_mm2),
-            friction_out_N=float(F.max()),
-            friction_in_N=float(F.min()),
-            energy_mJ=float(0.5 * ((F * U)[1:] + (F * U)[:-1]) @ np.diff(t)),
-            h_min_um=min(r.h_min_um for r in self.readings),
-            p_max_MPa=max(r.p_max_MPa for r in self.readings),
-            asperity_load_percent=max(r.asperity_load_percent for r in self.readings),
-            mass_error=float(np.ptp(balance) / before.content_mm2),
-            steps=len(self.readings),
-            newton_iterations=sum(r.iterations for r in self.readings),
-            verdict=TRANSIENT,
-        )
-        if last is None:
-            return row
-        through = max(abs(row.leak_mm3), 1e-3 * around * before.content_mm2)
-        leak = abs(row.leak_mm3 - last.leak_mm3) / through
-        change = 100.0 * max(leak, abs(row.energy_mJ / last.energy_mJ - 1.0))
-        return replace(row, change_percent=change, verdict=OK if change < PERIODIC else TRANSIENT)
 
-    def tables(self) -> list[dict[str, Array]]:
-        """The friction loop with all readings, and the film over time and place."""
-        names = asdict(self.readings[0])
-        loop = {n: np.array([getattr(r, n) for r in self.readings], dtype=float) for n in names}
-        film = {n: np.concatenate([f[n] for f in self.films]) for n in self.films[0]}
-        return [loop, film]
+def cycle_tables(films: Any) -> list[dict[str, Array]]:
+    """The friction loop with all readings, and the film over time and place."""
+    names = asdict(films.readings[0])
+    loop = {n: np.array([getattr(r, n) for r in films.readings], dtype=float) for n in names}
+    film = {n: np.concatenate([f[n] for f in films.films]) for n in films.films[0]}
+    return [loop, film]
 
 
 class CycleCase(Case[Cycle, CycleRow]):
@@ -182,10 +179,9 @@ class CycleCase(Case[Cycle, CycleRow]):
         """See :class:`Case`."""
         from softehl.cases.seal.cycles import run_cycles
 
-        def log(number: int, readings: Any, films: Any, before: Any, last: Any) -> CycleRow:
-            cycle = CycleLog(readings, films)
-            row = cycle.row(number, 0.5 * parameters.rod_diameter, before, last)
-            observer.state(State(row, cycle.tables()))
+        def log(number: int, films: Any, before: Any, last: Any) -> CycleRow:
+            row = cycle_row(number, 0.5 * parameters.rod_diameter, films, before, last)
+            observer.state(State(row, cycle_tables(films)))
             return row
 
         return run_cycles(parameters, parameters.path, observer, log)

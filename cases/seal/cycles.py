@@ -26,7 +26,17 @@ from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Point, Status
 
-Log = Callable[[int, list[Reading], list[dict[str, Array]], Reading, Any], Any]
+
+@dataclass
+class Films:
+    """Readings of the cycle that is computed, and what its film was."""
+
+    readings: list[Reading] = field(default_factory=list)
+    films: list[dict[str, Array]] = field(default_factory=list)
+
+
+Log = Callable[[int, Films, Reading, Any], Any]
+"""A row of the number of a cycle, what happened in it, the reading before it, the last row."""
 
 
 def steady_start(path: FilmPath, x: Array, speed: float) -> BuiltFilm | None:
@@ -37,21 +47,8 @@ def steady_start(path: FilmPath, x: Array, speed: float) -> BuiltFilm | None:
         if film.speed == speed:
             found[:] = [(film, point.solution.x)]
 
-    if path.system.parameters.rough:
-        path.rise("out", path.settled(x), keep)
-    else:
-        start = path.begun("out", x, keep)
-        if start is not None:
-            path.slower(path.build(*start), (speed,), keep)
+    path.films("out", path.settled(x), keep)
     return found[0] if found else None
-
-
-@dataclass
-class Films:
-    """What happened in the cycle so far."""
-
-    readings: list[Reading] = field(default_factory=list)
-    films: list[dict[str, Array]] = field(default_factory=list)
 
 
 def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) -> Outcome:
@@ -100,7 +97,7 @@ def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) ->
             )
 
         march.until(number * period, told)
-        last = log(number, films.readings, films.films, before, last)
+        last = log(number, films, before, last)
         before = films.readings[-1]
 
 

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from softehl.cases.seal.contact import contact_problem, held_place
+from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.film import release_stage, shear_stage, speed_stage
+from softehl.cases.seal.film import film_on, release_stage, shear_stage, speed_stage
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.path import PathSettings, Stage
 from softehl.cases.seal.system import PRESSURE, VOID
@@ -54,17 +54,7 @@ def settle_stage(system: SealSystem, settings: PathSettings) -> Stage:
 
 def dry_film(system: SealSystem, stroke: Stroke, x: Array) -> FilmLoads:
     """The slowest film of a stroke, on the contact state x of asperities, without shear."""
-    p = system.parameters
-    _, gap = system.arc_film(x)
-    return FilmLoads(
-        p.sealed_pressure,
-        stroke,
-        speed=min(SLOWEST, *p.speeds),
-        multipliers=system.rod_multipliers(x).copy(),
-        gap=gap,
-        shear=0.0,
-        place=held_place(p),
-    )
+    return film_on(system, stroke, x, min(SLOWEST, *system.parameters.speeds))
 
 
 def wetting_stages(system: SealSystem, film: FilmLoads, x: Array) -> list[Stage]:

@@ -69,21 +69,27 @@ def _stays(p: ORing) -> bool:
     return p.given_arc is not None or p.rubs
 
 
-def first_film(system: SealSystem, settings: PathSettings, stroke: Stroke, x: Array) -> FilmLoads:
-    """The film at its highest speed, under the rod forces of the contact state x."""
+def film_on(system: SealSystem, stroke: Stroke, x: Array, speed: float) -> FilmLoads:
+    """A film without shear on the contact state x, under its rod forces, held as this is."""
     p = system.parameters
     _, gap = system.arc_film(x)
     return FilmLoads(
         p.sealed_pressure,
         stroke,
-        speed=_start_speed(system, settings),
+        speed,
         multipliers=system.rod_multipliers(x).copy(),
         gap=gap,
-        shear=1.0 if p.shear_traction else 0.0,
-        rod_offset=settings.offset,
+        shear=0.0,
         place=held_place(p),
         moment=held_moment(p),
     )
+
+
+def first_film(system: SealSystem, settings: PathSettings, stroke: Stroke, x: Array) -> FilmLoads:
+    """The film at its highest speed, under the rod forces of the contact state x."""
+    film = film_on(system, stroke, x, _start_speed(system, settings))
+    shear = 1.0 if system.parameters.shear_traction else 0.0
+    return replace(film, shear=shear, rod_offset=settings.offset)
 
 
 def weight_stage(system: SealSystem, settings: PathSettings, film: FilmLoads) -> Stage:

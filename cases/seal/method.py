@@ -142,6 +142,15 @@ class FilmPath:
                 return film, y
         return first or (first_film(self.system, self.settings, stroke, x), x)
 
+    def films(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All films of a stroke from the settled contact state x; what went wrong, if anything."""
+        if self.system.parameters.rough:
+            return self.rise(stroke, x, on_speed)
+        start = self.begun(stroke, x, on_speed)
+        if start is None:
+            return None
+        return self.slower(self.build(*start), self.system.parameters.speeds, on_speed)
+
     def settled(self, x: Array) -> Array:
         """The contact state x where the rod is as near as asperities let it; x itself if smooth."""
         if not self.system.parameters.rough:
@@ -159,7 +168,7 @@ class FilmPath:
         if isinstance(y, StageFailed):
             return y
         shear = 1.0 if p.shear_traction else 0.0
-        moment = 0.0 if p.rotation == "free" else None
+        moment = 0.0 if p.rotation == "free" else film.moment
         return self._faster(replace(film, shear=shear, moment=moment), y, on_speed)
 
     def _faster(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
@@ -176,7 +185,8 @@ class FilmPath:
             speeds = tuple(u for u in p.speeds if u >= start.speed)
             return rising_stage(system, self.settings, start, speeds, keep)
 
-        if p.solver == "auto" and p.rotation == "fixed" and isinstance(linear, Condenser):
+        if self.quick:
+            assert isinstance(linear, Condenser)
             fast = FastFilm.of(system, linear)
             if not isinstance(self.driver.follow(fast.rising(stage(film)), x), StageFailed):
                 return None
@@ -329,12 +339,7 @@ def _thicknesses(path: FilmPath, x: Array, stroke: Stroke) -> dict[float, float]
             problem = system.film_problem(film)
             found[film.speed] = film_numbers(system, problem, film, point.solution.x).h_star
 
-    if system.parameters.rough:
-        path.rise(stroke, x, keep)
-        return found
-    start = path.begun(stroke, x, keep)
-    if start is not None:
-        path.slower(path.build(*start), speeds, keep)
+    path.films(stroke, x, keep)
     return found
 
 

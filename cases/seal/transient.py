@@ -28,13 +28,16 @@ from softehl.runtime.solve.schur import SchurCorrector
 class Instant:
     """A film at a time: unknowns x (n,), content of its segments (segments, m_p + 1), mm^2.
 
-    volumes: (2,) what has passed the sealed and the air end, + to the air side, mm^2: by the same
-    differences in time as the content, so that both balance to rounding.
+    held: in all of them. fluxes: (2,) at the sealed and the air end, + to the air side, mm^2/s.
+    volumes: (2,) what has passed these ends, mm^2: by the same differences in time as the content,
+    so that both balance to rounding.
     """
 
     t: float
     x: Array
     content: Array
+    held: float
+    fluxes: Array
     volumes: Array
 
 
@@ -96,10 +99,12 @@ class March:
 
     def begin(self, x: Array, t: float = 0.0) -> Reading:
         """From the steady film x (n,) at a time; its reading."""
-        self.behind = [Instant(t, x, self._content(x), np.zeros(2))]
         self.dt = self.steps.first * self.motion.period
         film = self._loads(t)
-        return self._reading(self.system.film_problem(film), film, self.behind[0], 0)
+        problem = self.system.film_problem(film)
+        first = Instant(t, x, *self._content(x), self._fluxes(problem, x), np.zeros(2))
+        self.behind = [first]
+        return self._reading(problem, film, first, 0)
 
     def until(self, end: float, on_step: Callable[[Instant, Reading], None]) -> None:
         """March to a time; every step is told.  Raises StuckError."""
@@ -201,26 +206,28 @@ class March:
 
     def _instant(self, problem: Problem, x: Array, dt: float) -> Instant:
         weights = self._weights(dt)
-        pressures = self.system.layout.part(PRESSURE)
-        rows = problem.assembler.residual(x, problem.parameters)[pressures]
-        through, known = np.array([-rows[0], rows[-1]]), self.behind[: len(weights) - 1]
+        fluxes, known = self._fluxes(problem, x), self.behind[: len(weights) - 1]
         before = sum(w * i.volumes for w, i in zip(weights[1:], known, strict=True))
-        volumes = (through - before) / weights[0]
-        return Instant(self.behind[0].t + dt, x, self._content(x), volumes)
+        volumes = (fluxes - before) / weights[0]
+        return Instant(self.behind[0].t + dt, x, *self._content(x), fluxes, volumes)
 
-    def _content(self, x: Array) -> Array:
+    def _fluxes(self, problem: Problem, x: Array) -> Array:
+        """See Instant; what the equations of the prescribed end pressures lack."""
+        residual = problem.assembler.residual(x, problem.parameters)
+        rows = residual[self.system.layout.part(PRESSURE)]
+        return np.array([-rows[0], rows[-1]])
+
+    def _content(self, x: Array) -> tuple[Array, float]:
+        """See Instant: of the segments, and in all."""
         problem = self.system.problem.with_parameters(**self.system.squeeze_values(0.0))
-        return problem.fields(SQUEEZE, x)["content"]
+        at = problem.fields(SQUEEZE, x)
+        return at["content"], float((at["dx"] * at["h_T"] * (1.0 - at["v"])).sum())
 
     def _reading(
         self, problem: Problem, film: FilmLoads, instant: Instant, iterations: int
     ) -> Reading:
         system, x = self.system, instant.x
         at = problem.fields(FILM, x)
-        rows = problem.assembler.residual(x, problem.parameters)[system.layout.part(PRESSURE)]
-        squeezed = problem.with_parameters(**self.system.squeeze_values(0.0))
-        content = squeezed.fields(SQUEEZE, x)
-        held = (content["dx"] * content["h_T"] * (1.0 - content["v"])).sum()
         share = rough_numbers(system, at).get("asperity_load", 0.0)
         return Reading(
             t_s=instant.t,
@@ -228,11 +235,11 @@ class March:
             rod_speed_mm_s=film.rod_speed,
             sealed_pressure_MPa=film.sealed_pressure,
             friction_N=float(2.0 * pi * system.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
-            flux_sealed_mm2_s=-float(rows[0]),
-            flux_air_mm2_s=float(rows[-1]),
+            flux_sealed_mm2_s=float(instant.fluxes[0]),
+            flux_air_mm2_s=float(instant.fluxes[1]),
             volume_sealed_mm2=float(instant.volumes[0]),
             volume_air_mm2=float(instant.volumes[1]),
-            content_mm2=float(held),
+            content_mm2=instant.held,
             h_min_um=1e3 * float(system.arc_film(x)[1].min()),
             p_max_MPa=float(at["p"].max()),
             asperity_load_percent=100.0 * share,

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
 from softehl.cases.seal.equations import build_system
 from softehl.cases.seal.method import run
@@ -149,3 +150,13 @@ def test_densities_agree_on_a_rough_film() -> None:
     for speed, state in fine.items():
         assert coarse[speed].mean_gap_um == pytest.approx(state.mean_gap_um, rel=1e-2)
         assert coarse[speed].rod_friction_N == pytest.approx(state.rod_friction_N, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_a_rough_film_on_a_section_that_rubs_on_its_housing() -> None:
+    """The film begins with the section free to roll, as friction holds it in the contact."""
+    given: dict[str, Any] = {"roughness": 0.3, "speeds": (10.0, 500.0), "stroke": "out"}
+    held, rubbing = (solved(housing_friction=f, density=2, **given) for f in (0.0, 0.2))
+    assert all(state.verdict == OK for state in rubbing.values())
+    for speed, state in held.items():
+        assert rubbing[speed].rod_friction_N == pytest.approx(state.rod_friction_N, rel=0.1)
