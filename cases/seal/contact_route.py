@@ -99,8 +99,7 @@ class ContactRoute:
         """Unknowns of a squeezed section without pressure; a failed start is tried closer."""
         for cut in _CUTS:
             stage = squeeze_stage(system, self.settings, cut)
-            stage = replace(stage, corrector=along(system, self.newton))
-            x = self.follow(stage, system.at_rest())
+            x = self.follow(self._quicker(system, stage), system.at_rest())
             if not isinstance(x, StageFailed) or x.branch.points:
                 break
         return x
@@ -110,10 +109,8 @@ class ContactRoute:
         p_s, force = system.parameters.sealed_pressure, 0.0
         if p_s > 0.0 and not wedged(system, x):
             y, place = against_wall(system, x)
-            stage = replace(
-                lean_stage(system, self.settings, place), corrector=along(system, self.newton)
-            )
-            leaning = self.follow(stage, y)
+            stage = lean_stage(system, self.settings, place)
+            leaning = self.follow(self._quicker(system, stage), y)
             if isinstance(leaning, StageFailed):
                 return leaning
             x, force = leaning, system.axial_force(leaning)
@@ -123,7 +120,11 @@ class ContactRoute:
                 return free
             x = free
         stage = load_stage(system, self.settings, p_s, force)
-        return self._over_kinks(system, replace(stage, corrector=along(system, self.newton)), x)
+        return self._over_kinks(system, self._quicker(system, stage), x)
+
+    def _quicker(self, system: SealSystem, stage: Stage) -> Stage:
+        """A stage whose steps are corrected by what is quickest."""
+        return replace(stage, corrector=along(system, self.newton))
 
     def _over_kinks(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
         """To the end of a stage in which nodes slide round the edge of an open gap.

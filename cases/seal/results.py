@@ -11,6 +11,7 @@ import numpy as np
 from softehl.cases.seal.catalogue import Ring, fill, squeeze, stretch
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.state import ContactState, FilmState, Profile, Section
 from softehl.cases.seal.surfaces import regime
 from softehl.cases.seal.system import (
@@ -216,6 +217,17 @@ def unsealed(system: SealSystem, x: Array) -> str:
     return "" if (system.pressing(BORE, x)[crown] > 0.0).all() else "at its crown"
 
 
+def fit_percent(p: ORing) -> dict[str, float]:
+    """How the free ring fits its gland."""
+    ring = Ring("", p.inner_diameter, p.section_diameter)
+    depth = 0.5 * (p.housing_diameter - p.rod_diameter)
+    return {
+        "stretch_percent": stretch(p.inner_diameter, p.rod_diameter),
+        "squeeze_percent": squeeze(p.section_diameter, depth),
+        "fill_percent": fill(ring, p.rod_diameter, p.housing_diameter, p.groove_width),
+    }
+
+
 def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
     """Fit of the ring in its gland; axial forces on it in the contact state x, + to the air side.
 
@@ -223,7 +235,6 @@ def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
     it. Their sum with that of the hold is zero in equilibrium.
     """
     p, section = system.parameters, system.section
-    ring = Ring("", p.inner_diameter, p.section_diameter)
     bottom, crown = system.deformed(x)[list(section.pressed_ends), 1]
     forces = {
         "air_wall_N": -system.reaction(AIR_WALL, x),
@@ -233,9 +244,7 @@ def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
         "sealed_pressure_N": p.sealed_pressure * pi * float(crown**2 - bottom**2),
     }
     return {
-        "stretch_percent": stretch(p.inner_diameter, p.rod_diameter),
-        "squeeze_percent": squeeze(p.section_diameter, 0.5 * (p.housing_diameter - p.rod_diameter)),
-        "fill_percent": fill(ring, p.rod_diameter, p.housing_diameter, p.groove_width),
+        **fit_percent(p),
         **forces,
         "axial_sum_N": sum(forces.values()),
         **mean_motion(system, x),

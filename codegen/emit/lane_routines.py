@@ -18,10 +18,7 @@ from softehl.codegen.language.definition import Definition
 
 def texts(d: Definition, wanted: Iterable[Routine]) -> list[str]:
     """C functions of the routines and what they need, each once, callees first."""
-    out: dict[str, None] = {}
-    for r in wanted:
-        out.update(dict.fromkeys(_text(d, r)))
-    return list(out)
+    return routines.texts(d, wanted, _text)
 
 
 def _text(d: Definition, r: Routine) -> list[str]:

@@ -6,7 +6,7 @@ not-a-number and the kernel marks the whole element (`codegen.abi`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.schedule import schedule
@@ -23,12 +23,16 @@ def called(roots: Iterable[Node]) -> list[Routine]:
     return list(dict.fromkeys(r for r in calls if isinstance(r, Routine)))
 
 
-def texts(d: Definition, routines: Iterable[Routine]) -> list[str]:
-    """C functions of `routines` and what they need, each once, callees first."""
-    out: dict[str, None] = {}
-    for r in routines:
-        out.update(dict.fromkeys(_text(d, r)))
-    return list(out)
+def texts(
+    d: Definition,
+    routines: Iterable[Routine],
+    text: Callable[[Definition, Routine], list[str]] | None = None,
+) -> list[str]:
+    """C functions of `routines` and what they need, each once, callees first.
+
+    text: what prints one of them, if it is another printer than this one.
+    """
+    return list(dict.fromkeys(c for r in routines for c in (text or _text)(d, r)))
 
 
 def _text(d: Definition, r: Routine) -> list[str]:

@@ -16,9 +16,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csr_array
 
-from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mpi import petsc, world
 from softehl.runtime.solve.linear import (
     Factorisation,
@@ -28,7 +28,6 @@ from softehl.runtime.solve.linear import (
 )
 from softehl.runtime.solve.superlu import SchurBySolves
 
-_RIGHT_SIDES = 64  # at a time
 _PAUSE = 5e-4  # seconds between looks for a task: who waits leaves the core to the others
 
 
@@ -154,20 +153,8 @@ class Mumps:
         return Factorisation(K, factors, row_sums, self.refinement, self.accuracy)
 
     def condense(self, K: SparseMatrix, boundary: Integers) -> SchurBySolves:
-        """See `Condenser`; the Schur complement takes a solve for each boundary unknown."""
-        checked_row_sums(K)
-        inner: Flags = np.ones(K.shape[0], dtype=bool)
-        inner[boundary] = False
-        interior = np.flatnonzero(inner)
-        rows = csc_array(K[boundary, :])
-        columns = csc_array(K[interior, :][:, boundary])
-        factors = self.team.factorise(csc_array(K[interior, :][:, interior]))
-        coupling = csc_array(rows[:, interior])
-        schur = rows[:, boundary].toarray()
-        for first in range(0, len(boundary), _RIGHT_SIDES):
-            part = slice(first, first + _RIGHT_SIDES)
-            schur[:, part] -= np.asarray(coupling @ factors.solve(columns[:, part].toarray()))
-        return SchurBySolves(boundary, schur, interior, factors, (coupling, columns))
+        """See `Condenser`."""
+        return SchurBySolves.of(K, boundary, self.team.factorise)
 
 
 def require() -> None:

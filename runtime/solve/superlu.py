@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -58,20 +59,8 @@ class SuperLU:
             raise SingularMatrix(f"no LU factors: {error}") from error
 
     def condense(self, K: SparseMatrix, boundary: Integers) -> SchurBySolves:
-        """See `Condenser`; the Schur complement takes a solve for each boundary unknown."""
-        checked_row_sums(K)
-        inner: Flags = np.ones(K.shape[0], dtype=bool)
-        inner[boundary] = False
-        interior = np.flatnonzero(inner)
-        rows = csc_array(K[boundary, :])
-        columns = csc_array(K[interior, :][:, boundary])
-        factors = self.factors(csc_array(K[interior, :][:, interior]))
-        coupling = csc_array(rows[:, interior])
-        schur = rows[:, boundary].toarray()
-        for first in range(0, len(boundary), _RIGHT_SIDES):
-            part = slice(first, first + _RIGHT_SIDES)
-            schur[:, part] -= np.asarray(coupling @ factors.solve(columns[:, part].toarray()))
-        return SchurBySolves(boundary, schur, interior, factors, (coupling, columns))
+        """See `Condenser`."""
+        return SchurBySolves.of(K, boundary, self.factors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +75,28 @@ class SchurBySolves:
     interior: NDArray[np.intp]
     factors: Factors
     couplings: tuple[SparseMatrix, SparseMatrix]
+
+    @classmethod
+    def of(
+        cls, K: SparseMatrix, boundary: Integers, factors_of: Callable[[SparseMatrix], Factors]
+    ) -> SchurBySolves:
+        """Of K, (n, n); the Schur complement takes a solve for each boundary unknown.
+
+        factors_of: of a matrix, with many right sides. Raises SingularMatrix.
+        """
+        checked_row_sums(K)
+        inner: Flags = np.ones(K.shape[0], dtype=bool)
+        inner[boundary] = False
+        interior = np.flatnonzero(inner)
+        rows = csc_array(K[boundary, :])
+        columns = csc_array(K[interior, :][:, boundary])
+        factors = factors_of(csc_array(K[interior, :][:, interior]))
+        coupling = csc_array(rows[:, interior])
+        schur = rows[:, boundary].toarray()
+        for first in range(0, len(boundary), _RIGHT_SIDES):
+            part = slice(first, first + _RIGHT_SIDES)
+            schur[:, part] -= np.asarray(coupling @ factors.solve(columns[:, part].toarray()))
+        return cls(boundary, schur, interior, factors, (coupling, columns))
 
     def reduce(self, r: Array) -> tuple[Array, Array]:
         """See `Condensed`."""

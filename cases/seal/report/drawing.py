@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from softehl.cases.seal.catalogue import Ring, fill, squeeze, stretch
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
+from softehl.cases.seal.results import fit_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,13 +43,11 @@ def gland_figure(p: ORing) -> Figure:
 
 def fit_numbers(p: ORing) -> list[tuple[str, float, str]]:
     """How the ring sits in its gland: name, value, unit."""
-    ring = Ring("", p.inner_diameter, p.section_diameter)
-    depth = 0.5 * (p.housing_diameter - p.rod_diameter)
-    filled = fill(ring, p.rod_diameter, p.housing_diameter, p.groove_width)
+    fits = fit_percent(p)
     return [
-        ("squeeze", squeeze(p.section_diameter, depth), "%"),
-        ("stretch", stretch(p.inner_diameter, p.rod_diameter), "%"),
-        ("gland fill", filled, "%"),
+        ("squeeze", fits["squeeze_percent"], "%"),
+        ("stretch", fits["stretch_percent"], "%"),
+        ("gland fill", fits["fill_percent"], "%"),
         ("shear modulus of the rubber", p.shear_modulus, "MPa"),
         ("viscosity of the oil", p.viscosity * 1e9, "mPa s"),
     ]
