@@ -23,12 +23,12 @@ from softehl.cases.seal.contact import (
 )
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.grading import PASSES, graded_disc, placed_disc
+from softehl.cases.seal.grading import PASSES, graded_layout, placed_layout
+from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import carried_contact, finer
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.sections import Disc
 from softehl.runtime.solve.newton import Newton
 
 State: TypeAlias = tuple[SealSystem, Array]
@@ -165,7 +165,7 @@ class ContactRoute:
             if not isinstance(state, StageFailed) and guide < density:
                 state = self._finer(state, density)
             if not isinstance(state, StageFailed):
-                state = self._on(placed_disc(*state, p), _at(p, density), state, PASSES)
+                state = self._on(placed_layout(*state, p), _at(p, density), state, PASSES)
             if not isinstance(state, StageFailed):
                 state = self._refined(*state, p.density)
             if not isinstance(state, StageFailed):
@@ -177,7 +177,7 @@ class ContactRoute:
         found = self._refined(*state, density)
         if not isinstance(found, StageFailed):
             return found
-        system = build_system(_at(state[0].parameters, density), state[0].section.disc)
+        system = build_system(_at(state[0].parameters, density), state[0].section.layout)
         return self._refined(system, self._loaded(system), density)
 
     def _guided(self, p: ORing, density: int) -> State | StageFailed:
@@ -187,17 +187,17 @@ class ContactRoute:
         state = x if isinstance(x, StageFailed) else (guide, x)
         for number in range(1, PASSES):
             if not isinstance(state, StageFailed):
-                disc = placed_disc(*state, p, most=0)
-                state = self._on(disc, _at(p, density), state, number)
+                layout = placed_layout(*state, p, most=0)
+                state = self._on(layout, _at(p, density), state, number)
         return state
 
-    def _on(self, disc: Disc, p: ORing, before: State, number: int) -> State | StageFailed:
+    def _on(self, layout: Layout, p: ORing, before: State, number: int) -> State | StageFailed:
         """On a graded mesh: carried to it, or else by the path from rest, coarse or as it is."""
-        new = build_system(p, disc)
+        new = build_system(p, layout)
         state = self.carried(*before, new, f"contact on graded mesh {number}")
         for density in _doublings(COARSE, p.density):
             if isinstance(state, StageFailed):
-                coarse = build_system(_at(p, density), disc)
+                coarse = build_system(_at(p, density), layout)
                 state = self._refined(coarse, self._loaded(coarse), p.density)
         return state
 
@@ -215,7 +215,7 @@ class ContactRoute:
         for number in range(1, PASSES + 1):
             if isinstance(state, StageFailed):
                 break
-            graded = build_system(p, graded_disc(*state))
+            graded = build_system(p, graded_layout(*state))
             name = f"contact on graded mesh {number}"
             state = self.carried(*state, graded, name)
         return state
@@ -226,7 +226,7 @@ class ContactRoute:
         while not isinstance(state, StageFailed) and state[0].parameters.density < density:
             coarse = state[0]
             state = self.carried(
-                *state, build_system(finer(coarse.parameters), coarse.section.disc)
+                *state, build_system(finer(coarse.parameters), coarse.section.layout)
             )
             if not isinstance(state, StageFailed) and coarse.parameters.mesh == "uniform":
                 self.contacts.keep(*state)

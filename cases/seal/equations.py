@@ -10,9 +10,10 @@ import numpy as np
 
 from softehl.cases.seal import scales
 from softehl.cases.seal.declared import Block, Field, Numbering
+from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.section import SealSection, disc_section
+from softehl.cases.seal.section import SealSection, seal_section
 from softehl.cases.seal.system import (
     AIR_WALL,
     AXIAL,
@@ -41,7 +42,7 @@ from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, S
 from softehl.runtime.fem.layered import Layer
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
-from softehl.runtime.mesh.sections import Disc, SectionMesh
+from softehl.runtime.mesh.sections import SectionMesh
 
 _STEP = 0.9  # of its thickness a film may lose in an iteration
 _ROUGH_STEP = 0.7  # of its thickness that of a rough film may change, at least by sigma
@@ -392,6 +393,8 @@ def _contact_constants(
     return found
 
 
-def build_system(p: ORing, disc: Disc | None = None, density: Fraction | None = None) -> SealSystem:
-    """The system of a case on its section; see `disc_section`."""
-    return SealSystem.of(p, disc_section(p, disc, density))
+def build_system(
+    p: ORing, layout: Layout | None = None, density: Fraction | None = None
+) -> SealSystem:
+    """The system of a case on its section; see `seal_section`."""
+    return SealSystem.of(p, seal_section(p, layout, density))

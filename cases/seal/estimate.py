@@ -24,7 +24,7 @@ def coarser_density(density: int) -> Fraction:
 def coarser_system(system: SealSystem) -> SealSystem:
     """The system on a coarser mesh of the same spacing."""
     parameters = system.parameters
-    return build_system(parameters, system.section.disc, coarser_density(parameters.density))
+    return build_system(parameters, system.section.layout, coarser_density(parameters.density))
 
 
 def h_star_error(density: int, h_star: float, coarser: float) -> float:

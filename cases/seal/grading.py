@@ -11,16 +11,16 @@ edges and are as K^(-6/5) at them resolve every speed, and one mesh serves both 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.layout import Layout, uniform_layout
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.section import SealSection, uniform_disc
 from softehl.cases.seal.system import ROD
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.sections import LONG, SHORT, Disc
+from softehl.runtime.mesh.sections import LONG
 from softehl.runtime.mesh.spacing import Spot, graded
 
 PASSES = 3
@@ -33,33 +33,24 @@ COARSEST = 18
 """The arc is at least as many of its longest segments long, at density 2."""
 
 _DENSITY = 2  # for which the sizes are chosen; other densities divide or join its segments
-_SIDES = 25.0  # degrees that the side blocks need at least
-_CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
 
 
-def graded_disc(system: SealSystem, x: Array) -> Disc:
-    """The disc whose mesh is fine at the contact edges of the contact state x.
+def graded_layout(system: SealSystem, x: Array) -> Layout:
+    """The layout whose mesh is fine at the contact edges of the contact state x.
 
     Segments stay equal where the contact is too small to have edges.
     """
-    disc = uniform_disc(system.parameters)
-    length = arc_positions(system.section)[-1]
+    layout = uniform_layout(system.parameters)
+    length = system.section.places[-1]
     edges = contact_edges(system, x)
     if not edges:
-        return disc
+        return layout
     steepest = max(edge.rise for edge in edges)
     spots = [
         Spot(min(max(edge.place, 0.0), length), (edge.rise / steepest) ** -0.6) for edge in edges
     ]
     spacing = graded(length, spots, LONG * _DENSITY, coarsest=length / COARSEST, rate=RATE)
-    return replace(
-        disc,
-        spacing=spacing,
-        top=_TOP,
-        corner_radius=_CORNERS,
-        layer_growth=_LAYER_GROWTH,
-        row_growth=_ROW_GROWTH,
-    )
+    return layout.graded(spacing, layout.long)
 
 
 REACH, FILMS = 0.15, 60.0
@@ -77,8 +68,8 @@ _MULTIPLE = 3  # of segments at density 1: meshes exist for thirds of a density
 _PLACED_COARSEST = 12  # as COARSEST, of an arc that the contact places
 
 
-def placed_disc(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGMENTS) -> Disc:
-    """The disc of a case whose arc reaches as far as a film may matter in the contact state x.
+def placed_layout(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGMENTS) -> Layout:
+    """The layout of a case whose arc reaches as far as a film may matter in the contact state x.
 
     With k = K / K_max of each edge, segments are as k^-0.3 at it and grow by 0.3 k^0.5 outside and
     0.3 min(1 / k, 1.5) inside: at the flatter edge the dip is as wide as the inlet of the other
@@ -86,13 +77,11 @@ def placed_disc(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGMENT
     most: segments at density 1 that it may get; a state that shows the edges only roughly is no
     reason for many.
     """
-    old, s = system.section.disc, arc_positions(system.section)
-    edges = contact_edges(system, x)
-    ends = [_way_out(system, x, s, side, p) for side in (0, 1)]
-    start, end = (old.arc_start + float(np.degrees(e / old.radius)) for e in ends)
-    disc = replace(uniform_disc(p), arc_start=start, arc_end=end)
+    s, edges = system.section.places, contact_edges(system, x)
+    ends = _way_out(system, x, s, 0, p), _way_out(system, x, s, 1, p)
+    layout = uniform_layout(p).between(system.section.layout, ends)
     if p.mesh == "uniform" or not edges:
-        return disc
+        return layout
     length, steepest = ends[1] - ends[0], max(edge.rise for edge in edges)
     spots = []
     for edge, side in zip(edges, (0, 1), strict=True):
@@ -100,25 +89,14 @@ def placed_disc(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGMENT
         rates = RATE * k**0.5, RATE * min(1.0 / k, 1.5)
         place = min(max(edge.place - ends[0], 0.0), length)
         spots.append(Spot(place, k**-0.3, rates if side == 0 else rates[::-1]))
-    growth, top = _ROW_GROWTH, max(_TOP, end + _SIDES, _SIDES - start)
     if p.opens:
         spots.append(_edge_spot(system, x, p, ends))
-        side = old.radius * np.radians(top - end)
-        growth = _growth_to(0.25 * p.corner_fillet / side, SHORT * _DENSITY)
-    for long in range(disc.long, max(most, disc.long) + 1, _MULTIPLE):
+    for long in range(layout.long, max(most, layout.long) + 1, _MULTIPLE):
         coarsest = length / _PLACED_COARSEST
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
         if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet_length(p, steepest):
             break
-    return replace(
-        disc,
-        spacing=spacing,
-        long=long,
-        top=top,
-        corner_radius=_CORNERS,
-        layer_growth=_LAYER_GROWTH,
-        row_growth=growth,
-    )
+    return layout.graded(spacing, long, 0.25 * p.corner_fillet if p.opens else None)
 
 
 def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:
@@ -127,17 +105,9 @@ def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) ->
     centre = np.array([p.groove_centre + 0.5 * p.groove_width, 0.5 * p.rod_diameter])
     centre += p.corner_fillet + np.array([0.0, p.extrusion_gap])
     away = np.linalg.norm(system.deformed(x)[nodes] - centre, axis=1)
-    place = arc_positions(system.section)[int(np.argmin(away))]
+    place = system.section.places[int(np.argmin(away))]
     fine = 0.25 * p.corner_fillet
     return Spot(min(place, ends[1]) - ends[0], np.inf, most=fine)
-
-
-def _growth_to(first: float, count: int) -> float:
-    """Ratio of the last to the first of `count` parts of a line, the first of them this part."""
-    growth = _ROW_GROWTH
-    while np.expm1(np.log(growth) / count) / (growth - 1.0) > first:
-        growth *= 1.1
-    return growth
 
 
 def inlet_length(p: ORing, rise: float) -> float:
@@ -172,14 +142,6 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, p: ORing) -> flo
     return float(s[-1])
 
 
-def arc_positions(section: SealSection) -> Array:
-    """Lengths (arc nodes,) along the undeformed arc from its sealed end, mm."""
-    disc, nodes = section.disc, section.mesh.arc_nodes
-    z, r = (section.mesh.points[nodes] - disc.centre).T
-    angle = np.arctan2(z, -r)
-    return np.asarray(disc.radius * (angle - angle[0]))
-
-
 @dataclass(frozen=True)
 class Edge:
     """An edge of the contact: its place on the arc, mm, and K^2 of its pressure, MPa^2/mm."""
@@ -194,7 +156,7 @@ def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
     The square of the pressure is a straight line there, taken from the second and third node that
     touch; none where fewer than three do.
     """
-    s, pressure = arc_positions(system.section), -system.rod_multipliers(x)
+    s, pressure = system.section.places, -system.rod_multipliers(x)
     touching = np.flatnonzero(pressure > 0.0)
     if len(touching) < 3:
         return []

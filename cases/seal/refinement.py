@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from softehl.cases.seal.contact import contact_problem, contact_stage
 from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
 from softehl.cases.seal.system import SOLID
@@ -53,16 +54,17 @@ class _Carrier:
 
 def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
     """The most accurate transfer: exact between meshes that share nodes, else by local splines."""
-    long = old.section.disc.long
+    before, after, long = old.section.layout, new.section.layout, old.section.layout.long
     density = old.mesh.arc // long
-    if old.section.disc == new.section.disc and new.mesh.arc == 2 * old.mesh.arc:
+    nested = isinstance(before, RoundLayout) and before == after
+    if nested and new.mesh.arc == 2 * old.mesh.arc:
         return _Carrier(
             f"prolonged from density {density}",
             lambda values: prolong_nodes(values, density, long),
             lambda values: prolong_elements(values, density, long),
             lambda name, v: prolong_loop(v) if _closed(old, name) else prolong_chain(v),
         )
-    if old.section.disc == new.section.disc and old.mesh.arc == 2 * new.mesh.arc:
+    if nested and old.mesh.arc == 2 * new.mesh.arc:
         return _Carrier(
             f"restricted from density {density}",
             lambda values: restrict_nodes(values, density, long),
@@ -74,8 +76,8 @@ def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
     def chain(name: str, values: Array) -> Array:
         if _closed(old, name):
             return transfer_loop(*meshes, values)
-        before, after = (system.section.chains[name][0] for system in (old, new))
-        return transfer_chain(*meshes, before, after, values)
+        here, there = (system.section.chains[name][0] for system in (old, new))
+        return transfer_chain(*meshes, here, there, values)
 
     return _Carrier(
         "moved from another mesh",

@@ -7,28 +7,27 @@ crown and the sealed side. Sealed pressure acts from the sealed end of the arc r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from math import pi, radians
 
 import numpy as np
 
+from softehl.cases.seal.layout import Layout, uniform_layout
 from softehl.cases.seal.parameters import ORing
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.sections import Disc, SectionMesh, disc_mesh
-from softehl.runtime.mesh.spacing import Spacing, Spot, graded
+from softehl.runtime.mesh.sections import SectionMesh
 
 
 @dataclass(frozen=True, eq=False)
 class SealSection:
     """A meshed section in its reference configuration; lengths in mm.
 
-    disc: how the mesh is laid out. placed: whether its arc was placed by the contact; then every
+    layout: of the mesh. placed: whether its arc was placed by the contact; then every
     boundary node may touch the walls of the groove, else (the paper's scheme) those off the arc.
     """
 
-    disc: Disc
+    layout: Layout
     mesh: SectionMesh
     placed: bool = False
 
@@ -75,12 +74,17 @@ class SealSection:
     @property
     def area(self) -> float:
         """Area of the section, mm^2."""
-        return pi * self.disc.radius**2
+        return self.layout.area
 
     @property
     def polar_moment(self) -> float:
-        """Polar moment of area about the centre, mm^4."""
-        return 0.5 * pi * self.disc.radius**4
+        """Polar moment of area about the centroid, mm^4."""
+        return self.layout.polar_moment
+
+    @property
+    def places(self) -> Array:
+        """Lengths (arc nodes,) along the undeformed arc from its sealed end, mm."""
+        return self.layout.places(self.mesh)
 
     def coordinates(self, elements: str) -> Array:
         """Coordinates (n, 2 k) in (z, r) of a set of elements, node by node."""
@@ -89,49 +93,15 @@ class SealSection:
 
     def _sealed_side(self) -> Integers:
         """Segments from the crown to the sealed end of the arc."""
-        outer = self.mesh.outer_segments
-        middle = self.mesh.points[outer].mean(axis=1)
-        return outer[int(np.flatnonzero(middle[:, 0] < 0.0)[0]) :]
+        return self.mesh.outer_segments[self.layout.pressed(self.mesh) :]
 
 
-GUIDE_ARC, GUIDE_TOP = 75.0, 118.0
-"""Half the angle of the arc on which contact is first looked for, and where the top begins."""
-
-EDGE_ANGLES = range(27, 70, 3)
-"""Where a section meets the edge of the gap under pressure, degrees from the bottom."""
-
-LONG_OPEN = 42
-"""The same where the edge of an open gap is to be resolved too."""
-
-LONG_PLACED = 33
-"""Segments at density 1 of an arc that the contact has placed."""
-
-
-def uniform_disc(p: ORing) -> Disc:
-    """The circular section with equal segments on its arc, the given one or a wide guide."""
-    radius = 0.5 * p.section_diameter
-    centre = 0.0, 0.5 * p.inner_diameter + radius
-    if p.given_arc:
-        return Disc(*centre, radius, *p.given_arc)
-    long = LONG_OPEN if p.opens else LONG_PLACED
-    guide = Disc(*centre, radius, -GUIDE_ARC, GUIDE_ARC, top=GUIDE_TOP, long=long)
-    return replace(guide, spacing=_fine_at_edge(guide)) if p.opens else guide
-
-
-def _fine_at_edge(guide: Disc) -> Spacing:
-    """Of a guide: fine where the section may meet the edge of an open gap, wherever that is."""
-    degree = radians(1.0) * guide.radius
-    spots = [Spot((GUIDE_ARC + angle) * degree) for angle in EDGE_ANGLES]
-    length = 2.0 * GUIDE_ARC * degree
-    return graded(length, spots, 2 * guide.long, coarsest=0.05 * length, rate=0.3)
-
-
-def disc_section(
-    p: ORing, disc: Disc | None = None, density: Fraction | None = None
+def seal_section(
+    p: ORing, layout: Layout | None = None, density: Fraction | None = None
 ) -> SealSection:
-    """The circular section of a case.
+    """The section of a case.
 
-    disc: how the mesh is laid out, with equal segments if left out. density: instead of the case's.
+    layout: of the mesh, with equal segments if left out. density: instead of the case's.
     """
-    disc = disc or uniform_disc(p)
-    return SealSection(disc, disc_mesh(disc, density or p.density), placed=p.given_arc is None)
+    layout = layout or uniform_layout(p)
+    return SealSection(layout, layout.mesh(density or p.density), placed=p.given_arc is None)

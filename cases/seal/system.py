@@ -175,7 +175,7 @@ def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | Non
         edge = {**wall, "lip": 0.5 * p.rod_diameter + p.extrusion_gap}
         return {"offset": 0.0, "force_weight": 1.0, "friction": p.housing_friction, **edge}
     if block.name == "rotation":
-        centre = {"centre_z": 0.0, "centre_r": section.disc.centre_r}
+        centre = dict(zip(("centre_z", "centre_r"), section.layout.centroid, strict=True))
         return {**centre, "polar_moment": section.polar_moment, "angle": 0.0}
     if block.name == "hold":
         return {"area": section.area, "place": 0.0}

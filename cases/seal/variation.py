@@ -13,9 +13,10 @@ from typing import Any
 from softehl.cases.seal import materials
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.given import number, times
+from softehl.cases.seal.layout import RoundLayout, uniform_layout
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.section import SealSection, uniform_disc
+from softehl.cases.seal.section import SealSection
 from softehl.runtime.fem.design import Inputs, rate_of
 from softehl.runtime.mesh.sections import SectionMesh
 
@@ -84,9 +85,17 @@ def _varies(value: Any) -> bool:
 
 def frozen(system: SealSystem, p: ORing) -> SealSystem:
     """The system of other parameters on the same mesh, moved with the measures of its section."""
-    old, new = system.section, uniform_disc(p)
-    disc = replace(old.disc, centre_z=new.centre_z, centre_r=new.centre_r, radius=new.radius)
-    unit = (old.mesh.points - old.disc.centre) / old.disc.radius
+    old, new = system.section.layout, uniform_layout(p)
+    assert isinstance(old, RoundLayout)
+    assert isinstance(new, RoundLayout)
+    disc = replace(
+        old.disc,
+        centre_z=new.disc.centre_z,
+        centre_r=new.disc.centre_r,
+        radius=new.disc.radius,
+    )
+    mesh = system.mesh
+    unit = (mesh.points - old.disc.centre) / old.disc.radius
     points = disc.centre + disc.radius * unit
-    mesh = SectionMesh(points, old.mesh.quads, old.mesh.boundary, old.mesh.arc)
-    return system.moved(p, SealSection(disc, mesh, old.placed))
+    moved = SectionMesh(points, mesh.quads, mesh.boundary, mesh.arc)
+    return system.moved(p, SealSection(RoundLayout(disc), moved, system.section.placed))

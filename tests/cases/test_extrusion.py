@@ -57,7 +57,7 @@ def test_the_mesh_is_fine_where_the_section_meets_the_edge() -> None:
     """A quarter of the fillet: over the whole of the guide's edge, at the air end of the film."""
     p = ORing(density=2, extrusion_gap=0.1)
     guide = build_system(p.model_copy(update={"mesh": "uniform"}))
-    z, r = (guide.mesh.points[guide.mesh.arc_nodes] - guide.section.disc.centre).T
+    z, r = (guide.mesh.points[guide.mesh.arc_nodes] - np.array(guide.section.layout.centroid)).T
     angle = np.degrees(np.arctan2(z, -r))
     edge = (angle[:-1] > 27.0) & (angle[1:] < 69.0)
     assert sizes(guide)[: guide.mesh.arc][edge].max() < 0.3 * p.corner_fillet

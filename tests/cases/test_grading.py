@@ -7,7 +7,8 @@ import pytest
 
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.grading import arc_positions, contact_edges, graded_disc
+from softehl.cases.seal.grading import contact_edges, graded_layout
+from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.method import run
 from softehl.cases.seal.order import OrderPair
 from softehl.cases.seal.parameters import ORing
@@ -33,7 +34,7 @@ def _curve(**changes: object) -> Outcome:
 
 def test_the_edge_of_a_pressure_like_a_square_root_is_found_exactly() -> None:
     system = build_system(oring(density=2))
-    s = arc_positions(system.section)
+    s = system.section.places
     x = system.at_rest()
     first, last = 0.413, 1.777
     system.rod_multipliers(x)[:] = -np.sqrt(np.maximum(np.minimum(s - first, last - s), 0.0))
@@ -45,12 +46,12 @@ def test_the_edge_of_a_pressure_like_a_square_root_is_found_exactly() -> None:
 def test_a_section_that_does_not_touch_keeps_equal_segments() -> None:
     system = build_system(oring(density=1))
     assert contact_edges(system, system.at_rest()) == []
-    assert graded_disc(system, system.at_rest()) == system.section.disc
+    assert graded_layout(system, system.at_rest()) == system.section.layout
 
 
 def test_segments_are_finest_at_the_edges_of_the_contact() -> None:
     system, x = _contact(2)
-    s = arc_positions(system.section)
+    s = system.section.places
     sizes, middle = np.diff(s), 0.5 * (s[1:] + s[:-1])
     for edge in contact_edges(system, x):
         nearest = np.abs(middle - edge.place).argmin()
@@ -62,11 +63,12 @@ def test_segments_are_finest_at_the_edges_of_the_contact() -> None:
 
 def test_a_graded_mesh_is_valid_and_its_boundary_is_round() -> None:
     system, x = _contact(2)
-    disc = system.section.disc
+    assert isinstance(system.section.layout, RoundLayout)
+    disc = system.section.layout.disc
     radii = np.hypot(*(system.mesh.points[system.mesh.boundary] - disc.centre).T)
     assert radii == pytest.approx(np.full(len(radii), disc.radius), rel=1e-13)
     assert corner_jacobians(system.mesh).min() > 0.1
-    assert graded_disc(system, x).spacing is not None
+    assert graded_layout(system, x).spacing is not None
 
 
 def test_the_same_contact_is_found_on_both_meshes() -> None:
@@ -95,10 +97,10 @@ def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
 
 def test_a_mesh_may_be_asked_for() -> None:
     assert ORing().mesh == "graded"
-    assert _contact(1, "uniform")[0].section.disc.spacing is None
+    assert _contact(1, "uniform")[0].section.layout.spacing is None
 
 
 def test_another_pressure_order_has_the_same_mesh() -> None:
     system, _ = _contact(2)
-    low = build_system(oring(density=2, mesh="graded", pressure_order=2), system.section.disc)
+    low = build_system(oring(density=2, mesh="graded", pressure_order=2), system.section.layout)
     assert OrderPair.of(low).high.mesh.points.tolist() == system.mesh.points.tolist()

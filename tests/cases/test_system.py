@@ -8,6 +8,7 @@ import pytest
 
 from softehl.cases.seal.declared import Block, Numbering
 from softehl.cases.seal.equations import SealSystem, build_system
+from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.scales import film_flux
 from softehl.cases.seal.section import SealSection
@@ -21,7 +22,7 @@ TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16:
 @pytest.mark.parametrize("d", TABLE_2)
 def test_unknowns_of_table_2(d: int) -> None:
     disc = Disc(0.0, 26.96, 1.765, -34.0, 43.0)
-    section = SealSection(disc, disc_mesh(disc, d))
+    section = SealSection(RoundLayout(disc), disc_mesh(disc, d))
     layout = Numbering.of(FIELDS, oring(density=1), section).layout
     total, pressures = TABLE_2[d]
     assert layout.count(PRESSURE) == pressures == 108 * d + 1

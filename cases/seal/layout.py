@@ -1,0 +1,186 @@
+"""How the mesh of a section is laid out: everything that knows the shape of a seal.
+
+`RoundLayout` is the O-grid of the paper in a disc. Whatever comes behind asks a `Layout` for its
+mesh, for places along the part of its boundary that is lubricated, and for what its shape measures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import pi, radians
+from typing import Protocol
+
+import numpy as np
+
+from softehl.cases.seal.parameters import ORing
+from softehl.runtime.arrays import Array
+from softehl.runtime.mesh.sections import SHORT, Disc, SectionMesh, disc_mesh
+from softehl.runtime.mesh.spacing import Spacing, Spot, graded
+
+_DENSITY = 2  # for which the sizes are chosen; other densities divide or join its segments
+
+
+class Layout(Protocol):
+    """A section in its reference configuration and how a mesh is laid into it; lengths in mm."""
+
+    @property
+    def long(self) -> int:
+        """Segments of the arc at density 1."""
+
+    @property
+    def spacing(self) -> Spacing | None:
+        """That of the nodes along the arc, None where they are equally spaced."""
+
+    @property
+    def area(self) -> float:
+        """Area of the section, mm^2."""
+
+    @property
+    def centroid(self) -> tuple[float, float]:
+        """Its centroid (z, r), mm."""
+
+    @property
+    def polar_moment(self) -> float:
+        """Polar moment of area about the centroid, mm^4."""
+
+    @property
+    def contour(self) -> Array:
+        """Points (n, 2) in (z, r) of its boundary, for pictures."""
+
+    def mesh(self, density: int | Fraction) -> SectionMesh:
+        """The mesh of a density."""
+
+    def places(self, mesh: SectionMesh) -> Array:
+        """Lengths (arc nodes,) along the undeformed arc from its sealed end, mm."""
+
+    def pressed(self, mesh: SectionMesh) -> int:
+        """The first outer segment that the sealed pressure acts on, which it does up to the arc."""
+
+    def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
+        """The same laid out on an arc whose ends are at these places of that of another one."""
+
+    def graded(self, spacing: Spacing, long: int, first: float | None = None) -> Layout:
+        """With these segments on the arc.  first: size of the one beyond its air end, mm."""
+
+
+GUIDE_ARC, GUIDE_TOP = 75.0, 118.0
+"""Half the angle of the arc on which contact is first looked for, and where the top begins."""
+
+EDGE_ANGLES = range(27, 70, 3)
+"""Where a section meets the edge of the gap under pressure, degrees from the bottom."""
+
+LONG_OPEN = 42
+"""The same where the edge of an open gap is to be resolved too."""
+
+LONG_PLACED = 33
+"""Segments at density 1 of an arc that the contact has placed."""
+
+_SIDES = 25.0  # degrees that the side blocks need at least
+_CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
+
+
+@dataclass(frozen=True)
+class RoundLayout:
+    """A disc under an O-grid."""
+
+    disc: Disc
+
+    @property
+    def long(self) -> int:
+        """See `Layout`."""
+        return self.disc.long
+
+    @property
+    def spacing(self) -> Spacing | None:
+        """See `Layout`."""
+        return self.disc.spacing
+
+    @property
+    def area(self) -> float:
+        """See `Layout`."""
+        return pi * self.disc.radius**2
+
+    @property
+    def centroid(self) -> tuple[float, float]:
+        """See `Layout`."""
+        return self.disc.centre_z, self.disc.centre_r
+
+    @property
+    def polar_moment(self) -> float:
+        """See `Layout`."""
+        return 0.5 * pi * self.disc.radius**4
+
+    @property
+    def contour(self) -> Array:
+        """See `Layout`."""
+        angles = np.linspace(0.0, 2.0 * pi, 181)
+        return np.asarray(self.disc.centre + self.disc.radius * self.disc.direction(angles))
+
+    def mesh(self, density: int | Fraction) -> SectionMesh:
+        """See `Layout`."""
+        return disc_mesh(self.disc, density)
+
+    def places(self, mesh: SectionMesh) -> Array:
+        """See `Layout`."""
+        z, r = (mesh.points[mesh.arc_nodes] - self.disc.centre).T
+        angle = np.arctan2(z, -r)
+        return np.asarray(self.disc.radius * (angle - angle[0]))
+
+    def pressed(self, mesh: SectionMesh) -> int:
+        """See `Layout`: from the crown on."""
+        middle = mesh.points[mesh.outer_segments].mean(axis=1)
+        return int(np.flatnonzero(middle[:, 0] < 0.0)[0])
+
+    def between(self, old: Layout, ends: tuple[float, float]) -> RoundLayout:
+        """See `Layout`."""
+        assert isinstance(old, RoundLayout)
+        before = old.disc
+        start, end = (before.arc_start + float(np.degrees(e / before.radius)) for e in ends)
+        return RoundLayout(replace(self.disc, arc_start=start, arc_end=end))
+
+    def graded(self, spacing: Spacing, long: int, first: float | None = None) -> RoundLayout:
+        """See `Layout`."""
+        start, end = self.disc.arc_start, self.disc.arc_end
+        growth, top = _ROW_GROWTH, max(_TOP, end + _SIDES, _SIDES - start)
+        if first is not None:
+            side = self.disc.radius * np.radians(top - end)
+            growth = _growth_to(first / side, SHORT * _DENSITY)
+        return RoundLayout(
+            replace(
+                self.disc,
+                spacing=spacing,
+                long=long,
+                top=top,
+                corner_radius=_CORNERS,
+                layer_growth=_LAYER_GROWTH,
+                row_growth=growth,
+            )
+        )
+
+
+def _growth_to(first: float, count: int) -> float:
+    """Ratio of the last to the first of `count` parts of a line, the first of them this part."""
+    growth = _ROW_GROWTH
+    while np.expm1(np.log(growth) / count) / (growth - 1.0) > first:
+        growth *= 1.1
+    return growth
+
+
+def uniform_layout(p: ORing) -> Layout:
+    """The section of a case with equal segments on its arc, the given one or a wide guide."""
+    radius = 0.5 * p.section_diameter
+    centre = 0.0, 0.5 * p.inner_diameter + radius
+    if p.given_arc:
+        return RoundLayout(Disc(*centre, radius, *p.given_arc))
+    long = LONG_OPEN if p.opens else LONG_PLACED
+    guide = Disc(*centre, radius, -GUIDE_ARC, GUIDE_ARC, top=GUIDE_TOP, long=long)
+    return RoundLayout(replace(guide, spacing=_fine_at_edge(guide)) if p.opens else guide)
+
+
+def _fine_at_edge(guide: Disc) -> Spacing:
+    """Of a guide: fine where the section may meet the edge of an open gap, wherever that is."""
+    degree = radians(1.0) * guide.radius
+    spots = [Spot((GUIDE_ARC + angle) * degree) for angle in EDGE_ANGLES]
+    length = 2.0 * GUIDE_ARC * degree
+    return graded(length, spots, 2 * guide.long, coarsest=0.05 * length, rate=0.3)
