@@ -211,7 +211,7 @@ class SealSystem:
 
     def axial_force(self, x: Array) -> float:
         """Force that the hold exerts on the section, to the air side, N."""
-        return -float(x[self.layout.part(AXIAL)][0])
+        return 0.0 - float(x[self.layout.part(AXIAL)][0])
 
     @property
     def film_ends(self) -> Integers:

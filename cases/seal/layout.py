@@ -1,7 +1,7 @@
 """How the mesh of a section is laid out: everything that knows the shape of a seal.
 
 `RoundLayout` is the O-grid of the paper in a disc. Whatever comes behind asks a `Layout` for its
-mesh, for places along the part of its boundary that is lubricated, and for what its shape measures.
+mesh and for places along the part of its boundary that is lubricated.
 """
 
 from __future__ import annotations
@@ -31,18 +31,6 @@ class Layout(Protocol):
     @property
     def spacing(self) -> Spacing | None:
         """That of the nodes along the arc, None where they are equally spaced."""
-
-    @property
-    def area(self) -> float:
-        """Area of the section, mm^2."""
-
-    @property
-    def centroid(self) -> tuple[float, float]:
-        """Its centroid (z, r), mm."""
-
-    @property
-    def polar_moment(self) -> float:
-        """Polar moment of area about the centroid, mm^4."""
 
     @property
     def contour(self) -> Array:
@@ -95,21 +83,6 @@ class RoundLayout:
     def spacing(self) -> Spacing | None:
         """See `Layout`."""
         return self.disc.spacing
-
-    @property
-    def area(self) -> float:
-        """See `Layout`."""
-        return pi * self.disc.radius**2
-
-    @property
-    def centroid(self) -> tuple[float, float]:
-        """See `Layout`."""
-        return self.disc.centre_z, self.disc.centre_r
-
-    @property
-    def polar_moment(self) -> float:
-        """See `Layout`."""
-        return 0.5 * pi * self.disc.radius**4
 
     @property
     def contour(self) -> Array:

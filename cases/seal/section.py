@@ -71,15 +71,21 @@ class SealSection:
         """Nodes at which the sealed pressure of the contact ends: on the arc, at the crown."""
         return int(self.mesh.arc_nodes[self.lowest]), int(self._sealed_side()[0, 0])
 
-    @property
-    def area(self) -> float:
-        """Area of the section, mm^2."""
-        return self.layout.area
+    @cached_property
+    def moments(self) -> tuple[float, Array, float]:
+        """Area, mm^2; centroid (2,) in (z, r), mm; polar moment about it, mm^4.
 
-    @property
-    def polar_moment(self) -> float:
-        """Polar moment of area about the centroid, mm^4."""
-        return self.layout.polar_moment
+        Of the section as it is meshed, so that what holds its mean rotation is a pure couple.
+        """
+        corner = self.mesh.points[self.mesh.boundary]
+        near = corner - corner[0]
+        after = np.roll(near, -1, axis=0)
+        cross = near[:, 0] * after[:, 1] - after[:, 0] * near[:, 1]
+        area = 0.5 * float(cross.sum())
+        centre = cross @ (near + after) / (6.0 * area)
+        squares = (near**2 + near * after + after**2).sum(axis=1)
+        polar = float(cross @ squares) / 12.0 - area * float(centre @ centre)
+        return area, corner[0] + centre, polar
 
     @property
     def places(self) -> Array:

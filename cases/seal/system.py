@@ -174,11 +174,12 @@ def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | Non
         wall = {"wall": p.groove_centre + 0.5 * p.groove_width, "fillet": p.corner_fillet}
         edge = {**wall, "lip": 0.5 * p.rod_diameter + p.extrusion_gap}
         return {"offset": 0.0, "force_weight": 1.0, "friction": p.housing_friction, **edge}
+    area, (z, r), polar_moment = section.moments
     if block.name == "rotation":
-        centre = dict(zip(("centre_z", "centre_r"), section.layout.centroid, strict=True))
-        return {**centre, "polar_moment": section.polar_moment, "angle": 0.0}
+        centre = {"centre_z": float(z), "centre_r": float(r)}
+        return {**centre, "polar_moment": polar_moment, "angle": 0.0}
     if block.name == "hold":
-        return {"area": section.area, "place": 0.0}
+        return {"area": area, "place": 0.0}
     return None
 
 

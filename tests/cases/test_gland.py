@@ -37,14 +37,20 @@ def test_a_stretched_ring_in_a_wide_groove_leans_on_the_wall_of_the_air_side() -
     assert numbers["stretch_percent"] == pytest.approx(1.91, abs=0.01)
     assert numbers["fill_percent"] == pytest.approx(68.1, abs=0.1)
     assert numbers["sealed_wall_N"] == numbers["hold_N"] == 0.0
-    assert numbers["sealed_pressure_N"] == pytest.approx(-numbers["air_wall_N"], rel=2e-6)
+    assert numbers["sealed_pressure_N"] == pytest.approx(-numbers["air_wall_N"], rel=1e-10)
+    assert abs(numbers["axial_sum_N"]) < 1e-10 * numbers["sealed_pressure_N"]
 
 
 def test_without_pressure_both_strokes_are_mirror_images() -> None:
     outcome = solved(sealed_pressure=0.0)
     out, back = outcome.states
     assert out.h_star_um == pytest.approx(back.h_star_um, rel=1e-10)
+    assert out.h_min_um == pytest.approx(back.h_min_um, rel=1e-10)
     assert out.rod_friction_N == pytest.approx(-back.rod_friction_N, rel=1e-10)
+    assert out.profile.x_mm == pytest.approx(-back.profile.x_mm[::-1], abs=1e-10)
+    for name in ("h_um", "p_MPa"):
+        there, mirrored = getattr(out.profile, name), getattr(back.profile, name)[::-1]
+        assert there == pytest.approx(mirrored, abs=1e-10 * there.max())
     assert abs(outcome.numbers["hold_N"]) < 1e-9
 
 

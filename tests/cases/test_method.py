@@ -186,13 +186,13 @@ def test_low_sealed_pressure_works_in_both_strokes(p_s: float) -> None:
 
 
 def test_a_collapsed_film_is_labelled_and_the_end_of_its_path_named() -> None:
-    """Density 1 at 3 MPa: collapsed at once, and the path turns back at 686 mm/s."""
+    """Density 1 at 3 MPa: collapsed at once, and the path turns back at 672 mm/s."""
     speeds = (1600.0, 400.0, 50.0)
     parameters = oring(density=1, sealed_pressure=3.0, stroke="in", speeds=speeds)
     outcome = run(parameters, Recorder())
     assert [(s.rod_speed_mm_s, s.verdict) for s in outcome.states] == [(-1600.0, COLLAPSED)]
     assert outcome.status is Status.STEP_TOO_SMALL
-    assert "stroke in: falling speed -50 was not reached, only -685" in outcome.message
+    assert "stroke in: falling speed -50 was not reached, only -672" in outcome.message
     assert "finer mesh" in outcome.message
 
 
@@ -206,7 +206,7 @@ def test_a_film_that_collapses_on_the_way_is_labelled_from_there_on() -> None:
 
 def test_a_free_section_rolls_until_no_moment_holds_it() -> None:
     # without shear stress hardly anything turns it, so that the path is not cut short
-    parameters = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (6400.0,)}
+    parameters = {"density": 1, "sealed_pressure": 0.6, "stroke": "out", "speeds": (6400.0,)}
     free, fixed = (
         run(oring(rotation=rotation, shear_traction=False, **parameters), Recorder())
         for rotation in ("free", "fixed")

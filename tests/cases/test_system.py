@@ -79,6 +79,29 @@ def test_axial_force_of_the_sealed_pressure_is_pressure_times_projected_area() -
     assert force == pytest.approx(2.0 * np.pi * (top**2 - bottom**2), rel=2e-3)
 
 
+def test_what_holds_the_rotation_is_a_pure_couple() -> None:
+    """About the centroid of the mesh, which is not that of the circle where its nodes are not even.
+
+    About the circle's own centre it would push the section along the rod.
+    """
+    system = build_system(oring(density=2))
+    area, centroid, polar_moment = system.section.moments
+    p = system.parameters
+    radius = 0.5 * p.section_diameter
+    assert area == pytest.approx(np.pi * radius**2, rel=3e-3)
+    assert polar_moment == pytest.approx(0.5 * np.pi * radius**4, rel=6e-3)
+    x = system.at_rest()
+    x[system.layout.part("rotation")] = 1.0
+    block = system.problem.assembler.block("rotation")
+
+    def push(centre: np.ndarray) -> float:
+        moments = block.residual(x, np.array([*centre, polar_moment, 0.0]))
+        return abs(float(moments[:, [0, 2, 4, 6]].sum()))
+
+    assert push(centroid) < 1e-12
+    assert push(np.array([0.0, 0.5 * p.inner_diameter + radius])) > 1e-6
+
+
 def test_obstacles_touch_the_free_section_where_they_should() -> None:
     system = build_system(oring(density=2))
     points = system.mesh.points
