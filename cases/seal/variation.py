@@ -18,7 +18,6 @@ from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection
 from softehl.runtime.fem.design import Inputs, rate_of
-from softehl.runtime.mesh.sections import SectionMesh
 
 SPEED, PRESSURE_KEY = "U", "sealed_pressure"
 """Parameters of a film that are no numbers of the case alone: the rod speed, as it is named in
@@ -97,5 +96,7 @@ def frozen(system: SealSystem, p: ORing) -> SealSystem:
     mesh = system.mesh
     unit = (mesh.points - old.disc.centre) / old.disc.radius
     points = disc.centre + disc.radius * unit
-    moved = SectionMesh(points, mesh.quads, mesh.boundary, mesh.arc)
+    scale = disc.radius / old.disc.radius
+    places, length = scale * mesh.places, scale * mesh.length
+    moved = replace(mesh, points=points, places=places, length=length)
     return system.moved(p, SealSection(RoundLayout(disc), moved, system.section.placed))

@@ -6,9 +6,10 @@ of density d are among those of density 2 d, and every boundary node lies exactl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
-from math import cos, radians, sin
+from math import cos, pi, radians, sin
 
 import numpy as np
 
@@ -69,13 +70,18 @@ class SectionMesh:
     points: (V, 2) reference (z, r) in mm. quads: (Q, 4), counterclockwise. boundary: (B,) nodes in
     counterclockwise order from the first node of the arc; segment i joins boundary[i] and
     boundary[i + 1] (cyclic), its outward normal is (dr, -dz)/length. arc: number of segments
-    on the refined arc, which come first.
+    on the refined arc, which come first. places: (B,) arc lengths of the boundary nodes on the
+    undeformed outline, mm, rising, from that of the first node. length: of the whole outline, mm,
+    by which places are periodic. regions: name -> numbers of the quads that are of one material.
     """
 
     points: Array
     quads: Integers
     boundary: Integers
     arc: int
+    places: Array
+    length: float
+    regions: Mapping[str, Integers] = field(default_factory=dict)
 
     @property
     def segments(self) -> Integers:
@@ -116,25 +122,30 @@ def disc_mesh(disc: Disc, density: int | Fraction) -> SectionMesh:
     loop = _loop(disc, long, short)
     ring = disc.centre + disc.radius * disc.direction(loop[0])
     inner = loop[1]
-    depth = _graded(layers, disc.layer_growth)
+    depth = graded_steps(layers, disc.layer_growth)
     layer_points = ring[None] + depth[:-1, None, None] * (inner - ring)[None]
     block = _central_block(disc, inner, long, short)
     points = np.concatenate([layer_points.reshape(-1, 2), block.reshape(-1, 2)])
     quads = np.concatenate([_layer_quads(long, short, layers), _block_quads(long, short, layers)])
     boundary = np.arange(2 * (long + short))
-    return SectionMesh(points, quads, boundary, long)
+    places = disc.radius * loop[0]
+    return SectionMesh(points, quads, boundary, long, places, 2.0 * pi * disc.radius)
 
 
 def corner_jacobians(mesh: SectionMesh) -> Array:
     """Jacobian determinants (Q, 4) at the corners of every quadrilateral, relative to its area."""
-    x = mesh.points[mesh.quads]
+    return corner_shares(mesh.points[mesh.quads])
+
+
+def corner_shares(x: Array) -> Array:
+    """The same of quadrilaterals with corners x (Q, 4, 2)."""
     forward, backward = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
     cross = forward[..., 0] * backward[..., 1] - forward[..., 1] * backward[..., 0]
     return np.asarray(cross / (0.5 * np.abs(cross.sum(axis=1, keepdims=True)) * 0.5))
 
 
-def _graded(count: int, growth: float) -> Array:
-    """0 to 1 in `count` steps; the slope grows exponentially from one end to the other."""
+def graded_steps(count: int, growth: float) -> Array:
+    """0 to 1 in `count` steps, (count + 1,); their lengths grow exponentially, in all by growth."""
     t = np.arange(count + 1) / count
     k = np.log(growth)
     return np.asarray(np.expm1(k * t) / np.expm1(k)) if growth != 1.0 else t
@@ -151,7 +162,7 @@ def _loop(disc: Disc, long: int, short: int) -> tuple[Array, Array]:
     a = disc.corners
     low, high = (disc.radius * c for c in disc.corner_radius)
     bottom, sides, top = disc.bulge
-    rows = _graded(short, disc.row_growth)
+    rows = graded_steps(short, disc.row_growth)
     pieces = [
         _edge(disc, a[0], a[1], low, low, bottom, _columns(disc, long)),
         _edge(disc, a[1], a[2], low, high, sides, rows),
@@ -179,7 +190,7 @@ def _central_block(disc: Disc, loop: Array, long: int, short: int) -> Array:
     right = loop[long : long + short + 1]
     top = loop[long + short : 2 * long + short + 1][::-1]
     left = np.concatenate([loop[2 * long + short :], loop[:1]])[::-1]
-    t = _graded(short, disc.row_growth)[:, None, None]
+    t = graded_steps(short, disc.row_growth)[:, None, None]
     s = _columns(disc, long)[:, None]
     s = s + t * ((np.arange(long + 1) / long)[:, None] - s)
     edges = (1 - t) * bottom[None] + t * top[None] + (1 - s) * left[:, None] + s * right[:, None]

@@ -1,7 +1,7 @@
 """From one mesh of a section to another: nodal values, element values, values along the boundary.
 
 For meshes of the same circle whose nodes lie anywhere; `runtime.mesh.prolongation` is sharper where
-one mesh holds the nodes of the other.
+one mesh holds the nodes of the other, `runtime.mesh.carrying` is for sections of any outline.
 """
 
 from __future__ import annotations

@@ -1,0 +1,263 @@
+"""A quadrilateral mesh of a section of any outline: layers along it, and a graded inside.
+
+A strip of layers follows the whole outline. What it encloses is filled with triangles, each of
+which is three quadrilaterals; of a finer mesh each of these is divided k by k, so that the meshes
+of density d and 2 d are of one family. Every node of the boundary lies exactly on the outline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from math import ceil, radians
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.mesh.mesh import MeshError
+from softehl.runtime.mesh.outline import Outline, Shape
+from softehl.runtime.mesh.sections import LAYERS, SectionMesh, corner_shares, graded_steps
+from softehl.runtime.mesh.spacing import Spacing
+from softehl.runtime.mesh.subdivide import subdivided
+from softehl.runtime.mesh.triangles import triangulate
+
+AROUND = 60
+"""The outline is at least so many of its longest segments long, at density 1."""
+
+DEPTH = 0.035
+"""Thickness of the strip, in twice the area over the length of the outline (radius of a disc)."""
+
+GROWTH = 8.0
+"""Ratio of the thickness of the innermost to the outermost layer."""
+
+WORST = 0.3
+"""Least Jacobian at a corner, relative to the area, that a mesh may have."""
+
+_RATE = 0.5  # growth of the segments outside the film with the distance from it, at density 1
+_SMOOTH = 0.02  # mm to either side over which normals are means at least
+_PINNED = radians(15.0)  # a corner that turns by more has a node
+_STATIONS = 720  # at which the thickness of the section is looked at
+_CLEAREST = 0.3  # of the radius of the largest ball inside that touches a place: strip there
+_SEGMENT, _ACROSS = 0.5, 1.5  # the same, and of the ball outside: a segment there
+_TURN = 0.4  # rad, by which the outline turns on a segment
+_TRIES = 6  # at a strip that does not fold, each half as thick
+_COARSEST_TRIANGLES = Fraction(2, 3)  # density of the triangles: finer meshes divide theirs
+
+
+def outline_mesh(
+    shape: Shape,
+    film: tuple[float, float],
+    spacing: Spacing | None,
+    long: int,
+    density: int | Fraction,
+    growth: float = GROWTH,
+) -> SectionMesh:
+    """The mesh of a section, with `long` d segments between the places of the film.
+
+    film: (s0, s1) on the outline, mm, counterclockwise. spacing: of the nodes there, None = equal.
+    density: a multiple of 1/3, at least 2/3, that makes `long` d whole. growth: of the layers.
+    Raises MeshError for others, and where no mesh of sound elements is found.
+    """
+    layout = _Layout.of(shape.outline, film, spacing, long)
+    _require_density(density, long)
+    k = _divisions(Fraction(density))
+    for halvings in range(_TRIES):
+        # the coarsest of its family decides how thick the strip is
+        coarse = _mesh(layout, Fraction(density) / k, 0.5**halvings, growth)
+        mesh = _mesh(layout, Fraction(density), 0.5**halvings, growth) if coarse else None
+        if mesh:
+            return mesh
+    raise MeshError(
+        f"no sound mesh of {shape.name} at density {density} with {long} segments of its film: no "
+        f"corner of an element may have less than {WORST:g} of its share; use a higher density, a "
+        "finer spacing or rounder corners"
+    )
+
+
+def _mesh(layout: _Layout, density: Fraction, part: float, growth: float) -> SectionMesh | None:
+    """The mesh with a strip of this part of its thickness, if its elements are sound."""
+    rows = _strip(layout, density, part, growth)
+    strip = rows.reshape(-1, 2)[_strip_quads(*rows.shape[:2])]
+    if not corner_shares(strip).min() >= WORST:
+        return None
+    try:
+        mesh = _filled(layout, rows, density)
+    except MeshError:
+        return None
+    return mesh if corner_shares(mesh.points[mesh.quads]).min() >= WORST else None
+
+
+def _require_density(density: int | Fraction, long: int) -> None:
+    if density < Fraction(2, 3) or (3 * density) % 1 or (long * density) % 1:
+        raise MeshError(
+            f"outline_mesh: density {density} is not allowed with {long} segments; it is a "
+            "multiple of 1/3, at least 2/3, that divides them"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    """Where the nodes of the boundary lie, for every density.
+
+    parts: begin and end of each part of the outline, rising from the start of the film on, its
+    spacing and number of segments at density 1; the film is the first. reach: (stations,) radius
+    of the largest ball inside that touches the outline at equal distances from s = 0 on.
+    """
+
+    outline: Outline
+    parts: tuple[tuple[float, float, Spacing | None, int], ...]
+    reach: Array
+
+    @classmethod
+    def of(
+        cls, outline: Outline, film: tuple[float, float], spacing: Spacing | None, long: int
+    ) -> _Layout:
+        length = outline.length
+        first = film[0]
+        last = first + (film[1] - first) % length
+        reach, mouth = _ball_radii(outline, 1.0), _ball_radii(outline, -1.0)
+        clear = np.minimum(_SEGMENT * reach, _ACROSS * mouth)
+        ends = np.sort(first + (outline.corners(_PINNED) - first) % length)
+        apart = 0.2 * length / AROUND
+        ends = ends[(ends > last + apart) & (ends < first + length - apart)]
+        places = np.arange(_STATIONS) * length / _STATIONS
+        sizes = _film_sizes(last - first, spacing, long)
+        parts = [(first, last, spacing, long)]
+        for a, b in pairwise([last, *ends.tolist(), first + length]):
+            s = np.linspace(a, b, 2001)
+            bend = np.abs(outline.curvature(s)) + 1e-9 / length
+            size = np.minimum(np.interp(s, places, clear, period=length), _TURN / bend)
+            size = np.minimum(size, length / AROUND)
+            size = np.minimum(size, sizes[1] + _RATE * (s - last))
+            size = np.minimum(size, sizes[0] + _RATE * (first + length - s))
+            index = cumulative_trapezoid(1.0 / size, s, initial=0)
+            count = 3 * max(1, ceil(index[-1] / 3 - 0.2))
+            steps = np.linspace(0.0, index[-1], 27 * 64 + 1)
+            parts.append((a, b, Spacing((np.interp(steps, index, s) - a) / (b - a)), count))
+        if sum(part[3] for part in parts) % 2:
+            longest = max(range(1, len(parts)), key=lambda k: parts[k][3])
+            a, b, own, count = parts[longest]
+            parts[longest] = (a, b, own, count + 3)
+        return cls(outline, tuple(parts), reach)
+
+    def places(self, density: Fraction) -> Array:
+        """s of the boundary nodes, rising from the start of the film."""
+        found = []
+        for a, b, spacing, count in self.parts:
+            n = int(count * density)
+            t = np.arange(n) / n
+            found.append(a + (b - a) * (spacing(t) if spacing else t))
+        return np.concatenate(found)
+
+    def depth(self, s: Array) -> Array:
+        """Thickness (n,) of the strip."""
+        length = self.outline.length
+        most = DEPTH * 2.0 * self.outline.area / length
+        own = np.minimum(most, _CLEAREST * self.reach)
+        s0 = np.arange(_STATIONS) * length / _STATIONS
+        apart = np.abs(s[:, None] - s0[None]) % length
+        apart = np.minimum(apart, length - apart)
+        return np.asarray((own[None] + 0.3 * apart).min(axis=1))
+
+
+def _film_sizes(length: float, spacing: Spacing | None, long: int) -> tuple[float, float]:
+    """Lengths of the first and the last segment of the film at density 1."""
+    if spacing is None:
+        return length / long, length / long
+    at = spacing(np.array([1.0 / long, 1.0 - 1.0 / long]))
+    return length * float(at[0]), length * float(1.0 - at[1])
+
+
+def _normals(outline: Outline, s: Array, over: Array | float) -> Array:
+    """Inward unit normals (n, 2), across the chord between s - over and s + over."""
+    chord = outline.at(s + over) - outline.at(s - over)
+    chord /= np.linalg.norm(chord, axis=1)[:, None]
+    return np.stack([-chord[:, 1], chord[:, 0]], axis=1)
+
+
+def _ball_radii(outline: Outline, side: float) -> Array:
+    """Radii (stations,) of the largest balls that touch the outline: inside (1) or outside (-1).
+
+    What lies within two strips along the outline does not count: corners stay blunt.
+    """
+    s = np.arange(_STATIONS) * outline.length / _STATIONS
+    over = max(_SMOOTH, DEPTH * 2.0 * outline.area / outline.length)
+    x, n = outline.at(s), side * _normals(outline, s, over)
+    away = x[None] - x[:, None]
+    inwards = (away * n[:, None]).sum(axis=2)
+    apart = np.abs(s[:, None] - s[None])
+    apart = np.minimum(apart, outline.length - apart)
+    seen = (inwards > 1e-9) & (apart > 2.0 * over)
+    radii = (away**2).sum(axis=2) / (2.0 * np.where(seen, inwards, 1.0))
+    return np.asarray(radii.min(axis=1, where=seen, initial=np.inf))
+
+
+def _strip(layout: _Layout, density: Fraction, part: float, growth: float) -> Array:
+    """Points (layers + 1, B, 2) from the outline to the front of the strip."""
+    s = layout.places(density)
+    depth = part * layout.depth(s)
+    ring = layout.outline.at(s)
+    inner = ring + depth[:, None] * _normals(layout.outline, s, np.maximum(_SMOOTH, 1.5 * depth))
+    t = graded_steps(int(LAYERS * density), growth)[:, None, None]
+    return np.asarray(ring[None] + t * (inner - ring)[None])
+
+
+def _strip_quads(rows: int, around: int) -> Integers:
+    numbers = np.arange(rows * around).reshape(rows, around)
+    after = np.roll(numbers, -1, axis=1)
+    return np.stack([numbers[:-1], after[:-1], after[1:], numbers[1:]], axis=-1).reshape(-1, 4)
+
+
+def _divisions(density: Fraction) -> int:
+    """k, a power of 2, of a mesh whose triangles, each 3 k^2 elements, are not too coarse."""
+    k = 1
+    while (3 * density / (2 * k)) % 1 == 0 and density / (4 * k) >= _COARSEST_TRIANGLES:
+        k *= 2
+    return k
+
+
+def _filled(layout: _Layout, strip: Array, density: Fraction) -> SectionMesh:
+    """The strip, and what is inside."""
+    rows, around = strip.shape[:2]
+    front, k = strip[-1], _divisions(density)
+    largest = 2.0 * layout.outline.length / AROUND * float(k / density)
+    corners, triangles = triangulate(front[:: 2 * k], 2.0 * largest)
+    points, quads, loop = _three_quads(corners, triangles, front[::k])
+    points, quads, border = subdivided(points, quads, loop, front, k)
+    numbers = np.full(len(points), -1, dtype=np.int64)
+    numbers[border] = (rows - 1) * around + np.arange(around)
+    free = numbers < 0
+    numbers[free] = rows * around + np.arange(int(free.sum()))
+    every = np.concatenate([strip.reshape(-1, 2), points[free]])
+    cells = np.concatenate([_strip_quads(rows, around), numbers[quads]])
+    arc = int(layout.parts[0][3] * density)
+    boundary = np.arange(around)
+    return SectionMesh(every, cells, boundary, arc, layout.places(density), layout.outline.length)
+
+
+def _three_quads(
+    corners: Array, triangles: Integers, front: Array
+) -> tuple[Array, Integers, Integers]:
+    """Points, quadrilaterals about the middles of the triangles' sides, and their outer loop.
+
+    front: (2 m, 2), corners and middles of the sides at the border; the corners come first.
+    """
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
+    edges, which = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
+    middles = len(corners) + which.reshape(-1, 3)
+    centres = len(corners) + len(edges) + np.arange(len(triangles))
+    quads = [
+        np.stack([triangles[:, i], middles[:, i], centres, middles[:, i - 1]], axis=1)
+        for i in range(3)
+    ]
+    m = len(front) // 2
+    ends = np.sort(np.stack([np.arange(m), (np.arange(m) + 1) % m], axis=1), axis=1)
+    base = len(corners) + 1
+    at = np.searchsorted(edges[:, 0] * base + edges[:, 1], ends[:, 0] * base + ends[:, 1])
+    loop = np.stack([np.arange(m), len(corners) + at], axis=1).ravel()
+    ends_and_middles = np.concatenate([corners, corners[edges].mean(axis=1)])
+    ends_and_middles[loop] = front
+    points = np.concatenate([ends_and_middles, ends_and_middles[middles].mean(axis=1)])
+    return points, np.concatenate(quads), loop

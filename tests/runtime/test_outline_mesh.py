@@ -1,0 +1,167 @@
+"""Meshes of outlines: sound elements, exact boundaries, families of one density."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from softehl.runtime.mesh.carrying import (
+    carry_boundary,
+    carry_chain,
+    carry_elements,
+    carry_nodes,
+    places_of,
+)
+from softehl.runtime.mesh.mesh import MeshError
+from softehl.runtime.mesh.outline import Outline, Shape, rounded
+from softehl.runtime.mesh.outline_mesh import outline_mesh
+from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
+from softehl.runtime.mesh.spacing import Spot, graded
+from tests.reference.calling import Part, assemble
+
+DENSITIES = [Fraction(2, 3), 1, Fraction(5, 3), 2, 3, 4]
+WEDGE = [(-1.0, 25.0), (1.2, 25.0), (1.7, 27.6), (0.4, 26.8), (-1.1, 28.5)]
+
+
+def ring() -> Shape:
+    return Shape.facing(Outline.circle((0.0, 26.0), 1.765), (0.0, 27.765), "round")
+
+
+def horn() -> Shape:
+    """Convex and concave, a sharp corner and round ones."""
+    return Shape.facing(Outline(rounded(WEDGE, [0.2, 0.1, 0.0, 0.3, 0.05])), (-1.1, 28.4), "horn")
+
+
+SHAPES = {"ring": ring(), "horn": horn()}
+
+
+def mesh_of(shape: Shape, density: int | Fraction) -> SectionMesh:
+    return outline_mesh(shape, shape.film, None, 33, density)
+
+
+def area(mesh: SectionMesh) -> float:
+    x = mesh.points[mesh.quads]
+    a, b = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
+    return float(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+
+
+@pytest.mark.parametrize("density", DENSITIES)
+@pytest.mark.parametrize("name", SHAPES)
+def test_elements_are_sound_and_fill_the_section(name: str, density: int | Fraction) -> None:
+    shape = SHAPES[name]
+    mesh = mesh_of(shape, density)
+    assert corner_jacobians(mesh).min() >= 0.3
+    assert area(mesh) == pytest.approx(shape.outline.area, rel=0.01 / density**2)
+    edges = np.sort(np.stack([mesh.quads, np.roll(mesh.quads, -1, axis=1)], 2).reshape(-1, 2), 1)
+    kinds, count = np.unique(edges, axis=0, return_counts=True)
+    assert set(count) == {1, 2}
+    assert {tuple(e) for e in kinds[count == 1]} == {tuple(sorted(s)) for s in mesh.segments}
+    assert len(mesh.points) == len(np.unique(mesh.quads))
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_boundary_lies_on_the_outline_at_its_places(name: str) -> None:
+    shape = SHAPES[name]
+    mesh = mesh_of(shape, 2)
+    assert mesh.arc == 66
+    assert mesh.length == shape.outline.length
+    assert mesh.points[mesh.boundary] == pytest.approx(shape.outline.at(mesh.places), abs=1e-12)
+    assert mesh.places[[0, mesh.arc]] == pytest.approx(shape.film)
+    assert (np.diff(mesh.places) > 0.0).all()
+    for corner in shape.outline.kinks:
+        away = (mesh.places - corner + 1e-9) % mesh.length
+        assert away.min() < 1e-8
+
+
+def test_the_nodes_of_the_film_are_where_the_spacing_has_them() -> None:
+    shape = SHAPES["ring"]
+    length = shape.film[1] - shape.film[0]
+    spacing = graded(length, (Spot(1.0), Spot(3.0)), 2 * 33, coarsest=length / 12, rate=0.3)
+    mesh = outline_mesh(shape, shape.film, spacing, 33, 2)
+    expected = shape.film[0] + length * spacing(np.arange(67) / 66)
+    assert mesh.places[:67] == pytest.approx(expected, abs=1e-12)
+    assert corner_jacobians(mesh).min() >= 0.3
+
+
+def test_a_mesh_of_twice_the_density_is_of_the_same_family() -> None:
+    coarse, fine = mesh_of(SHAPES["horn"], 2), mesh_of(SHAPES["horn"], 4)
+    assert len(fine.quads) == 4 * len(coarse.quads)
+    assert fine.places[::2] == pytest.approx(coarse.places, abs=1e-12)
+
+
+def test_a_density_that_does_not_divide_the_segments_is_named() -> None:
+    with pytest.raises(MeshError, match="density 4/3 is not allowed with 32 segments"):
+        outline_mesh(ring(), (-1.0, 1.0), None, 32, Fraction(4, 3))
+    with pytest.raises(MeshError, match="density 1/3 is not allowed"):
+        mesh_of(ring(), Fraction(1, 3))
+
+
+def imbalance(mesh: SectionMesh, stretch: tuple[float, float], bow: float = 0.0) -> float:
+    """Largest force at a node inside under u = (a Z, b R) + bow Z^2 over that on an element."""
+    maps = (2 * mesh.quads[:, :, None] + np.arange(2)).reshape(-1, 8)
+    x = mesh.points[mesh.quads].reshape(-1, 8)
+    part = Part("solid_taylor_mean", x, maps, (3.04, 0.62, 500.0))
+    u = mesh.points * stretch
+    u[:, 1] += bow * mesh.points[:, 0] ** 2
+    total, _ = assemble([part], u.ravel())
+    inside = np.ones(len(mesh.points), dtype=np.bool_)
+    inside[mesh.boundary] = False
+    largest = np.abs(part.elements(u.ravel())[0]).max()
+    return float(np.abs(np.asarray(total).reshape(-1, 2)[inside]).max() / largest)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_patch_test_is_passed(name: str) -> None:
+    mesh = mesh_of(SHAPES[name], 1)
+    assert imbalance(mesh, (0.2, -0.1)) < 1e-11
+    assert imbalance(mesh, (0.2, -0.1), bow=1e-3) > 1e-5
+
+
+def quadratic(points: np.ndarray) -> np.ndarray:
+    z, r = points[:, 0], points[:, 1] - 26.0
+    return np.stack([1.0 + z - r**2, z * r + 0.5 * z**2], axis=1)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_quadratic_fields_are_carried_over_exactly(name: str) -> None:
+    old, shape = mesh_of(SHAPES[name], 2), SHAPES[name]
+    new = outline_mesh(shape, (shape.film[0] + 0.1, shape.film[1] - 0.2), None, 42, 2)
+    moved = carry_nodes(old, new, quadratic(old.points))
+    assert moved == pytest.approx(quadratic(new.points), abs=1e-11)
+    cubic = carry_nodes(old, new, old.points[:, :1] ** 3) - new.points[:, :1] ** 3
+    assert 1e-9 < np.abs(cubic).max() < 1e-2
+    assert carry_nodes(old, old, np.sin(old.points)) == pytest.approx(np.sin(old.points), abs=1e-12)
+    constant = carry_elements(old, new, np.full(len(old.quads), 7.0))
+    assert constant == pytest.approx(np.full(len(new.quads), 7.0))
+
+
+def test_nothing_is_carried_across_a_mouth() -> None:
+    """Two arms 0.3 mm apart, one of which has moved."""
+    arms = [(0, 0), (4, 0), (4, 1.0), (0.5, 1.0), (0.5, 1.3), (4, 1.3), (4, 2.3), (0, 2.3)]
+    shape = Shape(Outline(rounded(arms, 0.1)), (0.0, 4.0), (12.0, 0.0), "fork")
+    old, new = (outline_mesh(shape, shape.film, None, 33, d) for d in (1, Fraction(4, 3)))
+
+    def moved(mesh: SectionMesh) -> np.ndarray:
+        z, r = mesh.points.T
+        return np.where(r > 1.15, np.maximum(z - 0.5, 0.0) ** 2, 0.0)[:, None]
+
+    assert carry_nodes(old, new, moved(old)) == pytest.approx(moved(new), abs=0.02)
+
+
+def test_places_carry_the_boundary() -> None:
+    shape = SHAPES["horn"]
+    old = mesh_of(shape, 2)
+    new = outline_mesh(shape, (shape.film[0] + 0.1, shape.film[1] - 0.2), None, 42, 2)
+
+    def wave(mesh: SectionMesh) -> np.ndarray:
+        return np.asarray(np.cos(2.0 * np.pi * mesh.places / mesh.length))
+
+    assert carry_boundary(old, new, wave(old)) == pytest.approx(wave(new), abs=1e-3)
+    values = np.zeros(len(old.arc_nodes))
+    values[5:9] = -3.0
+    chain = carry_chain(old, new, old.arc_nodes, new.arc_nodes, values)
+    assert -3.0 <= chain.min() < -2.5
+    assert chain.max() <= 0.0
+    outer = carry_chain(old, new, old.outer_nodes, new.outer_nodes, places_of(old, old.outer_nodes))
+    ends = places_of(old, old.outer_nodes)[[0, -1]]
+    assert outer == pytest.approx(np.clip(places_of(new, new.outer_nodes), *ends), abs=1e-12)
