@@ -335,6 +335,28 @@ def stick_slip(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="upper left")
 
 
+def fracture(figure: Figure, space: dict[str, Any]) -> None:
+    early, late, right = figure.subplots(1, 3, width_ratios=[1, 1, 1.5])
+    path, force, pulled = space["path"], space["force"], space["pulled"]
+    for axes, result in ((early, space["loaded"]), (late, path[-1])):
+        mesh, d = result.system.mesh, result.values("d")
+        cells = mesh.cells["quad4"]
+        places = mesh.points + 20 * np.column_stack([result.values(n) for n in ("u_x", "u_y")])
+        for side in (1, -1):
+            drawn = draw_cells(
+                axes, places * [1, side], cells, d[cells].mean(axis=1), cmap="magma_r", clim=(0, 1)
+            )
+        axes.set_title(f"{1e3 * pulled(result.t):.2f} µm")
+    figure.colorbar(drawn, ax=late, label="phase field", shrink=0.8)
+    opened = [1e3 * pulled(r.t) for r in path]
+    right.plot([0, *opened], [0, *force], color=BLUE, label="plate")
+    limits = {"Griffith": (space["griffith"], GREY), "as wide as cells": (space["wide"], ORANGE)}
+    for label, (place, colour) in limits.items():
+        right.axvline(1e3 * place, color=colour, lw=0.8, ls="--", label=label)
+    right.set(xlabel="displacement [µm]", ylabel="force [N]", xlim=(0, 5.3), ylim=(0, 600))
+    right.legend(loc="upper left")
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
@@ -347,6 +369,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "seal": seal,
     "finite-plasticity": finite_plasticity,
     "stick-slip": stick_slip,
+    "fracture": fracture,
 }
 
 if __name__ == "__main__":
