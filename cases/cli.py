@@ -1,4 +1,7 @@
-"""`softehl run`, `keys` and `reproduce`.  What is heavy is imported when a command needs it."""
+"""`softehl run`, `sweep`, `keys`, `design` and `reproduce`.
+
+What is heavy is imported when a command needs it.
+"""
 
 from pathlib import Path
 
@@ -94,6 +97,58 @@ def run(
         if report:
             code = _report_of(target, code, quiet=quiet)
         return code
+
+
+@click.command()
+@click.argument("study", metavar="STUDY.toml")
+@click.option(
+    "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
+)
+@click.option(
+    "--out",
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Folder for table, pictures and runs, results/<name of the study> if left out.",
+)
+@click.option("--resume", is_flag=True, help="Keep the runs that DIR has and run the others.")
+@click.option("--overwrite", is_flag=True, help="Begin anew in a DIR that holds a sweep.")
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(min=1),
+    default=1,
+    help="N runs side by side, in a process each.",
+)
+@click.option("--dask", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
+@click.option("--mpi", is_flag=True, help="Run on the processes that mpiexec started.")
+@click.option("--quiet", is_flag=True, help="No progress.")
+def sweep(
+    study: str,
+    assignments: tuple[str, ...],
+    folder: Path | None,
+    resume: bool,
+    overwrite: bool,
+    jobs: int,
+    dask: str | None,
+    mpi: bool,
+    quiet: bool,
+) -> int:
+    """Run a case many times: a grid, a list, a Latin hypercube or random tolerances of its keys.
+
+    STUDY.toml names the case, its fixed keys and how others vary (docs/many-curves.md). Writes
+    sweep.csv, pictures of each result over each key, and a folder for each run, to DIR. Exit code:
+    0 done, 2 bad input, 3 some runs did not converge (the others are saved).
+    """
+    from softehl.cases.harness.earlier import existing_of
+    from softehl.cases.harness.study_file import read_study
+    from softehl.cases.harness.sweep_command import Workers, sweep_study
+    from softehl.cases.harness.sweep_record import SweepRecord
+
+    read = read_study(study, SHIPPED, assignments)
+    target = Path("results", Path(study).stem) if folder is None else folder
+    existing = existing_of(resume=resume, overwrite=overwrite)
+    return sweep_study(SweepRecord(target, read, existing), Workers(jobs, dask, mpi), quiet=quiet)
 
 
 @click.command(name="report")

@@ -32,6 +32,10 @@ _SHOWN = 60
 _LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end
 
 
+class Contradiction(BadInput):
+    """Keys that are allowed each, but not together."""
+
+
 def read_case(
     given: str,
     shipped: Shipped,
@@ -49,7 +53,7 @@ def read_case(
     for text, origin in typed:
         key, values[key] = read_assignment(text, origin)
         origins[key] = origin
-    return Run(case, _validate(case.parameters, values, origins))
+    return Run(case, validated(case.parameters, values, origins))
 
 
 def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:
@@ -66,7 +70,7 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
     """Split KEY=VALUE and read VALUE as a TOML value; a bare word is a string.  BadInput."""
     key, equals, value = (part.strip() for part in text.partition("="))
     if not key or not equals:
-        raise BadInput(f"{origin} {_shorten(text)}: allowed is KEY=VALUE, as in length=4")
+        raise BadInput(f"{origin} {shortened(text)}: allowed is KEY=VALUE, as in length=4")
     try:
         table = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
@@ -77,30 +81,34 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
     if is_quantity(value) or any(form.fullmatch(value) for form in plain):
         return key, value
     raise BadInput(
-        f"{origin} {key}: {_shorten(value)!r} is not a TOML value; "
+        f"{origin} {key}: {shortened(value)!r} is not a TOML value; "
         f'allowed are a number, true or false, a word, "text" or a list as in [400, 100]'
     )
 
 
 def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     """The case name and the remaining keys of a TOML file."""
+    table = read_toml(
+        given, "no case or file", f"a TOML file or one of {', '.join(shipped)}", shipped
+    )
+    name = table.pop("case", None)
+    if not isinstance(name, str) or name not in shipped:
+        told = "no case" if name is None else f"case = {shown(name)}"
+        allowed = " or ".join(f'case = "{known}"' for known in shipped)
+        raise BadInput(f"{given}: {told}{meant(str(name), shipped)}; allowed: {allowed}")
+    return name, table
+
+
+def read_toml(given: str, missing: str, allowed: str, known: Iterable[str] = ()) -> dict[str, Any]:
+    """What a TOML file holds; the words are for a file that is not there.  Raises BadInput."""
     try:
-        table = tomllib.loads(_text(Path(given)))
+        return tomllib.loads(_text(Path(given)))
     except FileNotFoundError:
-        raise BadInput(
-            f"no case or file {given!r}{meant(given, shipped)}; "
-            f"allowed: a TOML file or one of {', '.join(shipped)}"
-        ) from None
+        raise BadInput(f"{missing} {given!r}{meant(given, known)}; allowed: {allowed}") from None
     except OSError as error:
         raise BadInput(f"cannot read the case file {given!r}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"{given}: not a TOML file: {_shorten(str(error), 200)}") from None
-    name = table.pop("case", None)
-    if not isinstance(name, str) or name not in shipped:
-        shown = "no case" if name is None else f"case = {_shown(name)}"
-        allowed = " or ".join(f'case = "{known}"' for known in shipped)
-        raise BadInput(f"{given}: {shown}{meant(str(name), shipped)}; allowed: {allowed}")
-    return name, table
+        raise BadInput(f"{given}: not a TOML file: {shortened(str(error), 200)}") from None
 
 
 def _text(path: Path) -> str:
@@ -112,20 +120,31 @@ def _text(path: Path) -> str:
     return content.decode("utf-8")
 
 
-def _validate(
-    kind: type[Parameters], values: Mapping[str, Any], origins: Mapping[str, str]
-) -> Parameters:
+def require_known(kind: type[Parameters], keys: Iterable[str], origins: Mapping[str, str]) -> None:
+    """Raise BadInput unless a case has all these keys.  origins: where they were given."""
     known = list(kind.model_fields)
-    for key in values:
+    for key in keys:
         if key not in kind.model_fields:
             raise BadInput(
-                f"{origins[key]}: unknown key {_shorten(key)!r}{meant(key, known)}; "
+                f"{origins[key]}: unknown key {shortened(key)!r}{meant(key, known)}; "
                 f"allowed: {', '.join(known)}"
             )
+
+
+def validated(
+    kind: type[Parameters], values: Mapping[str, Any], origins: Mapping[str, str]
+) -> Parameters:
+    """Checked parameters.  origins: where each key was given.
+
+    Raises BadInput, :class:`Contradiction` where no key alone is wrong.
+    """
+    require_known(kind, values, origins)
     try:
         return kind(**values)
     except ValidationError as error:
-        raise BadInput(_one_line(kind, values, origins, error)) from None
+        words = _one_line(kind, values, origins, error)
+        alone = error.errors(include_url=False, include_context=False)[0]["loc"]
+        raise (BadInput if alone else Contradiction)(words) from None
     except KernelError as error:
         raise BadInput(str(error)) from None
 
@@ -146,14 +165,16 @@ def _one_line(
         return f"{' and '.join(sorted(set(origins.values())))}: {reason}"
     key = str(first["loc"][0])
     return (
-        f"{origins[key]}: {key} = {_shown(values[key])}: {reason}{more}; "
+        f"{origins[key]}: {key} = {shown(values[key])}: {reason}{more}; "
         f"allowed: {kind.model_fields[key].description}"
     )
 
 
-def _shown(value: object) -> str:
-    return _shorten(json.dumps(value, default=str, ensure_ascii=False))
+def shown(value: object) -> str:
+    """A value in words."""
+    return shortened(json.dumps(value, default=str, ensure_ascii=False))
 
 
-def _shorten(text: str, limit: int = _SHOWN) -> str:
+def shortened(text: str, limit: int = _SHOWN) -> str:
+    """A text of at most `limit` letters."""
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -38,13 +38,17 @@ class Parameters(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    names: ClassVar[tuple[str, ...]] = ()
+    """Keys that do no more than give values to others, such as the name of a standard part."""
 
     @model_validator(mode="before")
     @classmethod
     def _without_units(cls, given: Any) -> Any:
         if not isinstance(given, dict):
             return given
-        return cls.completed({name: _plain(cls, name, value) for name, value in given.items()})
+        return cls.completed(
+            {name: without_unit(cls, name, value) for name, value in given.items()}
+        )
 
     @classmethod
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
@@ -53,6 +57,11 @@ class Parameters(BaseModel):
         Raises ValueError.
         """
         return given
+
+    def settled(self) -> dict[str, Any]:
+        """The values of all keys, without the names that they came from: each can be changed."""
+        fields = type(self).model_fields
+        return {**self.model_dump(), **{name: fields[name].default for name in self.names}}
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -65,10 +74,10 @@ class Parameters(BaseModel):
             field.description = f"{extra['meaning']}{unit}" + (f"; {bounds}" if bounds else "")
 
 
-def _plain(kind: type[Parameters], name: str, value: object) -> object:
-    """A value without a unit, in that of its key; lists item by item."""
+def without_unit(kind: type[Parameters], name: str, value: object) -> object:
+    """A value without a unit, in that of its key; lists item by item.  Raises ValueError."""
     if isinstance(value, list | tuple):
-        return [_plain(kind, name, item) for item in value]
+        return [without_unit(kind, name, item) for item in value]
     field = kind.model_fields.get(name)
     extra = field.json_schema_extra if field else None
     unit = str(extra["unit"]) if isinstance(extra, dict) else ""

@@ -1,13 +1,25 @@
 """What the user sees while a case runs: a bar on a terminal, plain lines elsewhere, or nothing."""
 
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from softehl.cases.harness.row import Row
+
+_LINES = 10.0  # seconds between lines where there is no terminal
 
 
 class Display:
@@ -98,6 +110,28 @@ class Bars(Display):
     def state(self, row: Row) -> None:
         """See :class:`Display`."""
         self._progress.console.print(f"  {row.line}", highlight=False, markup=False)
+
+
+@contextmanager
+def make_counter(done: int, total: int) -> Iterator[Callable[[], None]]:
+    """Shows how many runs are done: a bar on a terminal, elsewhere a line now and then, on stderr.
+
+    What it gives is to be called after each run.
+    """
+    console, last = Console(stderr=True), time.monotonic()
+    columns = ("{task.completed} of {task.total} runs", BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        task = progress.add_task("", total=total, completed=done)
+
+        def count() -> None:
+            nonlocal done, last
+            done += 1
+            progress.update(task, completed=done)
+            if not console.is_terminal and time.monotonic() - last > _LINES:
+                last = time.monotonic()
+                click.echo(f"{done} of {total} runs", err=True)
+
+        yield count
 
 
 def make_display(*, quiet: bool) -> Display:

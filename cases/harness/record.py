@@ -11,6 +11,7 @@ import platform
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -95,7 +96,7 @@ class RunRecord:
         self._size: dict[str, Any] = dict.fromkeys(_SIZE)
         self._logs: list[StageLog] = []
         self._stages: list[StageRecord] | None = None
-        _require_folder(folder)
+        require_folder(folder)
         if holds_a_run(folder):
             self._take(existing)
 
@@ -184,7 +185,7 @@ class RunRecord:
             "message": message,
             "warnings": self.run.case.warnings(self.run.parameters),
             "parameters": self.run.parameters.model_dump(),
-            "versions": _versions(),
+            "versions": package_versions(),
             **self._size,
             "seconds": seconds + self._earlier.seconds,
             "stages": [*self._earlier.stages, *map(_stage_json, stages)],
@@ -215,7 +216,7 @@ class RunRecord:
             raise BadInput(f"cannot write to {self.folder}: {error.strerror}") from None
         if existing == "resume":
             try:
-                version = _versions()["softehl"]
+                version = package_versions()["softehl"]
                 self._earlier = read_earlier(self.folder, self.run, version)
             except BaseException:
                 self._lock.release()
@@ -225,7 +226,7 @@ class RunRecord:
             self.curve.keep(self._earlier.rows)
 
 
-def _require_folder(folder: Path) -> None:
+def require_folder(folder: Path) -> None:
     """Raise BadInput if a part of the path is there and is no folder that can be written to."""
     try:
         nearest = next(p for p in (folder, *folder.absolute().parents) if p.exists())
@@ -266,7 +267,8 @@ def _stage_json(stage: StageRecord) -> dict[str, Any]:
     }
 
 
-def _versions() -> dict[str, str | None]:
+@cache
+def package_versions() -> dict[str, str | None]:
     """Of Python, the platform and every package that takes part in a run."""
     versions: dict[str, str | None] = {
         "python": platform.python_version(),

@@ -7,7 +7,7 @@ run.json, the heads of the table on the terminal and the table in the documentat
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import isnan
+from math import isnan, nan
 from typing import Any, ClassVar, Self, get_type_hints
 
 from softehl.runtime.io import Cell, number_text
@@ -34,7 +34,9 @@ class Column:
     shown: str = ""
 
     def read(self, text: str) -> Cell:
-        """The value of a cell.  Raises ValueError."""
+        """The value of a cell; that of a number which is not there is nan.  Raises ValueError."""
+        if self.kind is float and not text:
+            return nan
         value: Cell = text if self.kind is str else self.kind(float(text))
         return value
 

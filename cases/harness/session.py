@@ -38,7 +38,7 @@ def run_case(run: Run, folder: Path, existing: Existing, *, jobs: int, quiet: bo
             click.echo(f"softehl: {warning}", err=True)
         with make_display(quiet=quiet) as display:
             complaints = compute(record, jobs=jobs, display=display)
-        with _writing(folder):
+        with writing(folder):
             return _finish(record, complaints, quiet=quiet)
 
 
@@ -52,7 +52,7 @@ def compute(record: RunRecord, *, jobs: int, display: Display) -> list[str]:
         for parameters in run.case.rounds(run.parameters):
             pieces = run.case.pieces(parameters, record.curve.rows, jobs)
             outcomes += _solve(run, pieces, record, display, jobs)
-    with _writing(record.folder):
+    with writing(record.folder):
         return _conclude(record, outcomes)
 
 
@@ -83,7 +83,7 @@ class Reporter(Observer):
 
     def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
         """See :class:`Observer`."""
-        with _writing(self.record.folder):
+        with writing(self.record.folder):
             self.log = self.record.stage(name, where)
         self.display.stage(self.worker, title)
 
@@ -103,13 +103,13 @@ class Reporter(Observer):
 
     def state(self, state: State) -> None:
         """See :class:`Observer`."""
-        with _writing(self.record.folder):
+        with writing(self.record.folder):
             row = self.record.state(state)
         self.display.state(row)
 
     def files(self, contents: Mapping[str, Content]) -> None:
         """See :class:`Observer`."""
-        with _writing(self.record.folder):
+        with writing(self.record.folder):
             self.record.files(contents)
 
 
@@ -128,7 +128,8 @@ def _recorded(record: RunRecord) -> Iterator[None]:
 
 
 @contextmanager
-def _writing(folder: Path) -> Iterator[None]:
+def writing(folder: Path) -> Iterator[None]:
+    """Make an OSError bad input that names the file."""
     try:
         yield
     except OSError as error:

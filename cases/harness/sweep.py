@@ -38,13 +38,15 @@ class Curve:
     """A curve that was computed.
 
     parameters: of the class of the case.  rows: the rows of `curve.csv`, one for each state.
-    complaints: what was asked for and is not among them, and why, in words.
+    complaints: what was asked for and is not among them, and why, in words.  failed: whether the
+    program failed in it, which its complaint then says.
     """
 
     parameters: Any
     folder: Path
     rows: tuple[Any, ...]
     complaints: tuple[str, ...]
+    failed: bool = False
 
     @property
     def converged(self) -> bool:
@@ -76,9 +78,16 @@ def shared_folder(case: AnyCase, base: Path) -> Path | None:
     return base / case.shared if case.shared else None
 
 
-def solved(tasks: Sequence[Task], executor: Executor | None) -> Iterator[Curve]:
-    """The curves as they come in, begun in an order in which they use what others leave."""
-    for _, curve in completed(solve_task, in_order(tasks), executor):
+def solved(
+    tasks: Sequence[Task],
+    executor: Executor | None,
+    solve: Callable[[Task], Curve] | None = None,
+) -> Iterator[Curve]:
+    """The curves as they come in, begun in an order in which they use what others leave.
+
+    solve: what a worker does, :func:`solve_task` if left out.
+    """
+    for _, curve in completed(solve or solve_task, in_order(tasks), executor):
         yield curve
 
 
@@ -87,6 +96,20 @@ def solve_task(task: Task) -> Curve:
     with RunRecord(task.folder, task.run, task.existing) as record:
         complaints = compute(record, jobs=1, display=Display())
     return Curve(task.run.parameters, task.folder, tuple(record.curve.rows), tuple(complaints))
+
+
+def kept_task(task: Task) -> Curve:
+    """As :func:`solve_task`, but a run in which the program fails does not end the others.
+
+    Raises BadInput, which no other run would be spared either.
+    """
+    try:
+        return solve_task(task)
+    except BadInput:
+        raise
+    except Exception as error:
+        words = " ".join(f"{type(error).__name__}: {error}".split())
+        return Curve(task.run.parameters, task.folder, (), (words,), failed=True)
 
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:

@@ -37,6 +37,11 @@ class ORing(Parameters):
     Raises pydantic.ValidationError also for a geometry in which the seal is not squeezed.
     """
 
+    names = (
+        *("ring", "rod", "squeeze", "gland", "backup", "shore_A", "fit"),
+        *("oil", "oil_density", "roelands"),
+    )
+
     density: Literal[1, 2, 4, 8, 16] = key(
         2, "mesh density d: 27 d segments on the lubricated arc", bounds="1, 2, 4, 8 or 16"
     )

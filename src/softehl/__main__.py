@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _commands() -> "click.Group":
     import click
 
-    from softehl.cases.cli import design, keys, report_runs, reproduce, run
+    from softehl.cases.cli import design, keys, report_runs, reproduce, run, sweep
 
     @click.group(no_args_is_help=False)
     @click.version_option(__version__, prog_name="softehl")
@@ -100,6 +100,7 @@ def _commands() -> "click.Group":
 
     commands.add_command(design)
     commands.add_command(run)
+    commands.add_command(sweep)
     commands.add_command(keys)
     commands.add_command(report_runs)
     commands.add_command(reproduce)

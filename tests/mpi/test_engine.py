@@ -30,11 +30,16 @@ MPIEXEC = Path(sys.executable).with_name("mpiexec")
 PROCESSES = (1, 2, 3)
 
 
+def mpiexec(processes: int) -> list[str]:
+    """What starts a command on so many processes."""
+    found = str(MPIEXEC) if MPIEXEC.exists() else shutil.which("mpiexec")
+    assert found, "mpiexec is missing"
+    return [found, "-n", str(processes)]
+
+
 def command(name: str, processes: int, folder: Path) -> list[str]:
-    mpiexec = str(MPIEXEC) if MPIEXEC.exists() else shutil.which("mpiexec")
-    assert mpiexec, "mpiexec is missing"
     script = [sys.executable, "-m", "tests.mpi.problems", name, "petsc", str(folder)]
-    return [mpiexec, "-n", str(processes), *script]
+    return [*mpiexec(processes), *script]
 
 
 def run(name: str, processes: int, folder: Path) -> dict[str, Any]:

@@ -1,0 +1,213 @@
+"""The points of a study: a grid, a list, a Latin hypercube or random tolerances of some keys.
+
+A point is a value for each varied key.  Nothing here knows what the keys mean.
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Literal, TypeAlias, TypeGuard, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from scipy.stats import qmc
+
+from softehl.cases.harness.errors import BadInput
+from softehl.runtime.arrays import Array
+from softehl.runtime.names import meant
+
+F = TypeVar("F", bound="Form")
+Points: TypeAlias = list[dict[str, Any]]
+Read: TypeAlias = Callable[[str, object], Any]
+"""(key, value as it was typed) -> value in the unit of the key.  Raises BadInput."""
+
+MOST = 100_000
+"""Runs of a study."""
+
+NORMAL_DEVIATIONS = 2.0
+"""Standard deviations that a tolerance is, of a normal distribution."""
+
+_SHARE = re.compile(r"(\+-\s*)?(?P<size>\d+(\.\d*)?([eE][-+]?\d+)?)\s*%")
+
+
+class Form(BaseModel):
+    """What a table of a study may hold."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class Span(Form):
+    """Equally spaced values of a key: {from = 1, to = 2, count = 5}, or of its logarithm."""
+
+    start: Any = Field(alias="from")
+    to: Any
+    count: int = Field(ge=2, le=MOST)
+    spacing: Literal["linear", "log"] = "linear"
+
+
+class Hypercube(Form):
+    """[latin_hypercube]: a number of points that fill the box between bounds of each key."""
+
+    count: int = Field(ge=1, le=MOST)
+    seed: int = Field(default=1, ge=0)
+    between: dict[str, Any] = Field(min_length=1)
+
+
+class Random(Form):
+    """[random]: keys that are off by independent tolerances."""
+
+    count: int = Field(ge=1, le=MOST)
+    seed: int = Field(default=1, ge=0)
+    distribution: Literal["uniform", "normal"] = "uniform"
+    tolerances: dict[str, Any] = Field(min_length=1)
+
+
+def table_of(kind: type[F], given: object, where: str) -> F:
+    """A table of a study, checked.  Raises BadInput."""
+    names = [field.alias or name for name, field in kind.model_fields.items()]
+    if not isinstance(given, dict):
+        raise BadInput(f"{where} = {given!r}: allowed: a table of {', '.join(names)}")
+    for name in given:
+        if name not in names:
+            hint = meant(name, names)
+            raise BadInput(f"{where}: unknown {name!r}{hint}; allowed: {', '.join(names)}")
+    try:
+        return kind(**given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        name = str(first["loc"][0])
+        told = f"{name} = {given[name]!r}: " if name in given else f"{name} is missing: "
+        raise BadInput(f"{where} {told}{first['msg'].lower()}") from None
+
+
+def grid_points(axes: Mapping[str, Any], read: Read) -> Points:
+    """Every combination of the values of each key; the last key varies fastest.  BadInput."""
+    if not axes:
+        raise BadInput("[grid] is empty; allowed: a list of values for each key that is varied")
+    values = [_axis(key, given, read) for key, given in axes.items()]
+    count = math.prod(map(len, values))
+    if count > MOST:
+        raise BadInput(f"[grid] has {count} combinations; allowed: at most {MOST}")
+    return [dict(zip(axes, combination, strict=True)) for combination in product(*values)]
+
+
+def _axis(key: str, given: object, read: Read) -> list[Any]:
+    if isinstance(given, dict):
+        return _spaced(key, given, read)
+    if not isinstance(given, list) or not given:
+        raise BadInput(
+            f"[grid] {key} = {given!r}: allowed: a list of values, or "
+            '{from = 1, to = 2, count = 5}, with spacing = "log" if wanted'
+        )
+    return [read(key, value) for value in given]
+
+
+def _spaced(key: str, given: Mapping[str, Any], read: Read) -> list[Any]:
+    span = table_of(Span, given, f"[grid] {key}")
+    low, high = _bounds(f"[grid] {key}", read(key, span.start), read(key, span.to))
+    if span.spacing == "linear":
+        values = np.linspace(low, high, span.count)
+    elif low > 0.0:
+        values = np.geomspace(low, high, span.count)
+    else:
+        raise BadInput(f"[grid] {key}: from = {low:g} has no logarithm; allowed: more than 0")
+    whole = isinstance(span.start, int) and isinstance(span.to, int)
+    if whole and np.array_equal(values, np.round(values)):
+        return [int(value) for value in values]
+    return [float(value) for value in values]
+
+
+def list_points(entries: Sequence[Any], read: Read, otherwise: Mapping[str, Any]) -> Points:
+    """Points one by one; a key that an entry leaves out is as `otherwise` says.  BadInput."""
+    if not entries or not all(isinstance(entry, dict) and entry for entry in entries):
+        raise BadInput("[[list]] is empty; allowed: one [[list]] of KEY = VALUE for each run")
+    keys = list(dict.fromkeys(key for entry in entries for key in entry))
+    return [
+        {key: read(key, entry[key]) if key in entry else otherwise.get(key) for key in keys}
+        for entry in entries
+    ]
+
+
+def hypercube_points(table: Hypercube, read: Read) -> Points:
+    """A Latin hypercube between the bounds of each key, the same for the same seed.  BadInput."""
+    where = "[latin_hypercube] between."
+    box = [_pair(f"{where}{key}", key, given, read) for key, given in table.between.items()]
+    low, high = np.array(box, dtype=np.float64).T
+    random = np.random.default_rng(table.seed)
+    shares = qmc.LatinHypercube(len(box), seed=random).random(table.count)
+    return _named(list(table.between), low + shares * (high - low))
+
+
+def _pair(where: str, key: str, given: object, read: Read) -> tuple[float, float]:
+    if not isinstance(given, list) or len(given) != 2:
+        raise BadInput(f"{where} = {given!r}: allowed: [least, largest]")
+    return _bounds(where, *(read(key, value) for value in given))
+
+
+def _bounds(where: str, low: object, high: object) -> tuple[float, float]:
+    if not _is_number(low) or not _is_number(high):
+        raise BadInput(f"{where}: {low!r} to {high!r} is no range; allowed: two numbers")
+    least, largest = float(low), float(high)
+    if not least < largest:
+        raise BadInput(f"{where}: from {least:g} to {largest:g}; allowed: the smaller one first")
+    return least, largest
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Keys that are off by the same share of their value, at most `share` if it is uniform."""
+
+    keys: tuple[str, ...]
+    share: float
+
+
+def tolerance_points(table: Random, values: Mapping[str, Any], read: Read) -> Points:
+    """Keys around their values, each tolerance independent of the others; BadInput.
+
+    A tolerance is the largest deviation of a uniform, twice the standard deviation of a normal
+    distribution.  The first points of a study of more points are the same.
+    """
+    found = [_tolerance(name, given, values, read) for name, given in table.tolerances.items()]
+    keys = [key for tolerance in found for key in tolerance.keys]
+    if len(set(keys)) < len(keys):
+        raise BadInput("[random] tolerances: a key is given twice; allowed: once")
+    random, shape = np.random.default_rng(table.seed), (table.count, len(found))
+    if table.distribution == "uniform":
+        shares = random.uniform(-1.0, 1.0, shape)
+    else:
+        shares = random.normal(size=shape) / NORMAL_DEVIATIONS
+    columns = [
+        values[key] * (1.0 + tolerance.share * shares[:, n])
+        for n, tolerance in enumerate(found)
+        for key in tolerance.keys
+    ]
+    return _named(keys, np.stack(columns, axis=1))
+
+
+def _tolerance(name: str, given: object, values: Mapping[str, Any], read: Read) -> Tolerance:
+    """What is behind `"key, other" = "15 %"`, a share of both, or `key = "0.05 mm"`."""
+    where = f"[random] tolerances.{name} = {given!r}"
+    keys = tuple(part.strip() for part in name.split(","))
+    for key in keys:
+        read(key, 1.0)
+        if not _is_number(values.get(key)) or not values[key]:
+            raise BadInput(f"{where}: {key} = {values.get(key)!r}; allowed: a number that is not 0")
+    percent = _SHARE.fullmatch(given.strip()) if isinstance(given, str) else None
+    if percent:
+        return Tolerance(keys, 0.01 * float(percent["size"]))
+    size = read(keys[0], given)
+    if len(keys) > 1 or not _is_number(size) or not size > 0.0:
+        raise BadInput(
+            f'{where}: allowed: a share as in "15 %", or of one key a number in its unit'
+        )
+    return Tolerance(keys, float(size) / abs(values[keys[0]]))
+
+
+def _named(keys: Sequence[str], table: Array) -> Points:
+    return [dict(zip(keys, map(float, row), strict=True)) for row in table]

@@ -1,0 +1,391 @@
+"""`softehl sweep`: points, errors, resumed sweeps, equal tables on whatever runs them."""
+
+import csv
+import itertools
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+import softehl
+from softehl.cases import slider
+from softehl.cases.harness import sampling
+from softehl.cases.harness.case import load_case
+from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.study_file import WAYS, Study, read_study
+from softehl.cases.shipped import SHIPPED
+
+GRID = """
+case = "slider"
+speeds = [400, 200]
+segments = 40
+
+[grid]
+h0 = {from = "1 um", to = "2 um", count = 3}
+ratio = [2.2, 3]
+"""
+
+
+def study(path: Path, text: str) -> Study:
+    path.write_text(text)
+    return read_study(str(path), SHIPPED)
+
+
+def swept(path: Path, text: str, *options: str) -> int:
+    path.write_text(text)
+    return softehl.main(["sweep", str(path), "--quiet", "--out", str(path.parent / "s"), *options])
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / "sweep.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+# --- points ---------------------------------------------------------------------------------------
+
+
+def test_a_grid_is_every_combination(tmp_path: Path) -> None:
+    read = study(tmp_path / "s.toml", GRID)
+    expected = itertools.product((0.001, 0.0015, 0.002), (2.2, 3))
+    assert [tuple(point.values()) for point in read.points] == [
+        pytest.approx(pair) for pair in expected
+    ]
+    assert read.keys == ("h0", "ratio")
+    assert [p.h0 for p in read.runs] == [p["h0"] for p in read.points]  # type: ignore[union-attr]
+
+
+def test_a_grid_of_logarithms_words_and_whole_numbers(tmp_path: Path) -> None:
+    grid = """
+    case = "slider"
+    grid.viscosity = {from = 1e-9, to = 1e-7, count = 3, spacing = "log"}
+    grid.profile = ["wedge", "parabola"]
+    grid.segments = {from = 10, to = 30, count = 3}
+    """
+    points = study(tmp_path / "s.toml", grid).points
+    assert sorted({p["viscosity"] for p in points}) == pytest.approx([1e-9, 1e-8, 1e-7])
+    assert {p["segments"] for p in points} == {10, 20, 30}
+    assert len(points) == 18
+
+
+def test_a_list_fills_up_from_what_is_fixed(tmp_path: Path) -> None:
+    text = 'case = "slider"\n[[list]]\nh0 = 0.002\n[[list]]\nratio = 3.0\n'
+    read = study(tmp_path / "s.toml", text)
+    assert read.points == ({"h0": 0.002, "ratio": 2.2}, {"h0": 0.001, "ratio": 3.0})
+
+
+def test_a_latin_hypercube_has_one_point_in_each_slice(tmp_path: Path) -> None:
+    text = """
+    case = "slider"
+    [latin_hypercube]
+    count = 50
+    seed = {}
+    between.h0 = ["1 um", "2 um"]
+    between.ratio = [2, 4]
+    """
+    read = [study(tmp_path / "s.toml", text.format(seed)).points for seed in (1, 1, 2)]
+    assert read[0] == read[1] != read[2]
+    for key, low, high in (("h0", 0.001, 0.002), ("ratio", 2.0, 4.0)):
+        shares = np.array([(p[key] - low) / (high - low) for p in read[0]])
+        assert sorted(np.floor(50 * shares)) == list(range(50))
+
+
+@pytest.mark.parametrize(
+    ("shape", "law"), [("uniform", ("uniform", (-1, 2))), ("normal", ("norm", (0, 0.5)))]
+)
+def test_random_tolerances(shape: str, law: tuple[str, tuple[float, ...]], tmp_path: Path) -> None:
+    text = f"""
+    case = "slider"
+    h0 = 0.001
+    [random]
+    count = 2000
+    distribution = "{shape}"
+    tolerances.h0 = "0.1 um"
+    tolerances.ratio = "5 %"
+    """
+    points = study(tmp_path / "s.toml", text).points
+    off = np.array([((p["h0"] / 0.001 - 1) / 0.1, (p["ratio"] / 2.2 - 1) / 0.05) for p in points])
+    for column in off.T:
+        assert kstest(column, *law).pvalue > 0.01
+    assert abs(np.corrcoef(off.T)[0, 1]) < 0.06
+    assert study(tmp_path / "s.toml", text.replace("2000", "10")).points == points[:10]
+
+
+def test_the_law_of_tolerances_is_seen() -> None:
+    """The other distribution fails the test above."""
+    rng = np.random.default_rng(1)
+    assert kstest(rng.uniform(-1, 1, 2000), "norm", (0, 0.5)).pvalue < 1e-6
+
+
+RING = """
+case = "oring"
+ring = "AS568-226"
+rod = 50
+squeeze = 12
+shore_A = 70
+material = "neo-hooke"
+[random]
+count = 5
+"""
+
+
+def test_a_tolerance_leaves_what_followed_from_a_name(tmp_path: Path) -> None:
+    """The housing was cut for the nominal section; a harder rubber has another modulus."""
+    path = tmp_path / "s.toml"
+    runs: Any = study(path, RING + 'tolerances.section_diameter = "0.1 mm"').runs
+    assert len({p.section_diameter for p in runs}) == 5
+    assert len({p.housing_diameter for p in runs}) == 1
+    read = study(path, RING + "tolerances.shore_A = 5")
+    softest = sorted(zip((p["shore_A"] for p in read.points), read.runs, strict=True))
+    moduli = [p.mu for _, p in softest]  # type: ignore[union-attr]
+    assert moduli == sorted(set(moduli))
+
+
+def test_keys_that_move_together(tmp_path: Path) -> None:
+    text = 'case = "oring"\n[random]\ncount = 5\ntolerances."mu_1, mu_2" = "15 %"\n'
+    read = study(tmp_path / "s.toml", text)
+    default: Any = load_case(SHIPPED["oring"]).parameters()
+    for p in read.points:
+        assert p["mu_1"] / default.mu_1 == pytest.approx(p["mu_2"] / default.mu_2, rel=1e-14)
+
+
+def test_the_studies_of_the_documentation(tmp_path: Path) -> None:
+    page = Path("docs/many-curves.md").read_text(encoding="utf-8").split("## From a script")[0]
+    lines = [line[4:] for line in page.splitlines() if line.startswith("    ") or not line]
+    text = "\n".join(line for line in lines if not line.startswith(("softehl", "mpiexec")))
+    head, *ways = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
+    counts = {way.split("]")[0]: len(study(tmp_path / "s.toml", head + way).runs) for way in ways}
+    assert counts == {"[grid": 8, "[[list": 1, "[latin_hypercube": 50, "[random": 500}
+
+
+# --- bad input ------------------------------------------------------------------------------------
+
+HEAD = 'case = "slider"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[grid]\nh0 = [1]", "no case"),
+        ('case = "slidr"\n[grid]\nh0 = [1]', 'case = "slidr"; allowed'),
+        (HEAD, "no points; allowed: one of [grid], [[list]]"),
+        (HEAD + "[grid]\n[[list]]\nh0 = 1", "grid and list; allowed: one of"),
+        (HEAD + "[grid]\n", "[grid] is empty"),
+        (HEAD + "[grid]\nh0 = []", "[grid] h0 = []: allowed: a list of values"),
+        (HEAD + "[grid]\nh = [1]", "unknown key 'h' (did you mean 'h0'?)"),
+        (HEAD + "speed = [1]\n[grid]\nh0 = [1]", "unknown key 'speed'"),
+        (HEAD + "h0 = 1\n[grid]\nh0 = [1]", "h0 is fixed and varied"),
+        (HEAD + "[grid]\nh0 = [1, -1]", "h0 = -1: "),
+        (HEAD + '[grid]\nh0 = ["1 bar"]', "is no number in mm"),
+        (HEAD + "[grid]\nh0 = {from = 1, to = 2}", "count is missing"),
+        (HEAD + "[grid]\nh0 = {from = 2, to = 1, count = 3}", "from 2 to 1; allowed: the smaller"),
+        (HEAD + "[grid]\nh0 = {from = 1, to = 2, count = 3, scale = 1}", "unknown 'scale'"),
+        (HEAD + '[grid]\nstart = {from = -1, to = 0, count = 2, spacing = "log"}', "no logarithm"),
+        (HEAD + "[grid]\nh0 = {from = 1, to = 2, count = 1000}\n"
+         "ratio = {from = 1, to = 2, count = 1000}", "1000000 combinations"),
+        (HEAD + "[[list]]\n", "[[list]] is empty"),
+        (HEAD + "[latin_hypercube]\ncount = 2", "between is missing"),
+        (HEAD + "[latin_hypercube]\ncount = 0\nbetween.h0 = [1, 2]", "count = 0"),
+        (HEAD + "[latin_hypercube]\ncount = 2\nbetween.h0 = [2, 1]", "the smaller one first"),
+        (HEAD + "[latin_hypercube]\ncount = 2\nbetween.h0 = 2", "allowed: [least, largest]"),
+        (HEAD + "[latin_hypercube]\nnumber = 2\nbetween.h0 = [1, 2]", "unknown 'number'"),
+        (HEAD + '[random]\ncount = 2\ntolerances.h0 = "ten"', "allowed: a share"),
+        (HEAD + '[random]\ncount = 2\ntolerances.profile = "5 %"', 'profile = \'parabola\''),
+        (HEAD + '[random]\ncount = 2\ntolerances.start_pressure = "5 %"', "number that is not 0"),
+        (HEAD + '[random]\ncount = 2\ntolerances."h0, ratio" = 0.1', "allowed: a share"),
+        (HEAD + '[random]\ncount = 2\ntolerances.h0 = "5 %"\ntolerances."h0, ratio" = "5 %"',
+         "given twice"),
+        (HEAD + "end = -2\n[grid]\nh0 = [0.001]", "start = -1.5 must be less than end = -2"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert swept(tmp_path / "s.toml", text) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert len(error.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["s.toml"]
+
+
+def test_what_a_stranger_types(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for given, words in (("oring", "a study is a TOML file"), ("no.toml", "no file 'no.toml'")):
+        assert softehl.main(["sweep", given]) == 2
+        assert words in capsys.readouterr().err
+    assert swept(tmp_path / "s.toml", GRID, "--set", "h0=0.1") == 2
+    assert "--set: h0 is fixed and varied" in capsys.readouterr().err
+    assert swept(tmp_path / "s.toml", GRID, "--jobs", "2", "--mpi") == 2
+    assert "exclude one another" in capsys.readouterr().err
+
+
+def test_no_key_is_called_as_a_way_of_varying() -> None:
+    for module in SHIPPED.values():
+        assert not set(load_case(module).parameters.model_fields) & {*WAYS, "case"}
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The grid, run by one process without an interruption."""
+    folder = tmp_path_factory.mktemp("reference")
+    assert swept(folder / "s.toml", GRID) == 0
+    return folder / "s"
+
+
+def test_a_sweep_is_its_runs(reference: Path) -> None:
+    rows = table(reference)
+    assert [row["run"] for row in rows] == [str(n) for n in range(1, 7) for _ in range(2)]
+    assert {row["status"] for row in rows} == {"converged"}
+    for row in rows:
+        folder = reference / "runs" / f"{int(row['run']):05d}"
+        with (folder / "curve.csv").open(newline="") as file:
+            curve = {r["rod_speed_mm_s"]: r for r in csv.DictReader(file)}
+        assert curve[row["rod_speed_mm_s"]].items() <= row.items()
+        given = json.loads((folder / "run.json").read_text())["parameters"]
+        assert [given["h0"], given["ratio"]] == [float(row["h0"]), float(row["ratio"])]
+    assert {path.name for path in reference.iterdir()} == {
+        *("sweep.csv", "run.json", "runs", "response_h0.png", "response_ratio.png")
+    }
+    content = json.loads((reference / "run.json").read_text())
+    assert (content["status"], content["counts"]) == ("done", {"converged": 6})
+    assert content["fixed"] == {"speeds": [400, 200], "segments": 40}
+
+
+def test_a_folder_with_a_sweep(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "s.toml"
+    assert swept(path, GRID.replace("count = 3", "count = 2")) == 0
+    assert swept(path, GRID) == 2
+    assert "--resume keeps its runs, --overwrite begins anew" in capsys.readouterr().err
+    assert swept(path, GRID, "--resume") == 2
+    assert "a sweep with other points" in capsys.readouterr().err
+    assert swept(path, GRID.replace("segments = 40", "segments = 20"), "--resume") == 2
+    assert "a sweep with other fixed" in capsys.readouterr().err
+    assert swept(path, GRID, "--overwrite") == 0
+    same_tables(tmp_path / "s", reference)
+    assert swept(path, GRID.replace("count = 3", "count = 2"), "--overwrite") == 0
+    assert len(list((tmp_path / "s" / "runs").iterdir())) == 4
+
+
+def same_tables(folder: Path, expected: Path) -> None:
+    assert (folder / "sweep.csv").read_text() == (expected / "sweep.csv").read_text()
+
+
+def test_more_points_behind(tmp_path: Path) -> None:
+    """A study may be extended; what is there is kept, what is damaged is run again."""
+    text = 'case = "slider"\nsegments = 40\n[random]\ncount = 4\ntolerances.h0 = "5 %"\n'
+    path, runs = tmp_path / "s.toml", tmp_path / "s" / "runs"
+    assert swept(path, text.replace("4\n", "3\n")) == 0
+    before = {folder.name: (folder / "run.json").stat().st_mtime_ns for folder in runs.iterdir()}
+    (runs / "00002" / "curve.csv").write_text("")
+    assert swept(path, text, "--resume") == 0
+    after = {folder.name: (folder / "run.json").stat().st_mtime_ns for folder in runs.iterdir()}
+    assert {name for name in after if before.get(name) != after[name]} == {"00002", "00004"}
+    assert len(table(tmp_path / "s")) == 4 * 3
+
+
+def test_runs_that_cannot_be_and_runs_that_fail(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    solve = slider.SliderCase.solution
+
+    def broken(case: Any, parameters: Any, key: float) -> Any:
+        if parameters.h0 > 0.0015:
+            raise FloatingPointError("no such gap")
+        return solve(case, parameters, key)
+
+    monkeypatch.setattr(slider.SliderCase, "solution", broken)
+    text = HEAD + "speeds = [400]\nsegments = 40\n[grid]\nend = [-2, 0.75]\nh0 = [0.001, 0.002]"
+    assert swept(tmp_path / "s.toml", text) == 3
+    rows = table(tmp_path / "s")
+    assert [row["status"] for row in rows] == [
+        *("not possible", "not possible", "converged", "failed")
+    ]
+    assert "start = -1.5 must be less than end = -2" in rows[0]["words"]
+    assert rows[3]["words"] == "FloatingPointError: no such gap"
+    assert rows[3]["flux_mm2_s"] == "" != rows[2]["flux_mm2_s"]
+    assert "3 of 4 runs did not converge; run 1 not possible" in capsys.readouterr().err
+    monkeypatch.undo()
+    assert swept(tmp_path / "s.toml", text, "--resume") == 3
+    assert [row["status"] for row in table(tmp_path / "s")][2:] == ["converged"] * 2
+
+
+def test_two_processes_give_the_same_table(reference: Path, tmp_path: Path) -> None:
+    assert swept(tmp_path / "s.toml", GRID, "--jobs", "2") == 0
+    same_tables(tmp_path / "s", reference)
+
+
+def test_dask_gives_the_same_table(
+    reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        assert swept(tmp_path / "s.toml", GRID, "--dask", cluster.scheduler_address) == 0
+    same_tables(tmp_path / "s", reference)
+    assert swept(tmp_path / "s.toml", GRID, "--overwrite", "--dask", "tcp:/127.0.0.1:1") == 2
+    assert "no scheduler there" in capsys.readouterr().err
+
+
+def test_one_table_is_not_another(reference: Path, tmp_path: Path) -> None:
+    """What the tests of equal tables compare can differ."""
+    assert swept(tmp_path / "s.toml", GRID.replace("count = 3", "count = 2")) == 0
+    with pytest.raises(AssertionError):
+        same_tables(tmp_path / "s", reference)
+
+
+def test_a_sweep_killed_and_resumed(reference: Path, tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(GRID)
+    command = [sys.executable, "-m", "softehl", "sweep", str(path), "--quiet"]
+    command += ["--out", str(tmp_path / "s"), "--resume", "--jobs", "2"]
+    for wanted in (1, 3):
+        process = subprocess.Popen(command, start_new_session=True)
+        end = time.monotonic() + 120.0
+        while len(list(tmp_path.glob("s/runs/*/curve.csv"))) < wanted and process.poll() is None:
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    assert swept(path, GRID, "--resume") == 0
+    same_tables(tmp_path / "s", reference)
+
+
+@pytest.mark.slow
+def test_seals_share_contacts_and_agree(tmp_path: Path) -> None:
+    """Runs of one section start from each other's contact: equal to rounding of Newton's method."""
+    text = """
+    case = "oring"
+    density = 1
+    stroke = "out"
+    speeds = [1600]
+    error_estimate = false
+    [grid]
+    viscosity = ["30 mPa s", "60 mPa s"]
+    """
+    tables = []
+    for jobs in ("1", "2"):
+        assert swept(tmp_path / "s.toml", text, "--overwrite", "--jobs", jobs) == 0
+        tables.append([float(row["h_star_um"]) for row in table(tmp_path / "s")])
+    assert tables[0] == pytest.approx(tables[1], rel=1e-9)
+    assert tables[0][1] > 1.3 * tables[0][0]
+
+
+def test_points_are_few_enough() -> None:
+    with pytest.raises(BadInput, match="at most"):
+        sampling.grid_points({"a": [1.0] * 400, "b": [1.0] * 400}, lambda _, value: value)
+    points = sampling.grid_points({"a": [1.0] * 3, "b": [1.0] * 2}, lambda _, value: value)
+    assert Counter(map(str, points)) == {"{'a': 1.0, 'b': 1.0}": 6}
