@@ -47,7 +47,9 @@ def steady_start(path: FilmPath, x: Array, speed: float) -> BuiltFilm | None:
         if film.speed == speed:
             found[:] = [(film, point.solution.x)]
 
-    path.films("out", path.settled(x), keep)
+    settled = path.settled(x)
+    if not isinstance(settled, StageFailed):
+        path.films("out", settled, keep)
     return found[0] if found else None
 
 

@@ -13,13 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.contact import along, approach_stage
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film import film_on, release_stage, shear_stage, speed_stage
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.path import PathSettings, Stage
 from softehl.cases.seal.system import PRESSURE, VOID
 from softehl.runtime.arrays import Array
+from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Point
 from softehl.runtime.solve.steps import StepRule
 
@@ -29,26 +30,21 @@ NEAR = 1.0 / 3.0
 SLOWEST = 0.01
 """Speed of the first film, mm/s, if none that is asked for is slower."""
 
-_SETTLE_STEPS = StepRule(0.004, 1e-5)
+_SMALLEST = 1e-3  # step to contact of asperities, in its whole way
 _ONE_STEP = StepRule(1.0, 1e-3)
 _RISING_STEPS = StepRule(math.log(2.0), 0.004, math.log(8.0), target_iterations=14)
 
 
-def settle_stage(system: SealSystem, settings: PathSettings) -> Stage:
-    """The rod comes nearer, from where the contact stage holds it, without friction."""
-    p = system.parameters
+def settle_stage(system: SealSystem, settings: PathSettings, newton: Newton) -> Stage:
+    """The rod comes nearer, from where the contact stage holds it, without friction.
 
-    def at(offset: float) -> PathSettings:
-        return replace(settings, offset=offset)
-
-    return Stage(
-        name="contact of asperities",
-        problem_at=lambda offset: contact_problem(system, at(offset), p.sealed_pressure),
-        start=settings.offset,
-        stop=min(NEAR * p.surfaces.sigma, settings.offset),
-        steps=_SETTLE_STEPS,
-        sealed_pressure=p.sealed_pressure,
-        stroke="both",
+    In the logarithm of its offset: on fine meshes nodes come into contact one after the other.
+    """
+    near = min(NEAR * system.parameters.surfaces.sigma, settings.offset)
+    stage = approach_stage(system, settings, near)
+    steps = replace(stage.steps, smallest=_SMALLEST * stage.steps.first)
+    return replace(
+        stage, name="contact of asperities", steps=steps, corrector=along(system, newton)
     )
 
 

@@ -111,9 +111,13 @@ def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) ->
 
 
 def inlet_length(p: ORing, rise: float) -> float:
-    """Length l (mm) of the inlet at an edge of this K^2, at the slowest speed; see the head."""
+    """Length l (mm) of the inlet at an edge of this K^2, at the slowest speed; see the head.
+
+    Between rough surfaces at least that over which h = K l^(3/2) / E rises by sigma.
+    """
     flow, E = p.viscosity * min(p.speeds), 3.0 * p.shear_modulus
-    return float((flow * E**2 / rise**1.5) ** 0.4)
+    asperities = (p.surfaces.sigma * E / rise**0.5) ** (2.0 / 3.0)
+    return float(max((flow * E**2 / rise**1.5) ** 0.4, asperities))
 
 
 def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:

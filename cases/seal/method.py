@@ -151,12 +151,12 @@ class FilmPath:
             return None
         return self.slower(self.build(*start), self.system.parameters.speeds, on_speed)
 
-    def settled(self, x: Array) -> Array:
+    def settled(self, x: Array) -> Followed:
         """The contact state x where the rod is as near as asperities let it; x itself if smooth."""
         if not self.system.parameters.rough:
             return x
-        y = self.driver.follow(settle_stage(self.system, self.settings), x)
-        return x if isinstance(y, StageFailed) else y
+        stage = settle_stage(self.system, self.settings, self.driver.newton)
+        return self.driver.follow(stage, x)
 
     def rise(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> StageFailed | None:
         """Rough films: from asperities in contact at x to dry sliding, then to higher speeds."""
@@ -363,6 +363,9 @@ def run(
         state.failures.append(explained(found, "contact", parameters))
         return _outcome(build_system(parameters), driver, state)  # its size alone is reported
     seal = _begun(FilmPath(found[0], settings, driver), found[1], observer, state)
+    if isinstance(seal, StageFailed):
+        state.failures.append(explained(seal, "contact", parameters))
+        return _outcome(found[0], driver, state)
     strokes: tuple[Stroke, ...] = ("out", "in")
     for stroke in strokes if parameters.stroke == "both" else (parameters.stroke,):
         failed = seal.stroke(stroke)
@@ -371,20 +374,25 @@ def run(
     return _outcome(seal.system, driver, state, contact_numbers(seal.system, seal.x))
 
 
-def _begun(path: FilmPath, x: Array, observer: Observer, state: RunState) -> SealRun:
+def _begun(
+    path: FilmPath, x: Array, observer: Observer, state: RunState
+) -> SealRun | StageFailed:
     """A run whose contact state x (n,) is settled, and with it the mesh; shared by both strokes."""
     system, settings, p = path.system, path.settings, path.system.parameters
     problem = contact_problem(system, settings, p.sealed_pressure)
     observer.contact_state(contact_state(system, problem, p.sealed_pressure, x))
-    seal = SealRun(path, path.settled(x), observer, state)
+    settled = path.settled(x)
+    if isinstance(settled, StageFailed):
+        return settled
+    seal = SealRun(path, settled, observer, state)
     if not (p.error_estimate and p.mesh == "graded"):
         return seal
     coarser = FilmPath(coarser_system(system), settings, path.driver.named("coarser mesh: "))
     route = ContactRoute(settings, coarser.driver.follow, coarser.driver.newton)
     y = route.elsewhere(system, x, coarser.system)
-    if isinstance(y, StageFailed):
-        return seal
-    return replace(seal, coarser=(coarser, coarser.settled(y)))
+    if not isinstance(y, StageFailed):
+        y = coarser.settled(y)
+    return seal if isinstance(y, StageFailed) else replace(seal, coarser=(coarser, y))
 
 
 def _outcome(
