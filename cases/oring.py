@@ -10,7 +10,7 @@ from softehl.cases.harness.row import Record
 from softehl.cases.seal import catalogue, plan
 from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.report import PICTURES, write_plots
+from softehl.cases.seal.report import PICTURES, SOME, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmRow
@@ -29,7 +29,7 @@ class ORingCase(Case[ORing, FilmRow]):
     files = (
         *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv", "tornado.png", "tornado.svg"),
         *("leakage.csv", "fit.csv", "contact_*.csv", "contact_*.vtu"),
-        *(f"{name}.{kind}" for name in (*PICTURES, "fit") for kind in ("png", "svg")),
+        *(f"{name}.{kind}" for name in (*PICTURES, *SOME) for kind in ("png", "svg")),
     )
     shared = "contacts"
     left_out = LEFT_OUT

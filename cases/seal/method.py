@@ -374,9 +374,7 @@ def run(
     return _outcome(seal.system, driver, state, contact_numbers(seal.system, seal.x))
 
 
-def _begun(
-    path: FilmPath, x: Array, observer: Observer, state: RunState
-) -> SealRun | StageFailed:
+def _begun(path: FilmPath, x: Array, observer: Observer, state: RunState) -> SealRun | StageFailed:
     """A run whose contact state x (n,) is settled, and with it the mesh; shared by both strokes."""
     system, settings, p = path.system, path.settings, path.system.parameters
     problem = contact_problem(system, settings, p.sealed_pressure)

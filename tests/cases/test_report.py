@@ -20,7 +20,9 @@ from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure, fitted_exponent, plain_ticks
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import View, boundary_edges, section_figure, von_mises
+from softehl.cases.seal.report.stribeck import crossing, hersey_um, stribeck_figure
 from softehl.cases.seal.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
+from softehl.cases.seal.surfaces import regime
 from tests.cases.oring_cases import film_values
 
 SEAL = ORing()
@@ -260,3 +262,52 @@ def test_pressure_bands_are_to_scale() -> None:
     assert film == pytest.approx(0.26 * SEAL.section_diameter)
     # the corners of the square have normals at 45 degrees
     assert contact == pytest.approx(film * 1.85 / top * 0.5**0.5, rel=0.05)
+
+
+def rough_rows() -> list[FilmRow]:
+    """A stroke each way whose lambda ratio is the square root of |U|."""
+    return [
+        replace(
+            row(sign * u, 0.05 * u**0.5),
+            rod_friction_N=sign * (50.0 / (1.0 + u) + 0.1 * u),
+            lambda_ratio=u**0.5,
+            regime=regime(u**0.5),
+            asperity_load_percent=100.0 / (1.0 + u),
+            boundary_friction_percent=100.0 / (1.0 + 0.1 * u),
+        )
+        for sign in (1.0, -1.0)
+        for u in (0.1, 4.0, 100.0)
+    ]
+
+
+def test_the_stribeck_picture_marks_regimes_and_shares() -> None:
+    p = ORing.model_validate({"roughness": 0.3})
+    rows = rough_rows()
+    outstroke = rows[:3]
+    # straight in logarithms: lambda is one at 1 mm/s and three at 9 mm/s
+    for ratio, speed in ((1.0, 1.0), (3.0, 9.0)):
+        place = crossing(p, outstroke, ratio)
+        assert place == pytest.approx(1e3 * p.viscosity * speed / 3.7)
+    assert crossing(p, outstroke, 20.0) is None
+    assert hersey_um(p, rows[-1]) == pytest.approx(1e3 * p.viscosity * 100.0 / 3.7)
+    figure = stribeck_figure(p, rows)
+    assert figure is not None
+    said = texts(figure)
+    assert said.count("boundary | mixed") == said.count("mixed | full") == 2
+    assert "seal 0.3" in said
+    friction, shares = figure.axes
+    drawn = [np.asarray(line.get_ydata()) for line in friction.get_lines()]
+    np.testing.assert_allclose(drawn[0], [abs(r.rod_friction_N) for r in outstroke])
+    assert [line.get_linestyle() for line in shares.get_lines()].count("--") == 2
+
+
+def test_smooth_surfaces_have_no_stribeck_picture() -> None:
+    assert stribeck_figure(SEAL, power_law(0.6)) is None
+
+
+def test_films_that_flow_against_the_rod_are_left_out_of_the_curve() -> None:
+    """Pressure drives oil through asperities faster than a slow rod: h* < 0."""
+    rows = [*rough_rows(), replace(row(-0.01, 1.0), h_star_um=-0.2)]
+    (axes,) = curve_figure(SEAL, rows).axes
+    drawn = np.concatenate([np.asarray(line.get_ydata()) for line in axes.get_lines()])
+    assert np.min(drawn) > 0.0

@@ -26,9 +26,13 @@ _ENOUGH, _MANY = 3, 7
 
 
 def curve_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()) -> Figure:
-    """h* over |U|, both logarithmic, a line a stroke; rejected states are marked on the axis."""
+    """h* over |U|, both logarithmic, a line a stroke; rejected states are marked on the axis.
+
+    Not drawn: rough films so slow that the sealed pressure drives oil against the rod, h* < 0.
+    """
     from matplotlib.figure import Figure
 
+    rows = [row for row in rows if row.h_star_um > 0.0]
     figure = Figure(figsize=(5.4, 4.4))
     axes = figure.subplots()
     _set_limits(axes, rows, rejected)
@@ -38,8 +42,8 @@ def curve_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] 
             _draw_stroke(axes, stroke, chosen)
     _draw_slope(axes, rows)
     _draw_rejected(axes, rejected)
-    _tick_plainly(axes.xaxis, axes.get_xlim())
-    _tick_plainly(axes.yaxis, axes.get_ylim())
+    tick_plainly(axes.xaxis, axes.get_xlim())
+    tick_plainly(axes.yaxis, axes.get_ylim())
     axes.set_xlabel(style.SPEED)
     axes.set_ylabel(style.H_STAR)
     axes.legend(loc="upper left")
@@ -138,13 +142,13 @@ def _draw_rejected(axes: Axes, rejected: Sequence[FilmRow]) -> None:
 def _set_limits(axes: Axes, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> None:
     """Logarithmic axes around every speed and thickness, with room for the legend above."""
     speeds = [abs(row.rod_speed_mm_s) for row in (*rows, *rejected)]
-    films = [row.h_star_um for row in rows]
+    films = [row.h_star_um for row in rows] or [1.0]
     axes.set(xscale="log", yscale="log")
     axes.set(xlim=(min(speeds) / _BESIDE, max(speeds) * _BESIDE))
     axes.set(ylim=(min(films) / _BESIDE, max(films) * _ROOM))
 
 
-def _tick_plainly(axis: Axis, limits: tuple[float, float]) -> None:
+def tick_plainly(axis: Axis, limits: tuple[float, float]) -> None:
     """Ticks at round numbers, written out."""
     from matplotlib.ticker import NullLocator
 

@@ -15,6 +15,7 @@ from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
 from softehl.cases.seal.report.fit import fit_figure, fit_of
 from softehl.cases.seal.report.interactive import curve_plot, film_plot, friction_plot
 from softehl.cases.seal.report.section import View, section_figure
+from softehl.cases.seal.report.stribeck import stribeck_figure
 from softehl.cases.seal.rubber import shore_band
 from softehl.cases.seal.telling import read_profile, read_section
 from softehl.cases.seal.tolerances import ToleranceRow
@@ -32,7 +33,8 @@ def parts(runs: Sequence[FinishedRun]) -> list[Part]:
 
     with matplotlib.rc_context(style.STYLE):
         found = [_gland(runs), *_rubber(runs), _section(runs)]
-    found += [_film(runs), _curve(runs), _friction(runs), *_leakage(runs), *_surfaces(runs)]
+        surfaces = _surfaces(runs)
+    found += [_film(runs), _curve(runs), _friction(runs), *_leakage(runs), *surfaces]
     return [*found, _tolerances(runs)]
 
 
@@ -123,14 +125,19 @@ def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
 
 
 def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
-    """Film thickness over roughness and the regime, where the runs have columns of it."""
-    tables = []
+    """Stribeck curves and regimes, of the runs whose surfaces are rough."""
+    tables, pictures = [], []
     for run in runs:
+        if figure := stribeck_figure(run.parameters, run.rows):
+            pictures.append(Picture(run.name, _png(figure)))
         if any(isfinite(row.lambda_ratio) for row in run.rows):
             rows = [[getattr(row, name) for name in _SURFACE] for row in run.rows]
             tables.append(Table(run.name, _SURFACE, rows))
-    text = "Lambda is the film thickness over the roughness of both surfaces."
-    return [Part("Surfaces", text, tables=tables)] if tables else []
+    text = (
+        "Friction over eta U / p with the regimes, and what asperities carry. Lambda is the mean "
+        "gap over the roughness of both surfaces."
+    )
+    return [Part("Surfaces", text, pictures=pictures, tables=tables)] if tables else []
 
 
 _SURFACE = (

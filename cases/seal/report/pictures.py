@@ -11,6 +11,7 @@ from softehl.cases.seal.report.curve import curve_figure
 from softehl.cases.seal.report.fit import fit_figure, fit_of, write_residuals
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import View, section_figure
+from softehl.cases.seal.report.stribeck import stribeck_figure
 from softehl.cases.seal.state import FilmRow
 from softehl.cases.seal.telling import read_profile, read_section
 
@@ -18,7 +19,10 @@ if TYPE_CHECKING:
     from softehl.cases.seal.parameters import ORing
 
 PICTURES = ("curve", "profiles", "section")
-"""Names of the files, each .png and .svg; `fit` too where the rubber was fitted to tests."""
+"""Names of the files, each .png and .svg, of every run."""
+
+SOME = ("fit", "stribeck")
+"""Those where the rubber was fitted to tests, and where surfaces are rough."""
 
 
 def write_plots(
@@ -40,6 +44,8 @@ def write_plots(
         if found := fit_of(p):
             write_residuals(found, folder / "fit.csv")
             style.save(fit_figure([found]), folder / "fit")
+        if stribeck := stribeck_figure(p, rows):
+            style.save(stribeck, folder / "stribeck")
         if views:
             style.save(section_figure(p, views), folder / "section")
 

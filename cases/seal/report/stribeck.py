@@ -1,0 +1,108 @@
+"""Friction over eta U / p between rough surfaces: regimes, and what asperities carry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softehl.cases.seal.report import style
+from softehl.cases.seal.report.curve import tick_plainly
+from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.surfaces import FULL, MIXED
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from softehl.cases.seal.parameters import ORing
+
+_HERSEY = "$\\eta_0 |U| / p_{\\mathrm{dry}}$ [µm]   ($p_{\\mathrm{dry}}$ largest dry pressure)"
+_REGIMES = {MIXED: "boundary | mixed", FULL: "mixed | full"}
+_PANELS = (2.2, 1.0)
+
+
+def hersey_um(p: ORing, row: FilmRow) -> float:
+    """eta_0 |U| over the largest pressure of the dry contact, um."""
+    return 1e3 * p.viscosity * abs(row.rod_speed_mm_s) / row.contact_p_max_MPa
+
+
+def crossing(p: ORing, rows: Sequence[FilmRow], ratio: float) -> float | None:
+    """eta U / p (um) where the rows of a stroke, by rising speed, first have this lambda ratio.
+
+    By the logarithms of both; None where they have not.
+    """
+    for below, above in pairwise(rows):
+        ratios = below.lambda_ratio, above.lambda_ratio
+        if ratios[0] < ratio <= ratios[1]:
+            ends = np.log([hersey_um(p, below), hersey_um(p, above)])
+            return float(np.exp(np.interp(np.log(ratio), np.log(ratios), ends)))
+    return None
+
+
+def stribeck_figure(p: ORing, rows: Sequence[FilmRow]) -> Figure | None:
+    """Friction of both strokes and the shares of asperities; None for smooth surfaces."""
+    from matplotlib.figure import Figure
+
+    strokes = {
+        stroke: sorted(found, key=lambda row: abs(row.rod_speed_mm_s))
+        for stroke in style.STROKES
+        if (found := [row for row in rows if row.regime and row.stroke == stroke])
+    }
+    if not strokes:
+        return None
+    figure = Figure(figsize=(5.4, 5.6))
+    friction, shares = figure.subplots(2, 1, sharex=True, height_ratios=_PANELS)
+    for stroke, chosen in strokes.items():
+        _draw_stroke(p, friction, shares, stroke, chosen)
+    friction.set(xscale="log", yscale="log", ylabel="friction on the rod [N]")
+    shares.set(ylim=(-4.0, 104.0), ylabel="asperities [%]", xlabel=_HERSEY)
+    tick_plainly(friction.yaxis, friction.get_ylim())
+    friction.legend(loc="lower left")
+    shares.legend(loc="best", title="share of load (line), of friction (dashes)")
+    speed = 1e3 * p.viscosity / rows[0].contact_p_max_MPa
+    above = friction.secondary_xaxis("top", functions=(lambda x: x / speed, lambda u: u * speed))
+    above.set_xlabel(style.SPEED)
+    style.set_margins(figure, left=0.62, right=0.12, bottom=0.5, top=1.05, between=0.08)
+    style.write_head(figure, style.subject(p) + f"; {_surfaces(p)}", left=0.62)
+    return figure
+
+
+def _draw_stroke(
+    p: ORing, friction: Axes, shares: Axes, stroke: str, rows: Sequence[FilmRow]
+) -> None:
+    x = [hersey_um(p, row) for row in rows]
+    colour, label = style.COLOURS[stroke], style.STROKES[stroke]
+    friction.plot(
+        x,
+        [abs(row.rod_friction_N) for row in rows],
+        color=colour,
+        marker=style.MARKERS[stroke],
+        label=label,
+    )
+    shares.plot(x, [row.asperity_load_percent for row in rows], color=colour, label=label)
+    boundary = [row.boundary_friction_percent for row in rows]
+    shares.plot(x, boundary, color=colour, linestyle="--")
+    for ratio, words in _REGIMES.items():
+        place = crossing(p, rows, ratio)
+        if place is None:
+            continue
+        for axes in (friction, shares):
+            axes.axvline(place, color=colour, linestyle=":", linewidth=1.0)
+        side = "right" if stroke == "out" else "left"
+        friction.text(
+            *(place, 0.98, f"{words} "),
+            transform=friction.get_xaxis_transform(),
+            rotation=90,
+            ha=side,
+            va="top",
+            fontsize="x-small",
+            color=colour,
+        )
+
+
+def _surfaces(p: ORing) -> str:
+    rod, seal = p.roughness
+    return f"rms rod {rod:g}, seal {seal:g} µm"
