@@ -7,27 +7,18 @@ of density d and 2 d are of one family. Every node of the boundary lies exactly 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from itertools import pairwise
-from math import ceil, radians
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.mesh.outline import Outline, Shape
+from softehl.runtime.mesh.outline import Shape
+from softehl.runtime.mesh.outline_layout import AROUND, SMOOTH, BoundaryLayout, normals
 from softehl.runtime.mesh.sections import LAYERS, SectionMesh, corner_shares, graded_steps
 from softehl.runtime.mesh.spacing import Spacing
 from softehl.runtime.mesh.subdivide import subdivided
 from softehl.runtime.mesh.triangles import triangulate
-
-AROUND = 60
-"""The outline is at least so many of its longest segments long, at density 1."""
-
-DEPTH = 0.035
-"""Thickness of the strip, in twice the area over the length of the outline (radius of a disc)."""
 
 GROWTH = 8.0
 """Ratio of the thickness of the innermost to the outermost layer."""
@@ -35,13 +26,6 @@ GROWTH = 8.0
 WORST = 0.3
 """Least Jacobian at a corner, relative to the area, that a mesh may have."""
 
-_RATE = 0.5  # growth of the segments outside the film with the distance from it, at density 1
-_SMOOTH = 0.02  # mm to either side over which normals are means at least
-_PINNED = radians(15.0)  # a corner that turns by more has a node
-_STATIONS = 720  # at which the thickness of the section is looked at
-_CLEAREST = 0.3  # of the radius of the largest ball inside that touches a place: strip there
-_SEGMENT, _ACROSS = 0.5, 1.5  # the same, and of the ball outside: a segment there
-_TURN = 0.4  # rad, by which the outline turns on a segment
 _TRIES = 6  # at a strip that does not fold, each half as thick
 _COARSEST_TRIANGLES = Fraction(2, 3)  # density of the triangles: finer meshes divide theirs
 
@@ -60,7 +44,7 @@ def outline_mesh(
     density: a multiple of 1/3, at least 2/3, that makes `long` d whole. growth: of the layers.
     Raises MeshError for others, and where no mesh of sound elements is found.
     """
-    layout = _Layout.of(shape.outline, film, spacing, long)
+    layout = BoundaryLayout.of(shape.outline, film, spacing, long)
     _require_density(density, long)
     k = _divisions(Fraction(density))
     for halvings in range(_TRIES):
@@ -76,7 +60,9 @@ def outline_mesh(
     )
 
 
-def _mesh(layout: _Layout, density: Fraction, part: float, growth: float) -> SectionMesh | None:
+def _mesh(
+    layout: BoundaryLayout, density: Fraction, part: float, growth: float
+) -> SectionMesh | None:
     """The mesh with a strip of this part of its thickness, if its elements are sound."""
     rows = _strip(layout, density, part, growth)
     strip = rows.reshape(-1, 2)[_strip_quads(*rows.shape[:2])]
@@ -97,109 +83,12 @@ def _require_density(density: int | Fraction, long: int) -> None:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Layout:
-    """Where the nodes of the boundary lie, for every density.
-
-    parts: begin and end of each part of the outline, rising from the start of the film on, its
-    spacing and number of segments at density 1; the film is the first. reach: (stations,) radius
-    of the largest ball inside that touches the outline at equal distances from s = 0 on.
-    """
-
-    outline: Outline
-    parts: tuple[tuple[float, float, Spacing | None, int], ...]
-    reach: Array
-
-    @classmethod
-    def of(
-        cls, outline: Outline, film: tuple[float, float], spacing: Spacing | None, long: int
-    ) -> _Layout:
-        length = outline.length
-        first = film[0]
-        last = first + (film[1] - first) % length
-        reach, mouth = _ball_radii(outline, 1.0), _ball_radii(outline, -1.0)
-        clear = np.minimum(_SEGMENT * reach, _ACROSS * mouth)
-        ends = np.sort(first + (outline.corners(_PINNED) - first) % length)
-        apart = 0.2 * length / AROUND
-        ends = ends[(ends > last + apart) & (ends < first + length - apart)]
-        places = np.arange(_STATIONS) * length / _STATIONS
-        sizes = _film_sizes(last - first, spacing, long)
-        parts = [(first, last, spacing, long)]
-        for a, b in pairwise([last, *ends.tolist(), first + length]):
-            s = np.linspace(a, b, 2001)
-            bend = np.abs(outline.curvature(s)) + 1e-9 / length
-            size = np.minimum(np.interp(s, places, clear, period=length), _TURN / bend)
-            size = np.minimum(size, length / AROUND)
-            size = np.minimum(size, sizes[1] + _RATE * (s - last))
-            size = np.minimum(size, sizes[0] + _RATE * (first + length - s))
-            index = cumulative_trapezoid(1.0 / size, s, initial=0)
-            count = 3 * max(1, ceil(index[-1] / 3 - 0.2))
-            steps = np.linspace(0.0, index[-1], 27 * 64 + 1)
-            parts.append((a, b, Spacing((np.interp(steps, index, s) - a) / (b - a)), count))
-        if sum(part[3] for part in parts) % 2:
-            longest = max(range(1, len(parts)), key=lambda k: parts[k][3])
-            a, b, own, count = parts[longest]
-            parts[longest] = (a, b, own, count + 3)
-        return cls(outline, tuple(parts), reach)
-
-    def places(self, density: Fraction) -> Array:
-        """s of the boundary nodes, rising from the start of the film."""
-        found = []
-        for a, b, spacing, count in self.parts:
-            n = int(count * density)
-            t = np.arange(n) / n
-            found.append(a + (b - a) * (spacing(t) if spacing else t))
-        return np.concatenate(found)
-
-    def depth(self, s: Array) -> Array:
-        """Thickness (n,) of the strip."""
-        length = self.outline.length
-        most = DEPTH * 2.0 * self.outline.area / length
-        own = np.minimum(most, _CLEAREST * self.reach)
-        s0 = np.arange(_STATIONS) * length / _STATIONS
-        apart = np.abs(s[:, None] - s0[None]) % length
-        apart = np.minimum(apart, length - apart)
-        return np.asarray((own[None] + 0.3 * apart).min(axis=1))
-
-
-def _film_sizes(length: float, spacing: Spacing | None, long: int) -> tuple[float, float]:
-    """Lengths of the first and the last segment of the film at density 1."""
-    if spacing is None:
-        return length / long, length / long
-    at = spacing(np.array([1.0 / long, 1.0 - 1.0 / long]))
-    return length * float(at[0]), length * float(1.0 - at[1])
-
-
-def _normals(outline: Outline, s: Array, over: Array | float) -> Array:
-    """Inward unit normals (n, 2), across the chord between s - over and s + over."""
-    chord = outline.at(s + over) - outline.at(s - over)
-    chord /= np.linalg.norm(chord, axis=1)[:, None]
-    return np.stack([-chord[:, 1], chord[:, 0]], axis=1)
-
-
-def _ball_radii(outline: Outline, side: float) -> Array:
-    """Radii (stations,) of the largest balls that touch the outline: inside (1) or outside (-1).
-
-    What lies within two strips along the outline does not count: corners stay blunt.
-    """
-    s = np.arange(_STATIONS) * outline.length / _STATIONS
-    over = max(_SMOOTH, DEPTH * 2.0 * outline.area / outline.length)
-    x, n = outline.at(s), side * _normals(outline, s, over)
-    away = x[None] - x[:, None]
-    inwards = (away * n[:, None]).sum(axis=2)
-    apart = np.abs(s[:, None] - s[None])
-    apart = np.minimum(apart, outline.length - apart)
-    seen = (inwards > 1e-9) & (apart > 2.0 * over)
-    radii = (away**2).sum(axis=2) / (2.0 * np.where(seen, inwards, 1.0))
-    return np.asarray(radii.min(axis=1, where=seen, initial=np.inf))
-
-
-def _strip(layout: _Layout, density: Fraction, part: float, growth: float) -> Array:
+def _strip(layout: BoundaryLayout, density: Fraction, part: float, growth: float) -> Array:
     """Points (layers + 1, B, 2) from the outline to the front of the strip."""
     s = layout.places(density)
     depth = part * layout.depth(s)
     ring = layout.outline.at(s)
-    inner = ring + depth[:, None] * _normals(layout.outline, s, np.maximum(_SMOOTH, 1.5 * depth))
+    inner = ring + depth[:, None] * normals(layout.outline, s, np.maximum(SMOOTH, 1.5 * depth))
     t = graded_steps(int(LAYERS * density), growth)[:, None, None]
     return np.asarray(ring[None] + t * (inner - ring)[None])
 
@@ -218,7 +107,7 @@ def _divisions(density: Fraction) -> int:
     return k
 
 
-def _filled(layout: _Layout, strip: Array, density: Fraction) -> SectionMesh:
+def _filled(layout: BoundaryLayout, strip: Array, density: Fraction) -> SectionMesh:
     """The strip, and what is inside."""
     rows, around = strip.shape[:2]
     front, k = strip[-1], _divisions(density)
