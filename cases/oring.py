@@ -80,7 +80,7 @@ class ORingCase(Case[ORing, FilmRow]):
     def warnings(self, parameters: ORing) -> list[str]:
         """See :class:`Case`."""
         p = parameters
-        ring = catalogue.Ring("", p.inner_diameter, p.section_diameter)
+        ring = p.free_ring
         return list(catalogue.warnings(ring, p.rod_diameter, p.housing_diameter, p.groove_width))
 
     def notes(self, rows: Sequence[FilmRow]) -> list[str]:

@@ -46,13 +46,26 @@ class Range(NamedTuple):
 
 @dataclass(frozen=True)
 class Ring:
-    """A ring as it is sold, mm. Tolerances are +-, None where the class gives none."""
+    """A ring as it is sold, mm. Tolerances are +-, None where the class gives none.
+
+    area, middle: of a section that is not round, mm^2, and radius of its centroid, mm.
+    """
 
     name: str
     inner_diameter: float
     section_diameter: float
     inner_tolerance: float | None = None
     section_tolerance: float | None = None
+    area: float | None = None
+    middle: float | None = None
+
+    @property
+    def volume(self) -> float:
+        """Of the free ring, mm^3."""
+        if self.area is not None and self.middle is not None:
+            return 2.0 * pi * self.middle * self.area
+        middle = 0.5 * (self.inner_diameter + self.section_diameter)
+        return 2.0 * pi**2 * middle * (0.5 * self.section_diameter) ** 2
 
     @property
     def outer_diameter(self) -> float:
@@ -119,9 +132,7 @@ def squeeze(section_diameter: float, depth: float) -> float:
 
 def fill(a: Ring, rod_diameter: float, housing_diameter: float, width: float) -> float:
     """Volume of a ring over that of its gland, %."""
-    middle = 0.5 * (a.inner_diameter + a.section_diameter)
-    volume = 2.0 * pi**2 * middle * (0.5 * a.section_diameter) ** 2
-    return 100.0 * volume / (0.25 * pi * (housing_diameter**2 - rod_diameter**2) * width)
+    return 100.0 * a.volume / (0.25 * pi * (housing_diameter**2 - rod_diameter**2) * width)
 
 
 def warnings(

@@ -77,7 +77,8 @@ def _film_advice(failed: StageFailed) -> str:
 def _ring(p: ORing) -> str:
     stretch = catalogue.stretch(p.inner_diameter, p.rod_diameter)
     ring = f"{p.inner_diameter:g} x {p.section_diameter:g} mm"
-    return f"a ring of {ring}, stretched by {stretch:.2g} %,"
+    what = "a ring" if p.round else f"a {p.named}"
+    return f"{what} of {ring}, stretched by {stretch:.2g} %,"
 
 
 def _gland(p: ORing) -> str:

@@ -13,8 +13,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from softehl.cases.seal.contact import held_moment, held_place
+from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.grading import contact_edges, film_thickness
+from softehl.cases.seal.grading import film_thickness
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
@@ -54,7 +55,7 @@ def film_offsets(
     p, edges = system.parameters, contact_edges(system, x)
     if _stays(p) or not edges:
         return (settings.offset,)
-    h = film_thickness(p, [edges[0 if stroke == "out" else 1]], _start_speed(system, settings))
+    h = film_thickness(p, [edges[0 if stroke == "out" else -1]], _start_speed(system, settings))
     return tuple(films * h for films in FILMS_OFF)
 
 

@@ -11,14 +11,15 @@ edges and are as K^(-6/5) at them resolve every speed, and one mesh serves both 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 
+from softehl.cases.seal.contacts import Edge, contact_edges
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.layout import Layout, uniform_layout
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.system import ROD
+from softehl.cases.seal.system import BORE, ROD
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG
 from softehl.runtime.mesh.spacing import Spot, graded
@@ -79,20 +80,24 @@ def placed_layout(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGME
     """
     s, edges = system.section.places, contact_edges(system, x)
     ends = _way_out(system, x, s, 0, p), _way_out(system, x, s, 1, p)
-    layout = uniform_layout(p).between(system.section.layout, ends)
+    seen = system.section.layout.touching(
+        system.mesh, system.pressing(ROD, x) > 0.0, system.pressing(BORE, x) > 0.0
+    )
+    layout = uniform_layout(p).between(seen, ends)
     if p.mesh == "uniform" or not edges:
         return layout
     length, steepest = ends[1] - ends[0], max(edge.rise for edge in edges)
     spots = []
-    for edge, side in zip(edges, (0, 1), strict=True):
+    for edge, side in zip(edges, cycle((0, 1)), strict=False):
         k = (edge.rise / steepest) ** 0.5
         rates = RATE * k**0.5, RATE * min(1.0 / k, 1.5)
         place = min(max(edge.place - ends[0], 0.0), length)
         spots.append(Spot(place, k**-0.3, rates if side == 0 else rates[::-1]))
     if p.opens:
         spots.append(_edge_spot(system, x, p, ends))
-    for long in range(layout.long, max(most, layout.long) + 1, _MULTIPLE):
-        coarsest = length / _PLACED_COARSEST
+    parts = len(edges) // 2
+    coarsest = length / (parts * _PLACED_COARSEST)
+    for long in range(layout.long, max(parts * most, layout.long) + 1, parts * _MULTIPLE):
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
         if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet_length(p, steepest):
             break
@@ -144,30 +149,3 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, p: ORing) -> flo
         if h[i + 1] >= reach:
             return float(np.interp(reach, h[i : i + 2], s[i : i + 2]))
     return float(s[-1])
-
-
-@dataclass(frozen=True)
-class Edge:
-    """An edge of the contact: its place on the arc, mm, and K^2 of its pressure, MPa^2/mm."""
-
-    place: float
-    rise: float
-
-
-def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
-    """Where and how steeply the contact of the state x begins and ends along the arc.
-
-    The square of the pressure is a straight line there, taken from the second and third node that
-    touch; none where fewer than three do.
-    """
-    s, pressure = system.section.places, -system.rod_multipliers(x)
-    touching = np.flatnonzero(pressure > 0.0)
-    if len(touching) < 3:
-        return []
-    return [_edge(s[i], pressure[i] ** 2) for i in (touching[1:3], touching[-2:-4:-1])]
-
-
-def _edge(s: Array, y: Array) -> Edge:
-    """The zero of the straight line through two points, and its slope."""
-    slope = (y[1] - y[0]) / (s[1] - s[0])
-    return Edge(float(s[0] - y[0] / slope), abs(float(slope)))

@@ -14,10 +14,14 @@ from typing import Protocol
 import numpy as np
 
 from softehl.cases.seal.parameters import ORing
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Flags
+from softehl.runtime.fem.postprocess import run_around
+from softehl.runtime.mesh.outline import Shape
+from softehl.runtime.mesh.outline_mesh import outline_mesh
 from softehl.runtime.mesh.sections import SHORT, Disc, SectionMesh, disc_mesh
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 
+_LEVEL = 1e-6  # of the height of a section: what is level
 _DENSITY = 2  # for which the sizes are chosen; other densities divide or join its segments
 
 
@@ -33,6 +37,10 @@ class Layout(Protocol):
         """That of the nodes along the arc, None where they are equally spaced."""
 
     @property
+    def flat(self) -> bool:
+        """Whether a contact may have flats, at whose corners pressure peaks."""
+
+    @property
     def contour(self) -> Array:
         """Points (n, 2) in (z, r) of its boundary, for pictures."""
 
@@ -42,8 +50,18 @@ class Layout(Protocol):
     def places(self, mesh: SectionMesh) -> Array:
         """Lengths (arc nodes,) along the undeformed arc from its sealed end, mm."""
 
+    def lowest(self, mesh: SectionMesh) -> int:
+        """The arc node at which the sealed pressure of the contact ends: that nearest to the rod,
+        or where the section was seen to touch it.
+        """
+
     def pressed(self, mesh: SectionMesh) -> int:
         """The first outer segment that the sealed pressure acts on, which it does up to the arc."""
+
+    def touching(self, mesh: SectionMesh, rod: Flags, housing: Flags) -> Layout:
+        """The same where it touches rod (arc nodes,) and housing (outer nodes,) of this mesh there:
+        the sealed pressure ends at a place of contact.
+        """
 
     def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
         """The same laid out on an arc whose ends are at these places of that of another one."""
@@ -85,6 +103,11 @@ class RoundLayout:
         return self.disc.spacing
 
     @property
+    def flat(self) -> bool:
+        """See `Layout`."""
+        return False
+
+    @property
     def contour(self) -> Array:
         """See `Layout`."""
         angles = np.linspace(0.0, 2.0 * pi, 181)
@@ -99,6 +122,14 @@ class RoundLayout:
         z, r = (mesh.points[mesh.arc_nodes] - self.disc.centre).T
         angle = np.arctan2(z, -r)
         return np.asarray(self.disc.radius * (angle - angle[0]))
+
+    def lowest(self, mesh: SectionMesh) -> int:
+        """See `Layout`."""
+        return int(np.argmin(mesh.points[mesh.arc_nodes, 1]))
+
+    def touching(self, mesh: SectionMesh, rod: Flags, housing: Flags) -> RoundLayout:
+        """See `Layout`: a disc touches with its lowest point and its crown."""
+        return self
 
     def pressed(self, mesh: SectionMesh) -> int:
         """See `Layout`: from the crown on."""
@@ -140,8 +171,88 @@ def _growth_to(first: float, count: int) -> float:
     return growth
 
 
+@dataclass(frozen=True)
+class OutlineLayout:
+    """A section of any outline.
+
+    film: ends (s0, s1) of the lubricated part of the outline, mm. held: places on it at which the
+    sealed pressure ends on the rod and on the housing, mm; None: where the shape has them.
+    """
+
+    shape: Shape
+    film: tuple[float, float]
+    spacing: Spacing | None
+    long: int
+    held: tuple[float | None, float | None] = (None, None)
+
+    @property
+    def flat(self) -> bool:
+        """See `Layout`."""
+        return True
+
+    @property
+    def contour(self) -> Array:
+        """See `Layout`."""
+        outline = self.shape.outline
+        even = np.linspace(0.0, outline.length, 721)
+        return outline.at(np.unique(np.concatenate([even, outline.starts])))
+
+    def mesh(self, density: int | Fraction) -> SectionMesh:
+        """See `Layout`."""
+        return outline_mesh(self.shape, self.film, self.spacing, self.long, density)
+
+    def places(self, mesh: SectionMesh) -> Array:
+        """See `Layout`."""
+        ends = np.append(mesh.places, mesh.places[0] + mesh.length)
+        return np.asarray(ends[: mesh.arc + 1] - ends[0])
+
+    def pressed(self, mesh: SectionMesh) -> int:
+        """See `Layout`: from the node nearest to where the housing ends the pressure."""
+        begin, crown = mesh.places[0], self.held[1]
+        crown = self.shape.pressure[0] if crown is None else crown
+        crown = begin + (crown - begin) % mesh.length
+        return int(np.argmin(np.abs(mesh.places[mesh.arc :] - crown)))
+
+    def lowest(self, mesh: SectionMesh) -> int:
+        """See `Layout`: the middle of a flat, the first of two lobes."""
+        if self.held[0] is not None:
+            return int(np.argmin(np.abs(self.places(mesh) - (self.held[0] - self.film[0]))))
+        r = mesh.points[mesh.arc_nodes, 1]
+        level = np.flatnonzero(r <= r.min() + _LEVEL * float(np.ptp(mesh.points[:, 1])))
+        flat = level[: int(np.argmax(np.append(np.diff(level) > 1, True))) + 1]
+        return int(flat[len(flat) // 2])
+
+    def touching(self, mesh: SectionMesh, rod: Flags, housing: Flags) -> OutlineLayout:
+        """See `Layout`: where contact has left the places of before, the middle of the nearest."""
+        lip, crown = self.held
+        if rod.any() and not rod[self.lowest(mesh)]:
+            lip = self.film[0] + float(self.places(mesh)[_nearest(rod, self.lowest(mesh))])
+        if housing.any() and not housing[self.pressed(mesh)]:
+            crown = float(mesh.places[mesh.arc + _nearest(housing[:-1], self.pressed(mesh))])
+        return replace(self, held=(lip, crown))
+
+    def between(self, old: Layout, ends: tuple[float, float]) -> OutlineLayout:
+        """See `Layout`."""
+        assert isinstance(old, OutlineLayout)
+        begin, end = (old.film[0] + place for place in ends)
+        return replace(self, film=(begin, end), held=old.held)
+
+    def graded(self, spacing: Spacing, long: int, first: float | None = None) -> OutlineLayout:
+        """See `Layout`."""
+        return replace(self, spacing=spacing, long=long)
+
+
+def _nearest(flags: Flags, index: int) -> int:
+    """The middle of the run of true flags that is nearest to an index."""
+    true = np.flatnonzero(flags)
+    run = run_around(flags, int(true[np.argmin(np.abs(true - index))]))
+    return int(run.start + run.stop - 1) // 2
+
+
 def uniform_layout(p: ORing) -> Layout:
     """The section of a case with equal segments on its arc, the given one or a wide guide."""
+    if not p.round:
+        return OutlineLayout(p.free_section, p.free_section.film, None, p.lobes * LONG_PLACED)
     radius = 0.5 * p.section_diameter
     centre = 0.0, 0.5 * p.inner_diameter + radius
     if p.given_arc:

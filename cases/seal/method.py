@@ -35,10 +35,12 @@ from softehl.cases.seal.film import (
 )
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
+from softehl.cases.seal.overlap import overlap
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.results import (
     contact_numbers,
+    contact_peaks,
     contact_pressure,
     contact_state,
     film_numbers,
@@ -239,11 +241,17 @@ class SealRun:
         """Second and third stage of one stroke; why it ended early, if it did."""
         p, path = self.system.parameters, self.path
         reference = float(contact_pressure(self.system, p.sealed_pressure, self.x).max())
+        references = contact_peaks(self.system, p.sealed_pressure, self.x)
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
         ratios = INLET_RATIO if p.mesh == "graded" else ANY_RATIO
         coarser = _thicknesses(*self.coarser, stroke) if self.coarser else {}
         verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
-        verdict = replace(verdict, unsealed=unsealed(self.system, self.x))
+        verdict = replace(
+            verdict,
+            unsealed=unsealed(self.system, self.x),
+            references=references,
+            overlap=overlap(self.system, self.x),
+        )
         progress = StrokeState(verdict, set(p.speeds))
 
         def on_speed(film: FilmLoads, point: Point) -> None:

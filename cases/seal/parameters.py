@@ -7,13 +7,16 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.harness.parameters import key
 from softehl.cases.seal import materials
+from softehl.cases.seal.catalogue import Ring
 from softehl.cases.seal.fitting import fitted
 from softehl.cases.seal.oils import with_oil
 from softehl.cases.seal.rubber import require_stable, with_rubber
+from softehl.cases.seal.sections.keys import NAMES, ROUND, SectionKeys, lobes, shape_of
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness, Surfaces
 from softehl.cases.seal.tolerances import read_tolerances
+from softehl.runtime.mesh.outline import Shape
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
@@ -31,8 +34,8 @@ Terms = Annotated[
 ]
 
 
-class ORing(Parameters):
-    """Everything that defines one run of the O-ring case.
+class ORing(SectionKeys):
+    """Everything that defines one run of the O-ring case, or of a seal of another section.
 
     Raises pydantic.ValidationError also for a geometry in which the seal is not squeezed.
     """
@@ -165,7 +168,12 @@ class ORing(Parameters):
     inner_diameter: float = key(
         50.39, "inner diameter of the seal D_inner", unit="mm", gt=0, le=5000
     )
-    section_diameter: float = key(3.53, "diameter of the section D_seal", unit="mm", gt=0)
+    section_diameter: float = key(
+        3.53,
+        "diameter of the section D_seal; radial height of one that is not round",
+        unit="mm",
+        gt=0,
+    )
     rod_diameter: float = key(50.0, "rod diameter D_rod", unit="mm", gt=0)
     housing_diameter: float = key(56.30, "inner diameter of the housing D_housing", unit="mm", gt=0)
     material: materials.Name = key("mooney-rivlin", "rubber")
@@ -236,7 +244,8 @@ class ORing(Parameters):
     cavitation: Literal["penalty", "mass-conserving"] | None = key(
         None,
         "model of cavitation",
-        bounds='"penalty" (25) or "mass-conserving", left out = the latter with roughness',
+        bounds='"penalty" (25) or "mass-conserving", left out = the latter with roughness and '
+        "where a section has two lobes",
     )
     cavitation_pressure: float = key(
         0.0, "mass-conserving: pressure of the ruptured film", unit="MPa", ge=-0.1, le=0
@@ -286,6 +295,44 @@ class ORing(Parameters):
         return with_oil(with_rubber(fitted(given)))
 
     @property
+    def round(self) -> bool:
+        """Whether the section is a disc, which the O-grid of the paper is laid into."""
+        return self.section == ROUND
+
+    @property
+    def named(self) -> str:
+        """What the seal is called."""
+        return NAMES[self.section]
+
+    @property
+    def free_section(self) -> Shape:
+        """The free section where it is."""
+        sizes = self.sized(self.section_diameter)
+        return shape_of(self.section, sizes, self.inner_diameter)
+
+    @property
+    def free_ring(self) -> Ring:
+        """The seal as it is sold."""
+        if self.round:
+            return Ring("", self.inner_diameter, self.section_diameter)
+        outline = self.free_section.outline
+        sizes = {"area": outline.area, "middle": outline.centroid[1]}
+        return Ring("", self.inner_diameter, self.section_diameter, **sizes)
+
+    @property
+    def axial_width(self) -> float:
+        """That of the free section, mm."""
+        if self.round:
+            return self.section_diameter
+        left, _, right, _ = self.free_section.outline.box
+        return right - left
+
+    @property
+    def lobes(self) -> int:
+        """How many contacts with the rod the section is made for."""
+        return 1 if self.round else lobes(self.free_section)
+
+    @property
     def given_arc(self) -> tuple[float, float] | None:
         """Ends of the lubricated arc where they are given; else the contact decides."""
         start, end = self.arc_start, self.arc_end
@@ -304,7 +351,8 @@ class ORing(Parameters):
     @property
     def conserving(self) -> bool:
         """Whether the film conserves mass where it ruptures."""
-        return self.cavitation == "mass-conserving" or (self.cavitation is None and self.rough)
+        conserving = self.rough or self.lobes > 1
+        return self.cavitation == "mass-conserving" or (self.cavitation is None and conserving)
 
     @property
     def surfaces(self) -> Surfaces:
@@ -444,6 +492,21 @@ class ORing(Parameters):
         return self
 
     @model_validator(mode="after")
+    def _section_is_one(self) -> Self:
+        self.sized(self.section_diameter)
+        if self.round:
+            return self
+        _ = self.free_section
+        for name, given in (
+            ("arc_start and arc_end", self.arc_start is not None),
+            ("extrusion_gap", self.opens),
+            ("sensitivity", self.sensitivity),
+        ):
+            if given:
+                raise ValueError(f'{name}: for section = "round" only; leave it out')
+        return self
+
+    @model_validator(mode="after")
     def _seal_is_squeezed(self) -> Self:
         gap = 0.5 * (self.housing_diameter - self.rod_diameter)
         if not 0.5 * self.section_diameter < gap < self.section_diameter:
@@ -458,15 +521,17 @@ class ORing(Parameters):
                 f"rod_diameter = {self.rod_diameter:g} mm stretches inner_diameter = "
                 f"{self.inner_diameter:g} mm by {100 * stretch:.3g} %; allowed are -10 to 20 %"
             )
-        if self.groove_width < self.section_diameter:
+        if self.groove_width < self.axial_width:
+            what = "section_diameter" if self.round else "the width of the section"
             raise ValueError(
                 f"groove_width = {self.groove_width:g} mm; it must be at least "
-                f"section_diameter, {self.section_diameter:g} mm"
+                f"{what}, {self.axial_width:g} mm"
             )
-        limit = 0.5 * (self.groove_width - self.section_diameter)
+        limit = 0.5 * (self.groove_width - self.axial_width)
         if abs(self.groove_centre) > limit + 1e-9 * self.groove_width:
+            what = "round section" if self.round else "section"
             raise ValueError(
-                f"groove_centre = {self.groove_centre:g} mm; the round section must lie between "
+                f"groove_centre = {self.groove_centre:g} mm; the {what} must lie between "
                 f"the walls, {-limit:g} to {limit:g} mm"
             )
         return self

@@ -12,7 +12,7 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.results import CONTACT_FILM
+from softehl.cases.seal.contacts import CONTACT_FILM
 from softehl.cases.seal.system import DISPLACEMENT, FACET, FILM
 from softehl.cases.seal.variation import SPEED, FilmCase
 from softehl.runtime.arrays import Array

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 from softehl.cases.seal.contact import contact_problem, contact_stage
 from softehl.cases.seal.equations import SealSystem
@@ -17,9 +18,15 @@ from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
 from softehl.cases.seal.system import SOLID
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.kernels import load_kernel
+from softehl.runtime.mesh.carrying import (
+    carry_boundary,
+    carry_chain,
+    carry_elements,
+    carry_nodes,
+)
 from softehl.runtime.mesh.prolongation import (
     prolong_chain,
     prolong_elements,
@@ -29,6 +36,7 @@ from softehl.runtime.mesh.prolongation import (
     restrict_elements,
     restrict_nodes,
 )
+from softehl.runtime.mesh.sections import SectionMesh
 from softehl.runtime.mesh.transfer import (
     transfer_chain,
     transfer_elements,
@@ -52,6 +60,24 @@ class _Carrier:
     chain: Callable[[str, Array], Array]
 
 
+_Values: TypeAlias = Callable[[SectionMesh, SectionMesh, Array], Array]
+
+
+class _Transfer(NamedTuple):
+    """From a mesh to any other: of nodes, of elements, of the whole boundary, of a part of it."""
+
+    nodes: _Values
+    elements: _Values
+    loop: _Values
+    chain: Callable[[SectionMesh, SectionMesh, Integers, Integers, Array], Array]
+
+
+BY_ANGLE = _Transfer(transfer_nodes, transfer_elements, transfer_loop, transfer_chain)
+"""Between meshes of a disc."""
+BY_PLACE = _Transfer(carry_nodes, carry_elements, carry_boundary, carry_chain)
+"""Between meshes of any outline."""
+
+
 def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
     """The most accurate transfer: exact between meshes that share nodes, else by local splines."""
     before, after, long = old.section.layout, new.section.layout, old.section.layout.long
@@ -71,18 +97,18 @@ def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
             lambda values: restrict_elements(values, density, long),
             lambda _, values: restrict_chain(values),
         )
-    meshes = old.mesh, new.mesh
+    meshes, how = (old.mesh, new.mesh), BY_ANGLE if isinstance(before, RoundLayout) else BY_PLACE
 
     def chain(name: str, values: Array) -> Array:
         if _closed(old, name):
-            return transfer_loop(*meshes, values)
+            return how.loop(*meshes, values)
         here, there = (system.section.chains[name][0] for system in (old, new))
-        return transfer_chain(*meshes, here, there, values)
+        return how.chain(*meshes, here, there, values)
 
     return _Carrier(
         "moved from another mesh",
-        lambda values: transfer_nodes(*meshes, values),
-        lambda values: transfer_elements(*meshes, values),
+        lambda values: how.nodes(*meshes, values),
+        lambda values: how.elements(*meshes, values),
         chain,
     )
 

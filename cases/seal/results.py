@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import pi
+from itertools import pairwise
+from math import inf, pi, radians, tan
 
 import numpy as np
 
-from softehl.cases.seal.catalogue import Ring, fill, squeeze, stretch
+from softehl.cases.seal.catalogue import fill, squeeze, stretch
+from softehl.cases.seal.contacts import CONTACT_FILM, contacts, groups
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.parameters import ORing
@@ -24,7 +26,7 @@ from softehl.cases.seal.system import (
     SOLID,
     WALLS,
 )
-from softehl.cases.seal.verdict import FilmNumbers, Verdict
+from softehl.cases.seal.verdict import ContactNumbers, FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.postprocess import (
@@ -39,10 +41,10 @@ from softehl.runtime.fem.postprocess import (
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.rules import trace_rule
 
-CONTACT_FILM = 0.02
-"""Film thickness that counts as contact, mm."""
-
 MICROMETRE = 1e-3  # mm
+
+EXIT_SLOPE = 50.0
+"""Slope beyond which a film has ended, degrees: the corner of a flat, the heel of a cup."""
 
 INLET = (10.0, 1.5)
 """Film thicknesses, in h*, between which the segments of the inlet are counted."""
@@ -54,13 +56,19 @@ MID_CONTACT = 0.1
 def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array) -> FilmNumbers:
     """Scalars of a converged film with the unknowns x.
 
-    The flux is that at the largest pressure: the mean over the segment for continuous, the mean
+    The flux is that at the largest pressure, of several contacts in that which the oil reaches
+    first: the mean over the segment for continuous, the mean
     of (23) at the facets of the segment for discontinuous pressures, which (21) and (22) make
     constant. Its relative spread is taken over the neighbours on both sides up to where the film
     cavitates, eqs. (16) and (25).
     """
     at = problem.fields(FILM, x)
-    top = int(np.argmax(at["p"].max(axis=1)))
+    z, h = system.arc_film(x)
+    parts = film_parts(h)
+    first = parts[0 if film.stroke == "out" else -1]
+    peaks = [_top(at, part) for part in parts]
+    top = peaks[0 if film.stroke == "out" else -1]
+    inlet = {name: values[first] for name, values in at.items()}
     whole = run_around(at["p"].min(axis=1) >= 0.0, top)
     jump = 0.0
     if system.parameters.reynolds == "dg":
@@ -71,7 +79,6 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
     q = float(flux[around].mean())
     h_star = q / (0.5 * film.rod_speed)
-    z, h = system.arc_film(x)
     return FilmNumbers(
         speed=film.speed,
         flux=q,
@@ -81,13 +88,64 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         friction=float(2.0 * pi * system.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
         flux_variation=relative_spread(flux[whole]),
         jump=jump,
-        oscillation=oscillation(z, h),
+        oscillation=max(oscillation(*(v[_nodes(k)] for v in (z, h))) for k in parts),
         inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
-        inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(at, film, h_star),
-        end_gap=float(h[-1] if film.stroke == "out" else h[0]),
-        lacking=0.0 if system.parameters.rough else lacking(at, film, z, h),
+        inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(inlet, film, h_star),
+        end_gap=end_gap(*((z, h) if film.stroke == "out" else (-z[::-1], h[::-1]))),
+        lacking=0.0 if system.parameters.rough else lacking(inlet, film, z, h),
         **rough_numbers(system, at),
+        contacts=_contacts(at, (z, h), parts, film) if len(parts) > 1 else (),
     )
+
+
+def end_gap(z: Array, h: Array) -> float:
+    """Film thickness at the exit of the arc, mm; inf where the surface is too steep for a film.
+
+    z, h: (nodes,) towards the exit.
+    """
+    slope = (h[-1] - h[-2]) / (z[-1] - z[-2])
+    return inf if slope > tan(radians(EXIT_SLOPE)) else float(h[-1])
+
+
+def film_parts(h: Array) -> list[slice]:
+    """The segments of each contact, from the sealed side on; together they are the whole film.
+
+    h: (nodes,). Contacts are parted where the film between them is thickest.
+    """
+    found = groups(h, h < CONTACT_FILM)
+    between = [(a[-1], b[0]) for a, b in pairwise(found)]
+    cuts = [0, *(int(a + np.argmax(h[a : b + 1])) for a, b in between), len(h) - 1]
+    return [slice(a, b) for a, b in pairwise(cuts)]
+
+
+def _nodes(part: slice) -> slice:
+    return slice(part.start, part.stop + 1)
+
+
+def _top(at: Mapping[str, Array], part: slice) -> int:
+    """The segment of the largest pressure of a part of the film."""
+    return int(part.start + np.argmax(at["p"][part].max(axis=1)))
+
+
+def _contacts(
+    at: Mapping[str, Array], nodes: tuple[Array, Array], parts: Sequence[slice], film: FilmLoads
+) -> tuple[ContactNumbers, ...]:
+    """Each contact of a film that has several; nodes: z and h at them."""
+    flux, found = element_means(at["flux"], at["dx"]), []
+    for part in parts:
+        z, h = (values[_nodes(part)] for values in nodes)
+        start, end = interval_below(z, h, CONTACT_FILM)
+        found.append(
+            ContactNumbers(
+                flux=float(flux[_top(at, part)]),
+                p_max=float(at["p"][part].max()),
+                h_min=float(h.min()),
+                start=start,
+                end=end,
+                p_before=float(at["p"][part.start, 0]),
+            )
+        )
+    return tuple(found)
 
 
 def rough_numbers(system: SealSystem, at: Mapping[str, Array]) -> dict[str, float]:
@@ -217,14 +275,19 @@ def unsealed(system: SealSystem, x: Array) -> str:
     return "" if (system.pressing(BORE, x)[crown] > 0.0).all() else "at its crown"
 
 
+def contact_peaks(system: SealSystem, sealed_pressure: float, x: Array) -> tuple[float, ...]:
+    """The largest pressure of each contact of the state x, from the sealed side on, MPa."""
+    pressure = contact_pressure(system, sealed_pressure, x)
+    return tuple(float(pressure[nodes].max()) for nodes in contacts(system, x))
+
+
 def fit_percent(p: ORing) -> dict[str, float]:
     """How the free ring fits its gland."""
-    ring = Ring("", p.inner_diameter, p.section_diameter)
     depth = 0.5 * (p.housing_diameter - p.rod_diameter)
     return {
         "stretch_percent": stretch(p.inner_diameter, p.rod_diameter),
         "squeeze_percent": squeeze(p.section_diameter, depth),
-        "fill_percent": fill(ring, p.rod_diameter, p.housing_diameter, p.groove_width),
+        "fill_percent": fill(p.free_ring, p.rod_diameter, p.housing_diameter, p.groove_width),
     }
 
 
@@ -289,7 +352,7 @@ def film_state(
     """The record of a converged film whose numbers are the last of `verdict`."""
     numbers = verdict.last or film_numbers(system, problem, film, x)
     limits = interval_below(*system.arc_film(x), CONTACT_FILM)
-    return FilmState(
+    state = FilmState(
         sealed_pressure_MPa=film.sealed_pressure,
         rod_speed_mm_s=film.rod_speed,
         h_star_um=numbers.h_star / MICROMETRE,
@@ -317,6 +380,21 @@ def film_state(
         advice=verdict.advice,
         profile=_profile(system, problem, x),
         section=section_view(system, problem, x),
+    )
+    return _with_groove(state, numbers) if len(numbers.contacts) > 1 else state
+
+
+def _with_groove(state: FilmState, numbers: FilmNumbers) -> FilmState:
+    """The record with what is between two contacts, and how they differ."""
+    sealed, air = numbers.contacts[0], numbers.contacts[-1]
+    return replace(
+        state,
+        groove_start_mm=sealed.end,
+        groove_end_mm=air.start,
+        groove_pressure_MPa=air.p_before,
+        h_min_sealed_um=sealed.h_min / MICROMETRE,
+        h_min_air_um=air.h_min / MICROMETRE,
+        flux_mismatch_percent=numbers.mismatch,
     )
 
 

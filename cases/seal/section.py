@@ -63,8 +63,8 @@ class SealSection:
 
     @property
     def lowest(self) -> int:
-        """Index of the arc node nearest to the rod."""
-        return int(np.argmin(self.mesh.points[self.mesh.arc_nodes, 1]))
+        """Index of the arc node at which the sealed pressure of the contact ends: see `Layout`."""
+        return self.layout.lowest(self.mesh)
 
     @property
     def pressed_ends(self) -> tuple[int, int]:

@@ -114,6 +114,22 @@ class FilmRow(Row):
     boundary_friction_percent: float = column(
         "%", "share of asperities in the friction on the rod", default=0.0
     )
+    groove_start_mm: float = column(
+        "mm", "sealed end of the groove between two contacts; nan for one contact", default=nan
+    )
+    groove_end_mm: float = column("mm", "air end of that groove, where h is 20 um", default=nan)
+    groove_pressure_MPa: float = column(
+        "MPa", "film pressure in the groove between two contacts; nan for one", default=nan
+    )
+    h_min_sealed_um: float = column(
+        "um", "least film thickness of the contact on the sealed side; nan for one", default=nan
+    )
+    h_min_air_um: float = column(
+        "um", "least film thickness of the contact on the air side; nan for one", default=nan
+    )
+    flux_mismatch_percent: float = column(
+        "%", "difference between the fluxes of two contacts; 0 where mass is conserved", default=nan
+    )
     density: int = column("", "density of the mesh that the state was solved on")
     verdict: str = column(
         "",

@@ -47,6 +47,22 @@ FINER_MESH = "the film collapsed on this mesh; use a finer mesh (larger density)
 
 
 @dataclass(frozen=True)
+class ContactNumbers:
+    """One contact of a film that has several: mm, MPa, flux per circumference in mm^2/s.
+
+    start, end: where h is 20 um. p_before: pressure where its part of the film begins, in the
+    groove between it and the one before.
+    """
+
+    flux: float
+    p_max: float
+    h_min: float
+    start: float
+    end: float
+    p_before: float
+
+
+@dataclass(frozen=True)
 class FilmNumbers:
     """Scalars of a film: mm, MPa, N, s; flux per circumference in mm^2/s, signed like U.
 
@@ -58,6 +74,8 @@ class FilmNumbers:
     have built up before the arc begins, relative to that of the inlet.
     mean_gap: least h_T, mm. lambda_ratio: that
     over sigma, nan between smooth surfaces. asperity_load, boundary_friction: shares of asperities.
+    contacts: from the sealed side on, where there are several; h_star is then that of the first one
+    that the oil reaches.
     """
 
     speed: float
@@ -77,6 +95,13 @@ class FilmNumbers:
     lambda_ratio: float = nan
     asperity_load: float = 0.0
     boundary_friction: float = 0.0
+    contacts: tuple[ContactNumbers, ...] = ()
+
+    @property
+    def mismatch(self) -> float:
+        """Largest difference between the flux of a contact and that of h*, %; 0 for one contact."""
+        apart = (abs(contact.flux / self.flux - 1.0) for contact in self.contacts)
+        return 100.0 * max(apart, default=0.0)
 
     @property
     def touching(self) -> bool:
@@ -106,7 +131,9 @@ class Verdict:
     are judged for each film alone. fewest: segments that the inlet needs. ratios: credible
     inlet_ratio. error: estimated error of the last film's h*, %, None where none is wanted. rough:
     between rough surfaces friction may rise while the speed falls, and h may be negative.
-    unsealed: where the sealed pressure ends although nothing is touched there.
+    unsealed: where the sealed pressure ends although nothing is touched there. references: maximum
+    contact pressures of each contact, from the sealed side on. overlap: where the section runs into
+    itself.
     """
 
     reference: float
@@ -117,6 +144,8 @@ class Verdict:
     error: float | None = None
     rough: bool = False
     unsealed: str = ""
+    references: tuple[float, ...] = ()
+    overlap: str = ""
 
     def after(self, film: FilmNumbers) -> Verdict:
         """The verdict that includes one more film; `collapsed` says what gave it away."""
@@ -138,7 +167,7 @@ class Verdict:
             return UNDER_RESOLVED
         if self.error is not None and not abs(self.error) <= LARGEST_ERROR:
             return UNCERTAIN
-        if self.unsealed:
+        if self.unsealed or self.overlap or self.last.mismatch > LARGEST_ERROR:
             return UNCERTAIN
         return OSCILLATING if self.last.oscillation > STRONG_OSCILLATION else OK
 
@@ -160,6 +189,16 @@ class Verdict:
             return (
                 f"the sealed pressure is taken to end {self.unsealed}, where the ring touches "
                 "nothing; try more squeeze or a narrower groove"
+            )
+        if word == UNCERTAIN and self.overlap:
+            return (
+                f"the section runs into itself {self.overlap}, which the model does not hinder; "
+                "try a lower sealed_pressure, a harder rubber or a wider mouth"
+            )
+        if word == UNCERTAIN and last.mismatch > LARGEST_ERROR:
+            return (
+                f"the fluxes of the two contacts differ by {last.mismatch:.2g} %: oil is lost in "
+                'the groove between them; use cavitation = "mass-conserving"'
             )
         if word == UNCERTAIN:
             known = self.error is not None and isfinite(self.error)
@@ -184,9 +223,12 @@ class Verdict:
     def _suspicion(self, film: FilmNumbers) -> str:
         if film.h_min <= 0.0 and not self.rough:
             return f"its least thickness is {1e3 * film.h_min:.2g} um"
-        excess = film.p_max - self.reference
-        if excess > EXCESS_PRESSURE * self.reference:
-            return f"the maximum pressure is {excess:.2f} MPa above that of frictionless contact"
+        for peak, reference in self._peaks(film):
+            excess = peak - reference
+            if excess > EXCESS_PRESSURE * reference:
+                return (
+                    f"the maximum pressure is {excess:.2f} MPa above that of frictionless contact"
+                )
         if self.rough or self.last is None or not film.speed < self.last.speed:
             return ""
         if abs(film.friction) > abs(self.last.friction):
@@ -194,6 +236,13 @@ class Verdict:
         if film.h_star <= 0.0 or self._exponent(film) > LARGEST_EXPONENT:
             return "its thickness falls too fast with the speed"
         return ""
+
+    def _peaks(self, film: FilmNumbers) -> list[tuple[float, float]]:
+        """Maximum pressures, each with that of contact: one by one if there are as many."""
+        if len(film.contacts) > 1 and len(film.contacts) == len(self.references):
+            peaks = [contact.p_max for contact in film.contacts]
+            return list(zip(peaks, self.references, strict=True))
+        return [(film.p_max, self.reference)]
 
     def _exponent(self, film: FilmNumbers) -> float:
         if self.last is None or self.last.h_star <= 0.0:

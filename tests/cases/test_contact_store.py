@@ -21,6 +21,8 @@ from softehl.cases.seal.equations import build_system
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.sections import SECTIONS
+from softehl.cases.seal.sections.keys import dimensions
 from softehl.cases.seal.state import Outcome, Silent
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.solve.newton import Newton
@@ -131,12 +133,21 @@ def test_every_parameter_either_matters_or_does_not() -> None:
     assert set(OTHER) | set(ROUGH) | OTHER_WORDS | {"tolerance"} == set(WITHOUT_INFLUENCE)
     assert contact_key(case(rod=50.5)) == contact_key(case(rod_diameter=50.5))
     assert contact_key(case(rod=50.5)) != contact_key(case())
-    assert set(CHANGED) | set(RUBBERS) == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
+    sections = {name: section for section in SECTIONS for name in dimensions(section)}
+    known = {*CHANGED, *RUBBERS, *sections, "section"}
+    assert known == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
     key = contact_key(case())
     assert contact_key(case(**OTHER)) == contact_key(case(**ROUGH)) == key
     graded = case(mesh="graded"), case(mesh="graded", tolerance=0.7)
     assert contact_key(graded[0]) == contact_key(graded[1])
     keys = {contact_key(case(**{name: value})) for name, value in CHANGED.items()}
+    free = {"arc_start": None, "arc_end": None, "groove_width": 8.0}
+    shapes = [contact_key(case(section=section, **free)) for section in SECTIONS]
+    for name, section in sections.items():
+        given = getattr(SECTIONS[section](), dimensions(section)[name])
+        sized = {name: (1.01 if name == "nose_radius" else 0.99) * given}
+        shapes.append(contact_key(case(section=section, **free, **sized)))
+    assert len(set(shapes)) == len(shapes)
     rubbers = [contact_key(case(**given)) for cases in RUBBERS.values() for given in cases]
     assert len({key, *keys, *rubbers}) == 1 + len(CHANGED) + len(rubbers)
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.grading import contact_edges, graded_layout
+from softehl.cases.seal.grading import graded_layout
 from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.method import run
 from softehl.cases.seal.order import OrderPair

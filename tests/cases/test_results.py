@@ -1,6 +1,7 @@
 """Verdicts on films, and the numbers of a film that is known in closed form."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,7 +61,7 @@ def test_a_film_that_follows_the_power_law_is_believed() -> None:
         ({"h_star": -1e-6}, "thickness falls too fast"),
     ],
 )
-def test_each_sign_of_collapse_is_seen(change: dict[str, float], reason: str, sign: float) -> None:
+def test_each_sign_of_collapse_is_seen(change: dict[str, Any], reason: str, sign: float) -> None:
     slower = replace(SLOWER, **change)
     instroke = replace(slower, friction=sign * slower.friction)
     verdict = _verdict(replace(HEALTHY, friction=sign * 5.0), instroke)
@@ -79,7 +80,7 @@ def test_each_sign_of_collapse_is_seen(change: dict[str, float], reason: str, si
     ],
 )
 def test_doubtful_films_are_labelled_each_for_itself(
-    change: dict[str, float], word: str, reason: str
+    change: dict[str, Any], word: str, reason: str
 ) -> None:
     verdict = _verdict(HEALTHY, replace(SLOWER, **change))
     assert verdict.word == word
@@ -191,7 +192,7 @@ def test_sealed_pressure_changes_the_load_of_the_contact_problem_only() -> None:
     ],
 )
 def test_ok_is_a_promise(
-    changes: dict[str, float], error: float | None, word: str, says: str
+    changes: dict[str, Any], error: float | None, word: str, says: str
 ) -> None:
     """Nothing is ok whose inlet, arc, thickness or estimated error speaks against it."""
     start = Verdict(reference=4.0, ratios=INLET_RATIO, error=error)

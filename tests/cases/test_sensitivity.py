@@ -16,12 +16,13 @@ from pydantic import ValidationError
 from softehl.__main__ import main
 from softehl.cases.oring import CASE
 from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.contacts import CONTACT_FILM
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.method import FilmPath
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.quantities import QUANTITIES
-from softehl.cases.seal.results import CONTACT_FILM, film_numbers
+from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import SensitivityRow, resolved
 from softehl.cases.seal.state import FilmRow, Silent

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from softehl.cases.seal.layout import uniform_layout
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
 from softehl.cases.seal.results import fit_percent
@@ -18,15 +19,15 @@ if TYPE_CHECKING:
 def gland_figure(p: ORing) -> Figure:
     """The section as it is made, at its radius on the rod, and the gland that it goes into."""
     from matplotlib.figure import Figure
-    from matplotlib.patches import Circle
+    from matplotlib.patches import Polygon
 
     figure = Figure(figsize=(4.6, 4.2))
     axes = figure.subplots()
     draw_gland(axes, p)
     rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
     half, size = 0.5 * p.groove_width, p.section_diameter
-    ring = Circle((0.0, rod + 0.5 * size), 0.5 * size, facecolor="#f2c14e", edgecolor="#3b3f45")
-    axes.add_patch(ring)
+    contour = uniform_layout(p).contour - [0.0, 0.5 * p.inner_diameter - rod]
+    axes.add_patch(Polygon(contour, facecolor="#f2c14e", edgecolor="#3b3f45"))
     left, right = p.groove_centre - half, p.groove_centre + half
     _measure(axes, (left, housing), (right, housing), f"{p.groove_width:.4g}", (0, 5))
     depth = housing - rod

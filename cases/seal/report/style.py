@@ -43,7 +43,7 @@ SPEED = "rod speed $|U|$ [mm/s]"
 def subject(p: ORing) -> str:
     """The ring, the oil and the sealed pressure in three lines, for the head of a picture."""
     return (
-        f"O-ring {p.inner_diameter:g} \N{MULTIPLICATION SIGN} {p.section_diameter:g} mm, "
+        f"{p.named} {p.inner_diameter:g} \N{MULTIPLICATION SIGN} {p.section_diameter:g} mm, "
         f"rod {p.rod_diameter:g} mm, housing {p.housing_diameter:g} mm\n"
         f"rubber $\\mu$ = {p.shear_modulus:g} MPa, $\\kappa$ = {p.bulk_modulus:g} MPa; "
         f"$p_s$ = {p.sealed_pressure:g} MPa\n"

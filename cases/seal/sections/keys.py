@@ -1,0 +1,127 @@
+"""The keys of a case that say which section its seal has, and the shape that they give.
+
+`section` names a page of this folder; its dimensions are keys by their own names, but for the
+height, which is `section_diameter`, and the width, `section_width`. They are read off the pages, so
+that another section is its page and a line of the registry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from pydantic import ValidationError, create_model
+
+from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.sections import SECTIONS
+from softehl.runtime.mesh.outline import Shape
+
+Name = Literal["round", "rectangular", "x_ring", "d_ring", "trapezoid", "u_cup"]
+
+ROUND: Name = "round"
+"""The section that needs no outline: its mesh is the O-grid of the paper."""
+
+NAMES = {
+    ROUND: "O-ring",
+    "rectangular": "square ring",
+    "x_ring": "X-ring",
+    "d_ring": "D-ring",
+    "trapezoid": "trapezoidal ring",
+    "u_cup": "U-cup",
+}
+"""What seals of these sections are called."""
+
+_RENAMED = {"width": "section_width"}  # what a page calls a dimension -> its key
+_STATIONS = 2000
+_BETWEEN = 0.01  # of the height: two lobes have a groove at least so deep between them
+
+
+def dimensions(section: str) -> dict[str, str]:
+    """Keys of the dimensions of a section, and what its page calls them."""
+    names = [name for name in SECTIONS[section].model_fields if name != "height"]
+    return {_RENAMED.get(name, name): name for name in names}
+
+
+def _declared() -> dict[str, Any]:
+    """Which section, and every dimension of every section once, with what it means in each."""
+    found: dict[str, list[tuple[str, str, float]]] = {}
+    for section in SECTIONS:
+        for name, own in dimensions(section).items():
+            extra = SECTIONS[section].model_fields[own].json_schema_extra
+            assert isinstance(extra, dict)
+            use = section, str(extra["meaning"]), float(str(extra["part"]))
+            found.setdefault(name, []).append(use)
+    keys = {name: (float | None, _key(uses)) for name, uses in found.items()}
+    return {"section": (Name, key(ROUND, "section of the seal (docs/sections.md)")), **keys}
+
+
+def _key(uses: list[tuple[str, str, float]]) -> Any:
+    """A key of the sections that have this dimension."""
+    meaning = f"{', '.join(section for section, _, _ in uses)}: {uses[0][1]}"
+    shares = " or ".join(dict.fromkeys(f"{share:g}" for _, _, share in uses))
+    bounds = f"left out = {shares} of section_diameter"
+    return key(None, meaning, unit="mm", bounds=bounds, ge=0)
+
+
+if TYPE_CHECKING:
+
+    class _Keys(Parameters):
+        section: Name = ROUND
+
+else:
+    _Keys = create_model("_Keys", __base__=Parameters, **_declared())
+
+
+class SectionKeys(_Keys):
+    """Which section a seal has, and the dimensions of it."""
+
+    def sized(self, height: float) -> dict[str, float]:
+        """The dimensions that are given, as their page calls them.  ValueError for others'."""
+        known = dimensions(self.section)
+        given = {
+            name: value
+            for section in SECTIONS
+            for name in dimensions(section)
+            if (value := getattr(self, name)) is not None
+        }
+        for name in given:
+            if name not in known:
+                has = ", ".join(known) or "section_diameter alone"
+                raise ValueError(f'{name} is no dimension of section = "{self.section}": {has}')
+        return {"height": height, **{known[name]: value for name, value in given.items()}}
+
+
+def shape_of(section: str, sizes: Mapping[str, float], inner_diameter: float) -> Shape:
+    """The shape of a section of these dimensions.  ValueError where they bound none."""
+    return _shape(section, tuple(sorted(sizes.items())), inner_diameter)
+
+
+@lru_cache(maxsize=32)
+def _shape(section: str, sizes: tuple[tuple[str, float], ...], inner_diameter: float) -> Shape:
+    try:
+        return SECTIONS[section](**dict(sizes)).shape(inner_diameter)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        name = ".".join(str(part) for part in first["loc"])
+        words = first["msg"].removeprefix("Value error, ")
+        raise ValueError(f'section = "{section}": {name} {words}'.replace("  ", " ")) from None
+
+
+def lobes(shape: Shape) -> int:
+    """How many separate parts of its film a section rests on: minima of r with a groove between."""
+    first, last = shape.film
+    r = shape.outline.at(np.linspace(first, last, _STATIONS))[:, 1]
+    deep, found, lowest, highest = _BETWEEN * float(np.ptp(r)), 1, r[0], r[0]
+    rising = False
+    for value in r:
+        if rising:
+            highest = max(highest, value)
+            if value < highest - deep:
+                found, rising, lowest = found + 1, False, value
+        else:
+            lowest = min(lowest, value)
+            if value > lowest + deep:
+                rising, highest = True, value
+    return found
