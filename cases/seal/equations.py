@@ -24,6 +24,7 @@ from softehl.cases.seal.system import (
     PRESSURE,
     ROD,
     ROTATION,
+    SEALED_WALL,
     SHEAR,
     VOID,
     WALLS,
@@ -45,6 +46,7 @@ from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.sections import SectionMesh
 
 _STEP = 0.9  # of its thickness a film may lose in an iteration
+_AT_WALL = 0.02  # of the section: as near to a wall it may come to touch it
 _ROUGH_STEP = 0.7  # of its thickness that of a rough film may change, at least by sigma
 
 
@@ -301,15 +303,19 @@ class SealSystem:
 
     # --- other systems on the same section --------------------------------------------------------
 
-    def film_layer(self) -> Layer:
-        """The film as the layer of the modified Newton iteration.
+    def film_layer(self, x: Array) -> Layer:
+        """The film as the layer of the modified Newton iteration, near the state x.
 
         Displacements of the arc and the moment are shared with the section; the pressures but
-        those at the ends are the film's own, whatever else its blocks know is prescribed.
+        those at the ends are the film's own, whatever else its blocks know is prescribed. Where
+        the arc is at a wall, its multipliers are shared too: without the displacements of these
+        nodes nothing would determine them.
         """
         start, nodes = self.layout.part(DISPLACEMENT).start, self.mesh.arc_nodes
         moment = self.layout.dofs(ROTATION)
-        shared = np.concatenate([start + 2 * nodes, start + 2 * nodes + 1, moment])
+        shared = np.concatenate(
+            [start + 2 * nodes, start + 2 * nodes + 1, moment, self._walls_of_arc(x)]
+        )
         own = [self.layout.dofs(field.name) for field in self._fields if field.on == "film"]
         inner = np.concatenate(own)
         if self.parameters.conserving:  # side by side along the film: their matrix is a band
@@ -333,6 +339,17 @@ class SealSystem:
         (pressure,) = [field for field in self._fields if field.name == PRESSURE]
         fields = (*self._fields, replace(pressure, name=name, order=order))
         return SealSystem.of(self.parameters, self.section, fields, (*self.blocks, *film))
+
+    def _walls_of_arc(self, x: Array) -> Integers:
+        """Multipliers (n,) of the walls at those nodes of the arc that touch them or are near."""
+        found = []
+        for name in (SEALED_WALL, AIR_WALL):
+            nodes = self.section.chains[WALLS[name]][0]
+            gap = self.obstacles[name].gap(self.deformed(x)[nodes])
+            near = np.isin(nodes, self.mesh.arc_nodes)
+            near &= gap < _AT_WALL * self.parameters.section_diameter
+            found.append(self.layout.dofs(name)[near])
+        return np.concatenate(found)
 
     # --- inside -----------------------------------------------------------------------------------
 

@@ -173,10 +173,10 @@ class FastFilm:
     corrector: SchurCorrector
 
     @classmethod
-    def of(cls, system: SealSystem, linear: Condenser) -> FastFilm:
-        """For one stroke; the factors of the section are kept from stage to stage."""
+    def of(cls, system: SealSystem, linear: Condenser, x: Array) -> FastFilm:
+        """For a stroke begun at x (n,); factors of the section are kept from stage to stage."""
         finish = Newton(max_iterations=1, linear=linear)
-        return cls(system, system.film_layer(), SchurCorrector(linear, near=_NEAR, finish=finish))
+        return cls(system, system.film_layer(x), SchurCorrector(linear, near=_NEAR, finish=finish))
 
     def weight(self, stage: Stage) -> Stage:
         """The stage from contact to film, to a loose tolerance: its states are not results."""

@@ -119,7 +119,7 @@ class FilmPath:
         system, settings, p = self.system, self.settings, self.system.parameters
         linear = self.driver.newton.linear
         assert isinstance(linear, Condenser)
-        fast = FastFilm.of(system, linear)
+        fast = FastFilm.of(system, linear, x)
         stages = [fast.weight(weight_stage(system, settings, film))]
         if p.shear_traction:
             stages.append(fast.shear(shear_stage(system, settings, film)))
@@ -189,7 +189,7 @@ class FilmPath:
 
         if self.quick:
             assert isinstance(linear, Condenser)
-            fast = FastFilm.of(system, linear)
+            fast = FastFilm.of(system, linear, x)
             if not isinstance(self.driver.follow(fast.rising(stage(film)), x), StageFailed):
                 return None
         film, x = reached[-1]

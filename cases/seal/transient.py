@@ -170,7 +170,7 @@ class March:
         content = sum(w * i.content for w, i in pairs)
         arc = self.system.mesh.arc_segments
         moved = sum(w * self.system.displacements(i.x)[arc, 0] for w, i in pairs)
-        layer = self._layer = self._layer or self.system.film_layer()
+        layer = self._layer = self._layer or self.system.film_layer(self.behind[0].x)
         assemblers = [
             a.with_data(FILM, data=np.ascontiguousarray(moved)).with_data(
                 SQUEEZE, point_data=np.ascontiguousarray(content)[:, :, None]

@@ -5,13 +5,18 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 
 from softehl.cases.seal import film as seal_film
-from softehl.cases.seal.film import METHOD
+from softehl.cases.seal.equations import build_system
+from softehl.cases.seal.film import METHOD, first_film
 from softehl.cases.seal.method import run
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathSettings
 from softehl.cases.seal.state import Outcome
 from softehl.runtime.arrays import Array
+from softehl.runtime.fem.layered import Layered
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Solution, Status
@@ -130,3 +135,23 @@ def test_a_section_that_is_free_to_roll_takes_the_monolithic_route() -> None:
     parameters = {"density": 1, "sealed_pressure": 0.6, "stroke": "out", "speeds": (6400.0,)}
     outcome = run(oring(rotation="free", shear_traction=False, **parameters), Recorder())
     assert {s.method for s in outcome.stages} == {"newton"}
+
+
+def test_a_film_that_ends_at_a_wall_leaves_no_multiplier_undetermined() -> None:
+    """Above three shear moduli the arc reaches the wall; the rest of the section is condensed."""
+    system = build_system(ORing(density=1))
+    x, air_end = system.at_rest(), system.mesh.arc_nodes[-3:]
+    at_wall = system.obstacles["air_wall"].c
+    system.displacements(x)[air_end, 0] = -at_wall - system.mesh.points[air_end, 0]
+    boundary = system.section.chains["wall_nodes"][0]
+    x[system.layout.part("air_wall")][np.isin(boundary, air_end)] = -1.0
+    film = first_film(system, PathSettings(), "out", x)
+
+    def empty_rows(near: Array) -> int:
+        layered = Layered(system.film_problem(film), system.film_layer(near))
+        inside = np.setdiff1d(np.arange(len(x)), layered.shared)
+        rows: Array = abs(layered.body(x).tocsr()[inside][:, inside]).sum(axis=1)
+        return int((np.asarray(rows).ravel() == 0.0).sum())
+
+    assert empty_rows(x) == 0
+    assert empty_rows(system.at_rest()) == len(air_end)
