@@ -261,3 +261,23 @@ def test_the_length_of_a_vector_and_its_derivatives(tmp_path: Path) -> None:
     (tmp_path / "root").mkdir()
     r = compiled(m.finish(), tmp_path / "root").residual(np.zeros((1, 0)), np.zeros((1, 2)))
     assert np.isnan(r).all()
+
+
+@pytest.mark.parametrize(
+    ("clamp", "slope"),
+    [
+        (lambda x, c: sp.Max(-c, sp.Min(x, c)), 1.0),
+        (lambda x, c: sp.sign(x) * sp.Min(sp.Abs(x), c), 0.0),
+    ],
+)
+def test_the_slope_of_a_clamp_at_zero(
+    clamp: Callable[[Any, Any], Any], slope: float, tmp_path: Path
+) -> None:
+    """What docs/language.md says of kinks: `sign(0)` is 0, and so is the slope of the product."""
+    m = Model("clamp", nodes=1, rule=quadrature.point_rule())
+    x = m.unknown("x")
+    (c,) = m.parameters(c="limit")
+    m.weak_form([(clamp(x, c), x)])
+    kernel = compiled(m.finish(), tmp_path, "-O0")
+    _, K = kernel.tangent(np.empty((1, 0)), np.zeros((1, 1)), parameters=[0.5])
+    assert K.item() == slope

@@ -33,7 +33,7 @@ def floor() -> Definition:
     gap = -uy
     pressure = m.define("pressure", k * sp.Max(gap, 0))
     trial = m.define("trial", k * (ux - foot))
-    traction = m.define("traction", sp.sign(trial) * sp.Min(sp.Abs(trial), mu * pressure))
+    traction = m.define("traction", sp.Max(-mu * pressure, sp.Min(trial, mu * pressure)))
     half = m.define("half", (X[0][1] - X[0][0]) / 2)
     m.weak_form([(-pressure * half, uy), (traction * half, ux)])
     m.fields(pressure=pressure, traction=traction, slip=foot)
