@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ from softehl.runtime.library import KernelError, Library
 
 class ArgumentError(KernelError, ValueError):
     """An array has a wrong shape or kind, or a task is not offered."""
+
+
+_NOTHING = np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +40,18 @@ class Rule:
         for array in (self.points, self.weights, self.basis):
             if array is not None:
                 array.setflags(write=False)
+
+    @cached_property
+    def table(self) -> Array:
+        """Points with their weights, (q, dim + 1)."""
+        points = np.asarray(self.points, dtype=np.float64).reshape(len(self.weights), -1)
+        return np.column_stack([points, self.weights])
+
+    @cached_property
+    def shape_functions(self) -> Array:
+        """The basis, contiguous; empty for none."""
+        basis = _NOTHING if self.basis is None else self.basis
+        return np.ascontiguousarray(basis, dtype=np.float64)
 
 
 Condition = tuple[str, str, float, str]
@@ -72,9 +88,6 @@ class Family:
     conditions: tuple[Condition, ...] = ()
     places: tuple[tuple[str, int | None], ...] = ()
     history: tuple[str, ...] = ()
-
-
-_NOTHING = np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,17 +172,13 @@ class Call:
 
     def _tables(self) -> tuple[Array, Array]:
         """Points with their weights, (q, dim + 1), and the basis at them."""
-        rule, default = self.rule, self.kernel.default_rule
-        points = np.asarray(rule.points, dtype=np.float64).reshape(len(rule.weights), -1)
-        dimension = default.points.reshape(len(default.weights), -1).shape[1]
-        if points.shape[1] != dimension:
+        table, default = self.rule.table, self.kernel.default_rule.table
+        if table.shape[1] != default.shape[1]:
             raise ArgumentError(
-                f"{self.kernel.name}: points of the rule are {points.shape[1]}-dimensional, "
-                f"must be {dimension}-dimensional"
+                f"{self.kernel.name}: points of the rule are {table.shape[1] - 1}-dimensional, "
+                f"must be {default.shape[1] - 1}-dimensional"
             )
-        basis = _NOTHING if rule.basis is None else rule.basis
-        table = np.column_stack([points, rule.weights])
-        return table, np.ascontiguousarray(basis, dtype=np.float64)
+        return table, self.rule.shape_functions
 
     def _check(self, data: Array, parameters: Array, condition: Condition) -> None:
         name, relation, bound, where = condition

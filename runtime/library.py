@@ -32,6 +32,7 @@ _SIGNATURE = (
     " const double *, const double *, const double *, const double *, double *, double *);"
 )
 _ffi = cffi.FFI()
+_DOUBLES = _ffi.typeof("double[]")
 
 Function = Callable[[tuple[int, int, int], Sequence[Array], Array, "Array | None"], None]
 """counts (elements, points, modes), arrays that are read, values and tangent that are written; the
@@ -76,9 +77,9 @@ class Library:
         ) -> None:
             function(
                 *counts,
-                *(_pointer(array, "const double *") for array in read),
-                _pointer(values, "double *"),
-                _ffi.NULL if tangent is None else _pointer(tangent, "double *"),
+                *map(_pointer, read),
+                _pointer(values),
+                _ffi.NULL if tangent is None else _pointer(tangent),
             )
 
         return call
@@ -178,8 +179,9 @@ def _remedy(directory: Path) -> str:
     )
 
 
-def _pointer(array: Array, kind: str) -> Any:
-    return _ffi.cast(kind, array.ctypes.data)
+def _pointer(array: Array) -> Any:
+    """Where an array begins that is contiguous in memory; raises otherwise."""
+    return _ffi.from_buffer(_DOUBLES, array)
 
 
 def _sources_signature(directory: Path) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,22 +34,27 @@ class DofLayout:
 
     def count(self, name: str) -> int:
         """Number of unknowns of a field; KeyError for an unknown name."""
-        return self.counts[self._position(name)]
+        part = self.part(name)
+        return int(part.stop - part.start)
 
     def part(self, name: str) -> slice:
         """Slice of a field in the vector of unknowns; KeyError for an unknown name."""
-        first = sum(self.counts[: self._position(name)])
-        return slice(first, first + self.count(name))
+        try:
+            return self._parts[name]
+        except KeyError:
+            known = ", ".join(self.names)
+            raise KeyError(f"no field {name!r}; there are {known}") from None
 
     def dofs(self, name: str) -> Integers:
         """Numbers (count,) of the unknowns of a field; KeyError for an unknown name."""
         part = self.part(name)
         return np.arange(part.start, part.stop)
 
-    def _position(self, name: str) -> int:
-        if name not in self.names:
-            raise KeyError(f"no field {name!r}; there are {', '.join(self.names)}")
-        return self.names.index(name)
+    @cached_property
+    def _parts(self) -> dict[str, slice]:
+        ends = itertools.accumulate(self.counts)
+        named = zip(self.names, self.counts, ends, strict=True)
+        return {name: slice(end - count, end) for name, count, end in named}
 
 
 def displacement_dofs(nodes: Integers) -> Integers:

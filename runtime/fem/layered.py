@@ -51,6 +51,16 @@ class Layer:
         return len(self.shared) + len(self.own)
 
 
+def _leading(K: csc_array[np.float64], size: int) -> csc_array[np.float64]:
+    """The first rows and columns of K; K itself where there are no others."""
+    if K.shape[0] == size:
+        return K
+    end = K.indptr[size]
+    kept = K.indices[:end] < size
+    ends = np.concatenate([[0], np.cumsum(kept)])[K.indptr[: size + 1]]
+    return csc_array((K.data[:end][kept], K.indices[:end][kept], ends), shape=(size, size))
+
+
 def _renumbered(block: ElementBlock, compact: Integers) -> ElementBlock:
     return replace(block, dofs=compact[block.dofs])
 
@@ -124,7 +134,7 @@ class Layered:
         """Residual (m + k,) and tangent (m + k, m + k) of the layer, shared unknowns first."""
         layer = self.layer
         r, K = layer.assembler.linearise(x[layer.numbers], self.problem.parameters)
-        return r[: layer.size], csc_array(K[: layer.size, : layer.size])
+        return r[: layer.size], _leading(K, layer.size)
 
     def layer_limit(self, x: Array, dx: Array) -> float:
         """Largest fraction of the step that the guards of the layer admit."""

@@ -103,11 +103,11 @@ class CondensedSystem:
     def step(self, r: Array, L: SparseMatrix) -> Array:
         """Newton step (n,): the own unknowns by a banded solve, the shared by a dense one."""
         m = len(self.problem.shared)
-        own = L[m:, m:]
-        right = np.column_stack([L[m:, :m].toarray(), r[m:]])
-        eliminated = solve_banded(csc_array(own), right)
-        A = self.schur + L[:m, :m].toarray() - L[:m, m:] @ eliminated[:, :m]
-        b = r[:m] - L[:m, m:] @ eliminated[:, m]
+        parts = Parts.of(L, m)
+        eliminated = solve_banded(parts.own, np.column_stack([parts.shared[m:], r[m:]]))
+        through = np.asarray(parts.right @ eliminated)[:m]
+        A = self.schur + parts.shared[:m] - through[:, :m]
+        b = r[:m] - through[:, m]
         try:
             a = dense.lu_solve(dense.lu_factor(A, check_finite=False), b, check_finite=False)
         except (ValueError, np.linalg.LinAlgError) as error:
@@ -123,14 +123,54 @@ class CondensedSystem:
         return self.problem.layer_limit(x, dx)
 
 
-def solve_banded(A: SparseMatrix, b: Array) -> Array:
+@dataclass(frozen=True, eq=False)
+class Entries:
+    """Entries of a matrix (size, size): rows, columns and values, none twice."""
+
+    size: int
+    rows: Integers
+    columns: Integers
+    values: Array
+
+    @classmethod
+    def of(cls, A: SparseMatrix) -> Entries:
+        """Those of a sparse matrix."""
+        entries = A.tocoo()
+        rows, columns = (part.astype(np.int64) for part in entries.coords)
+        return cls(A.shape[0], rows, columns, entries.data)
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """A layer's tangent, cut between its shared and its own unknowns.
+
+    shared: (m + k, m) its first columns, dense.  right: (m + k, k) the others.  own: (k, k).
+    """
+
+    shared: Array
+    right: SparseMatrix
+    own: Entries
+
+    @classmethod
+    def of(cls, L: SparseMatrix, m: int) -> Parts:
+        """Cut L (m + k, m + k), csc without entries that are given twice."""
+        size, first = L.shape[0], L.indptr[m]
+        columns = np.repeat(np.arange(size), np.diff(L.indptr))
+        shared = np.zeros((size, m))
+        shared[L.indices[:first], columns[:first]] = L.data[:first]
+        rows, data = L.indices[first:], L.data[first:]
+        right = csc_array((data, rows, L.indptr[m:] - first), shape=(size, size - m))
+        inner = rows >= m
+        chosen = rows[inner].astype(np.int64) - m, columns[first:][inner] - m
+        return cls(shared, right, Entries(size - m, *chosen, data[inner]))
+
+
+def solve_banded(A: Entries, b: Array) -> Array:
     """A^-1 b, (k, j), by LU of the band that holds A (k, k); raises SingularMatrix."""
-    entries = A.tocoo()
-    rows, columns = entries.coords
-    offset = rows.astype(np.int64) - columns
+    offset = A.rows - A.columns
     lower, upper = int(offset.max(initial=0)), int(-offset.min(initial=0))
-    band = np.zeros((lower + upper + 1, A.shape[0]))
-    band[upper + offset, columns] = entries.data
+    band = np.zeros((lower + upper + 1, A.size))
+    band[upper + offset, A.columns] = A.values
     try:
         return np.asarray(dense.solve_banded((lower, upper), band, b, check_finite=False))
     except np.linalg.LinAlgError as error:

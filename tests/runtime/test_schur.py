@@ -15,7 +15,7 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve import pardiso
-from softehl.runtime.solve.condensed import solve_banded
+from softehl.runtime.solve.condensed import Entries, Parts, solve_banded
 from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.linear import Condenser, SingularMatrix
 from softehl.runtime.solve.modified_newton import ModifiedNewton
@@ -238,9 +238,11 @@ def test_a_start_that_is_not_finite_is_named() -> None:
 def test_banded_solve_against_a_dense_one(rng: np.random.Generator) -> None:
     A = np.diag(rng.normal(size=8)) + np.diag(rng.normal(size=7), 1) + np.diag(np.ones(6), -2)
     b = rng.normal(size=(8, 3))
-    assert solve_banded(csc_array(A), b) == pytest.approx(np.linalg.solve(A, b), rel=1e-9)
+    assert solve_banded(Entries.of(csc_array(A)), b) == pytest.approx(
+        np.linalg.solve(A, b), rel=1e-9
+    )
     with pytest.raises(SingularMatrix):
-        solve_banded(csc_array(np.zeros((3, 3))), np.ones((3, 1)))
+        solve_banded(Entries.of(csc_array(np.zeros((3, 3)))), np.ones((3, 1)))
 
 
 # --- the corrector -----------------------------------------------------------------------------
@@ -393,3 +395,14 @@ def test_a_looser_view_shares_the_condensation() -> None:
     assert loose.residual_norms[-1] > 1e-6
     assert (loose.factorisations, tight.factorisations) == (1, 0)
     assert tight.x == pytest.approx(answer(0.5), abs=1e-9)
+
+
+def test_a_tangent_cut_between_shared_and_own_unknowns() -> None:
+    rng = np.random.default_rng(3)
+    A = np.where(rng.random((9, 9)) < 0.5, rng.random((9, 9)), 0.0)
+    parts = Parts.of(csc_array(A), 4)
+    own = np.zeros((5, 5))
+    own[parts.own.rows, parts.own.columns] = parts.own.values
+    assert (parts.shared == A[:, :4]).all()
+    assert (parts.right.toarray() == A[:, 4:]).all()
+    assert (own == A[4:, 4:]).all()
