@@ -90,6 +90,7 @@ docs: $(VENV)/.docs
 
 pictures: $(VENV)/.kernels
 	$(BIN)/python docs/pictures.py
+	$(BIN)/python docs/section_pictures.py
 	PYTHONPATH=. $(BIN)/python docs/gallery/pictures.py
 
 clean:

@@ -1,6 +1,7 @@
 """Tables of docs/ that follow from declarations: `python -m softehl.cases.document` renews them.
 
-A table stands between the lines `<!-- columns CASE -->` or `<!-- keys CASE -->` and `<!-- end -->`.
+A table stands between the lines `<!-- columns CASE -->`, `<!-- keys CASE -->` or
+`<!-- section NAME -->`, the dimensions of a section of a seal, and `<!-- end -->`.
 """
 
 import re
@@ -8,11 +9,13 @@ from pathlib import Path
 
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.table import column_lines, key_lines
+from softehl.cases.seal.sections import SECTIONS
+from softehl.cases.seal.sections.keys import dimensions
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.io import write_text
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-_TABLE = re.compile(r"<!-- (columns|keys) (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+_TABLE = re.compile(r"<!-- (columns|keys|section) (\w+) -->\n.*?<!-- end -->", re.DOTALL)
 
 
 def renewed(text: str) -> str:
@@ -22,9 +25,25 @@ def renewed(text: str) -> str:
 
 def _table(found: re.Match[str]) -> str:
     what, name = found.groups()
-    case = load_case(SHIPPED[name])
-    lines = key_lines(case.parameters) if what == "keys" else column_lines(case.row)
+    if what == "section":
+        lines = section_lines(name)
+    else:
+        case = load_case(SHIPPED[name])
+        lines = key_lines(case.parameters) if what == "keys" else column_lines(case.row)
     return "\n".join([f"<!-- {what} {name} -->", *lines, "<!-- end -->"])
+
+
+def section_lines(name: str) -> list[str]:
+    """The dimensions of a section as a table."""
+    rows = ["| key | left out | bounds [mm] | what it is |", "|---|---|---|---|"]
+    fields = SECTIONS[name].model_fields
+    for key, own in dimensions(name).items():
+        extra = fields[own].json_schema_extra
+        assert isinstance(extra, dict)
+        bounds = str(extra["bounds"]).partition(";")[0]
+        share = f"{extra['part']:g} section_diameter"
+        rows.append(f"| `{key}` | {share} | {bounds} | {extra['meaning']} |")
+    return rows
 
 
 def main() -> None:

@@ -83,6 +83,13 @@ class BoundaryLayout:
             found.append(a + (b - a) * (spacing(t) if spacing else t))
         return np.concatenate(found)
 
+    def lengths(self, density: Fraction, s: Array) -> Array:
+        """Lengths (n,) of the longer segment of this density at nodes at s, mm."""
+        places = self.places(density)
+        after = np.diff(np.append(places, places[0] + self.outline.length))
+        longer = np.maximum(after, np.roll(after, 1))
+        return np.asarray(np.interp(s, places, longer, period=self.outline.length))
+
     def depth(self, s: Array) -> Array:
         """Thickness (n,) of the strip, mm."""
         length = self.outline.length

@@ -24,8 +24,9 @@ GROWTH = 8.0
 """Ratio of the thickness of the innermost to the outermost layer."""
 
 WORST = 0.3
-"""Least Jacobian at a corner, relative to the area, that a mesh may have."""
+"""Least Jacobian at a corner, relative to the area, that is looked for with thinner strips."""
 
+_LEAST = 0.1  # the same that is accepted where they do not help: long segments over a fillet
 _TRIES = 6  # at a strip that does not fold, each half as thick
 _COARSEST_TRIANGLES = Fraction(2, 3)  # density of the triangles: finer meshes divide theirs
 
@@ -46,33 +47,42 @@ def outline_mesh(
     """
     layout = BoundaryLayout.of(shape.outline, film, spacing, long)
     _require_density(density, long)
-    k = _divisions(Fraction(density))
-    for halvings in range(_TRIES):
-        # the coarsest of its family decides how thick the strip is
-        coarse = _mesh(layout, Fraction(density) / k, 0.5**halvings, growth)
-        mesh = _mesh(layout, Fraction(density), 0.5**halvings, growth) if coarse else None
-        if mesh:
-            return mesh
+    coarse = Fraction(density) / _divisions(Fraction(density))
+    best, found, mesh = 0.0, 1.0, None
+    for halvings in range(_TRIES):  # the coarsest of its family decides how thick the strip is
+        tried = _mesh(layout, coarse, 0.5**halvings, growth)
+        share = _worst(tried)
+        if share > best:
+            best, found, mesh = share, 0.5**halvings, tried
+        if share >= WORST:
+            break
+    if coarse != density and best >= _LEAST:
+        mesh = _mesh(layout, Fraction(density), found, growth)
+    if mesh and _worst(mesh) >= _LEAST:
+        return mesh
     raise MeshError(
-        f"no sound mesh of {shape.name} at density {density} with {long} segments of its film: no "
-        f"corner of an element may have less than {WORST:g} of its share; use a higher density, a "
-        "finer spacing or rounder corners"
+        f"no sound mesh of {shape.name} at density {density} with {long} segments of its film: a "
+        f"corner of an element has {best:.2g} of its share, at least {_LEAST:g} is needed; use a "
+        "higher density, a finer spacing or rounder corners"
     )
 
 
 def _mesh(
     layout: BoundaryLayout, density: Fraction, part: float, growth: float
 ) -> SectionMesh | None:
-    """The mesh with a strip of this part of its thickness, if its elements are sound."""
+    """The mesh with a strip of this part of its thickness; None where it folds."""
     rows = _strip(layout, density, part, growth)
-    strip = rows.reshape(-1, 2)[_strip_quads(*rows.shape[:2])]
-    if not corner_shares(strip).min() >= WORST:
+    if corner_shares(rows.reshape(-1, 2)[_strip_quads(*rows.shape[:2])]).min() < _LEAST:
         return None
     try:
-        mesh = _filled(layout, rows, density)
+        return _filled(layout, rows, density)
     except MeshError:
         return None
-    return mesh if corner_shares(mesh.points[mesh.quads]).min() >= WORST else None
+
+
+def _worst(mesh: SectionMesh | None) -> float:
+    """The least share of a corner, 0 without a mesh."""
+    return float(corner_shares(mesh.points[mesh.quads]).min()) if mesh else 0.0
 
 
 def _require_density(density: int | Fraction, long: int) -> None:
@@ -88,7 +98,9 @@ def _strip(layout: BoundaryLayout, density: Fraction, part: float, growth: float
     s = layout.places(density)
     depth = part * layout.depth(s)
     ring = layout.outline.at(s)
-    inner = ring + depth[:, None] * normals(layout.outline, s, np.maximum(SMOOTH, 1.5 * depth))
+    # over half a segment of the coarsest of the family: chords may pass over a small fillet
+    over = np.maximum(0.5 * layout.lengths(density / _divisions(density), s), 1.5 * depth)
+    inner = ring + depth[:, None] * normals(layout.outline, s, np.maximum(SMOOTH, over))
     t = graded_steps(int(LAYERS * density), growth)[:, None, None]
     return np.asarray(ring[None] + t * (inner - ring)[None])
 

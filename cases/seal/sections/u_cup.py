@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softehl.cases.seal.sections.base import Section, part, require
-from softehl.runtime.mesh.outline import Outline, Point, rounded
+from softehl.runtime.mesh.outline import Arc, Outline, Point, rounded
 
 _ROUNDS = 12  # in which the height over the rounded edges settles
 
@@ -71,5 +71,7 @@ class UCup(Section):
         return 0.5 * self.height - self.bevel
 
     def crown(self) -> Point:
-        """The sealing edge of the lip in the housing."""
-        return self.bevel, 0.5 * self.height
+        """The highest point of the lip in the housing, on its rounded sealing edge."""
+        top = max(self.drawn().pieces, key=lambda piece: piece.box[3])
+        z = top.centre[0] if isinstance(top, Arc) else self.bevel
+        return z, top.box[3]
