@@ -60,10 +60,13 @@ REACH, FILMS = 0.15, 60.0
 STEEPEST = 55.0
 """Or where the surface is this steep, degrees: beyond it is no film."""
 
-MOST_SEGMENTS, FINEST = 60, 0.7
+MOST_SEGMENTS, FINEST = 60, 0.45
 """An arc that the contact places gets more segments, up to so many at density 1, until the finest
-one at density 2 is so much of the inlet at the slowest speed: with 0.8 inlet lengths h* is right to
-one per cent, with 2.5 to five."""
+one at density 2 is so much of the inlet at the slowest speed."""
+
+DEPTH = 2.5
+"""Elements on such an arc are nowhere thicker than so many inlets at the slowest speed: with ten h*
+was two per cent too small, with half as many as this it changes by 0.2 %."""
 
 _MULTIPLE = 3  # of segments at density 1: meshes exist for thirds of a density
 _PLACED_COARSEST = 12  # as COARSEST, of an arc that the contact places
@@ -101,7 +104,8 @@ def placed_layout(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGME
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
         if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet_length(p, steepest):
             break
-    return layout.graded(spacing, long, 0.25 * p.corner_fillet if p.opens else None)
+    first = 0.25 * p.corner_fillet if p.opens else None
+    return layout.graded(spacing, long, DEPTH * inlet_length(p, steepest), first)
 
 
 def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:

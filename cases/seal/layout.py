@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import pi, radians
+from math import inf, pi, radians
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +18,7 @@ from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.fem.postprocess import run_around
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.outline_mesh import outline_mesh
-from softehl.runtime.mesh.sections import SHORT, Disc, SectionMesh, disc_mesh
+from softehl.runtime.mesh.sections import LAYERS, SHORT, Disc, SectionMesh, disc_mesh
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 
 _LEVEL = 1e-6  # of the height of a section: what is level
@@ -66,8 +66,14 @@ class Layout(Protocol):
     def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
         """The same laid out on an arc whose ends are at these places of that of another one."""
 
-    def graded(self, spacing: Spacing, long: int, first: float | None = None) -> Layout:
-        """With these segments on the arc.  first: size of the one beyond its air end, mm."""
+    def graded(
+        self, spacing: Spacing, long: int, depth: float = inf, first: float | None = None
+    ) -> Layout:
+        """With these segments on the arc.
+
+        depth: that elements on the arc are to have at most, mm, as far as their number allows.
+        first: size of the segment beyond the air end of the arc, mm.
+        """
 
 
 GUIDE_ARC, GUIDE_TOP = 75.0, 118.0
@@ -84,6 +90,10 @@ LONG_PLACED = 33
 
 _SIDES = 25.0  # degrees that the side blocks need at least
 _CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
+
+
+MOST_LAYERS, STEEPEST_GROWTH = 6, 2.0
+"""Layers at density 1, and the largest ratio of one to the one outside of it at density 2."""
 
 
 @dataclass(frozen=True)
@@ -143,13 +153,16 @@ class RoundLayout:
         start, end = (before.arc_start + float(np.degrees(e / before.radius)) for e in ends)
         return RoundLayout(replace(self.disc, arc_start=start, arc_end=end))
 
-    def graded(self, spacing: Spacing, long: int, first: float | None = None) -> RoundLayout:
+    def graded(
+        self, spacing: Spacing, long: int, depth: float = inf, first: float | None = None
+    ) -> RoundLayout:
         """See `Layout`."""
         start, end = self.disc.arc_start, self.disc.arc_end
         growth, top = _ROW_GROWTH, max(_TOP, end + _SIDES, _SIDES - start)
         if first is not None:
             side = self.disc.radius * np.radians(top - end)
-            growth = _growth_to(first / side, SHORT * _DENSITY)
+            growth = _growth_to(first / side, SHORT * _DENSITY, _ROW_GROWTH)
+        layers, layer_growth = _layers(depth / self._deepest)
         return RoundLayout(
             replace(
                 self.disc,
@@ -157,15 +170,32 @@ class RoundLayout:
                 long=long,
                 top=top,
                 corner_radius=_CORNERS,
-                layer_growth=_LAYER_GROWTH,
+                layers=layers,
+                layer_growth=layer_growth,
                 row_growth=growth,
             )
         )
 
+    @property
+    def _deepest(self) -> float:
+        """Depth of all layers below the middle of the arc, mm: they are least deep at its ends."""
+        bulge, half = self.disc.bulge[0], 0.5 * (self.disc.arc_end - self.disc.arc_start)
+        inner = _CORNERS[0] * (bulge + (1.0 - bulge) * np.cos(np.radians(half)))
+        return float((1.0 - inner) * self.disc.radius)
 
-def _growth_to(first: float, count: int) -> float:
+
+def _layers(first: float) -> tuple[int, float]:
+    """How many layers there are at density 1, and their growth; the first is this part of all."""
+    for layers in range(LAYERS, MOST_LAYERS + 1, LAYERS):
+        growth = _growth_to(first, layers * _DENSITY, _LAYER_GROWTH)
+        if growth <= STEEPEST_GROWTH ** (layers * _DENSITY):
+            return layers, growth
+    return MOST_LAYERS, STEEPEST_GROWTH ** (MOST_LAYERS * _DENSITY)
+
+
+def _growth_to(first: float, count: int, least: float) -> float:
     """Ratio of the last to the first of `count` parts of a line, the first of them this part."""
-    growth = _ROW_GROWTH
+    growth = least
     while np.expm1(np.log(growth) / count) / (growth - 1.0) > first:
         growth *= 1.1
     return growth
@@ -237,8 +267,10 @@ class OutlineLayout:
         begin, end = (old.film[0] + place for place in ends)
         return replace(self, film=(begin, end), held=old.held)
 
-    def graded(self, spacing: Spacing, long: int, first: float | None = None) -> OutlineLayout:
-        """See `Layout`."""
+    def graded(
+        self, spacing: Spacing, long: int, depth: float = inf, first: float | None = None
+    ) -> OutlineLayout:
+        """See `Layout`; the depth of its elements follows from its segments."""
         return replace(self, spacing=spacing, long=long)
 
 

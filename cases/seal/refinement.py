@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
 from softehl.cases.seal.contact import contact_problem, contact_stage
@@ -28,10 +29,13 @@ from softehl.runtime.mesh.carrying import (
     carry_nodes,
 )
 from softehl.runtime.mesh.prolongation import (
+    PARTS,
     prolong_chain,
     prolong_elements,
     prolong_loop,
     prolong_nodes,
+    resampled_elements,
+    resampled_nodes,
     restrict_chain,
     restrict_elements,
     restrict_nodes,
@@ -80,24 +84,26 @@ BY_PLACE = _Transfer(carry_nodes, carry_elements, carry_boundary, carry_chain)
 
 def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
     """The most accurate transfer: exact between meshes that share nodes, else by local splines."""
-    before, after, long = old.section.layout, new.section.layout, old.section.layout.long
-    density = old.mesh.arc // long
+    before, after = old.section.layout, new.section.layout
+    density = old.mesh.arc // before.long
     nested = isinstance(before, RoundLayout) and before == after
+    parts = before.disc.parts if isinstance(before, RoundLayout) else PARTS
     if nested and new.mesh.arc == 2 * old.mesh.arc:
         return _Carrier(
             f"prolonged from density {density}",
-            lambda values: prolong_nodes(values, density, long),
-            lambda values: prolong_elements(values, density, long),
+            lambda values: prolong_nodes(values, density, parts),
+            lambda values: prolong_elements(values, density, parts),
             lambda name, v: prolong_loop(v) if _closed(old, name) else prolong_chain(v),
         )
     if nested and old.mesh.arc == 2 * new.mesh.arc:
         return _Carrier(
             f"restricted from density {density}",
-            lambda values: restrict_nodes(values, density, long),
-            lambda values: restrict_elements(values, density, long),
+            lambda values: restrict_nodes(values, density, parts),
+            lambda values: restrict_elements(values, density, parts),
             lambda _, values: restrict_chain(values),
         )
     meshes, how = (old.mesh, new.mesh), BY_ANGLE if isinstance(before, RoundLayout) else BY_PLACE
+    sizes = Fraction(old.mesh.arc, before.long), Fraction(new.mesh.arc, after.long)
 
     def chain(name: str, values: Array) -> Array:
         if _closed(old, name):
@@ -105,6 +111,13 @@ def _carrier(old: SealSystem, new: SealSystem) -> _Carrier:
         here, there = (system.section.chains[name][0] for system in (old, new))
         return how.chain(*meshes, here, there, values)
 
+    if nested:
+        return _Carrier(
+            "from another density",
+            lambda values: resampled_nodes(values, *sizes, parts),
+            lambda values: resampled_elements(values, *sizes, parts),
+            chain,
+        )
     return _Carrier(
         "moved from another mesh",
         lambda values: how.nodes(*meshes, values),

@@ -1,12 +1,14 @@
-"""From a mesh to the one of twice its density, and back: nodal, element and chain values.
+"""From a mesh to one of another density of it: nodal, element and chain values.
 
 The nodes of both meshes are images of index space under one mapping (`mesh.sections`), so that
-values are interpolated in the indices of each of its five blocks. `long` is that of the disc.
+values are interpolated in the indices of each of its five blocks. `parts` are those of the disc.
 """
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -14,13 +16,17 @@ from scipy.interpolate import make_interp_spline
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.sections import LAYERS, LONG, SHORT
 
+Parts: TypeAlias = tuple[int, int, int]
 
-def node_blocks(density: int, long: int = LONG) -> list[Integers]:
+PARTS: Parts = LONG, SHORT, LAYERS
+
+
+def node_blocks(density: int | Fraction, parts: Parts = PARTS) -> list[Integers]:
     """Node numbers of the blocks as grids: bottom, right, top and left layers, then the centre.
 
     Blocks share the nodes at which they meet.
     """
-    long, short, layers = long * density, SHORT * density, LAYERS * density
+    long, short, layers = (int(n * density) for n in parts)
     around = 2 * (long + short)
     rings = np.arange(layers * around).reshape(layers, around)
     centre = layers * around + np.arange((short + 1) * (long + 1)).reshape(short + 1, long + 1)
@@ -31,27 +37,51 @@ def node_blocks(density: int, long: int = LONG) -> list[Integers]:
     return [rings[:, a : b + 1] for a, b in pairwise(ends)] + [centre]
 
 
-def prolong_nodes(values: Array, density: int, long: int = LONG) -> Array:
-    """Nodal values (V', k) at twice the density from those, (V, k), at `density`: cubic splines."""
-    coarse, fine = node_blocks(density, long), node_blocks(2 * density, long)
-    result = np.empty((max(int(block.max()) for block in fine) + 1, values.shape[1]))
-    for old, new in zip(coarse, fine, strict=True):
-        result[new] = _halve(_halve(values[old], axis=0), axis=1)
+def prolong_nodes(values: Array, density: int, parts: Parts = PARTS) -> Array:
+    """Nodal values (V', k) at twice the density from those, (V, k), at `density`."""
+    return resampled_nodes(values, density, 2 * density, parts)
+
+
+def resampled_nodes(
+    values: Array, old: int | Fraction, new: int | Fraction, parts: Parts = PARTS
+) -> Array:
+    """Nodal values (V', k) at a density from those, (V, k), at another one: cubic splines."""
+    before, after = node_blocks(old, parts), node_blocks(new, parts)
+    result = np.empty((max(int(block.max()) for block in after) + 1, values.shape[1]))
+    for given, wanted in zip(before, after, strict=True):
+        along = _splined(values[given], wanted.shape[0], axis=0)
+        result[wanted] = _splined(along, wanted.shape[1], axis=1)
     return result
 
 
-def restrict_nodes(values: Array, density: int, long: int = LONG) -> Array:
+def resampled_elements(
+    values: Array, old: int | Fraction, new: int | Fraction, parts: Parts = PARTS
+) -> Array:
+    """Element values (Q',) at a density from those, (Q,), at another one: bilinear."""
+    long, short, layers = (int(n * old) for n in parts)
+    wide, high, deep = (int(n * new) for n in parts)
+    around = 2 * (long + short)
+    ring = values[: layers * around].reshape(layers, around)
+    ring = np.concatenate([ring[:, -1:], ring, ring[:, :1]], axis=1)  # it closes upon itself
+    turn = 1.0 + _centres(around, 2 * (wide + high))
+    outer = _between(_between(ring, _centres(layers, deep), 0), turn, 1)
+    block = values[layers * around :].reshape(short, long)
+    centre = _between(_between(block, _centres(short, high), 0), _centres(long, wide), 1)
+    return np.concatenate([outer.ravel(), centre.ravel()])
+
+
+def restrict_nodes(values: Array, density: int, parts: Parts = PARTS) -> Array:
     """Nodal values (V', k) at half the density from those, (V, k), at an even `density`."""
-    coarse, fine = node_blocks(density // 2, long), node_blocks(density, long)
+    coarse, fine = node_blocks(density // 2, parts), node_blocks(density, parts)
     result = np.empty((max(int(block.max()) for block in coarse) + 1, values.shape[1]))
     for new, old in zip(coarse, fine, strict=True):
         result[new] = values[old[::2, ::2]]
     return result
 
 
-def restrict_elements(values: Array, density: int, long: int = LONG) -> Array:
+def restrict_elements(values: Array, density: int, parts: Parts = PARTS) -> Array:
     """Element values (Q',) at half the density, means of four of those, (Q,), at `density`."""
-    long, short, layers = long * density, SHORT * density, LAYERS * density
+    long, short, layers = (int(n * density) for n in parts)
     around = 2 * (long + short)
     grids = (
         values[: layers * around].reshape(layers, -1),
@@ -66,29 +96,27 @@ def _fours(grid: Array) -> Array:
     return np.asarray(grid.reshape(rows // 2, 2, columns // 2, 2).mean(axis=(1, 3)))
 
 
-def _halve(values: Array, axis: int) -> Array:
-    """Cubic spline through values at the integers, taken at the halves."""
+def _splined(values: Array, new: int, axis: int) -> Array:
+    """Cubic spline through values at equal distances, at `new` equally spaced places."""
     count = values.shape[axis]
-    order = min(3, count - 1)
-    spline = make_interp_spline(np.arange(count), values, k=order, axis=axis)
-    return np.asarray(spline(np.arange(2 * count - 1) / 2.0))
+    spline = make_interp_spline(np.arange(count), values, k=min(3, count - 1), axis=axis)
+    return np.asarray(spline(np.arange(new) * (count - 1) / (new - 1)))
 
 
-def prolong_elements(values: Array, density: int, long: int = LONG) -> Array:
-    """Element values (Q',) at twice the density from those, (Q,), at `density`: bilinear."""
-    long, short, layers = long * density, SHORT * density, LAYERS * density
-    around = 2 * (long + short)
-    ring = values[: layers * around].reshape(layers, around)
-    ring = np.concatenate([ring[:, -1:], ring, ring[:, :1]], axis=1)  # it closes upon itself
-    outer = _split(_split(ring, 0), 1)[:, 2:-2]
-    centre = _split(_split(values[layers * around :].reshape(short, long), 0), 1)
-    return np.concatenate([outer.ravel(), centre.ravel()])
+def prolong_elements(values: Array, density: int, parts: Parts = PARTS) -> Array:
+    """Element values (Q',) at twice the density from those, (Q,), at `density`."""
+    return resampled_elements(values, density, 2 * density, parts)
 
 
-def _split(values: Array, axis: int) -> Array:
-    """Values of cells at the centres of their halves; constant beyond the outermost centres."""
+def _centres(old: int, new: int) -> Array:
+    """Where the centres of `new` cells are, counted in the centres of `old` ones."""
+    return (np.arange(new) + 0.5) * old / new - 0.5
+
+
+def _between(values: Array, at: Array, axis: int) -> Array:
+    """Values of cells, linear between their centres and constant beyond the outermost."""
     count = values.shape[axis]
-    at = np.clip((np.arange(2 * count) + 0.5) / 2.0 - 0.5, 0.0, count - 1.0)
+    at = np.clip(at, 0.0, count - 1.0)
     left = np.minimum(at.astype(np.int64), max(count - 2, 0))
     right = np.minimum(left + 1, count - 1)
     shape = [1, 1]

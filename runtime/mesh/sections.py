@@ -31,7 +31,8 @@ class Disc:
     1 = concentric arc. layer_growth, row_growth: ratio of the last to the first thickness
     of the layers (outside to inside) and of the rows of the central block (bottom to top).
     spacing: of the nodes along the arc and, fading, in the columns above it; None = equal.
-    long: segments of the arc, and of the side opposite to it, at density 1.
+    long: segments of the arc, and of the side opposite to it, at density 1. layers: how many there
+    are at density 1.
     """
 
     centre_z: float
@@ -46,6 +47,12 @@ class Disc:
     row_growth: float = 2.4
     spacing: Spacing | None = None
     long: int = LONG
+    layers: int = LAYERS
+
+    @property
+    def parts(self) -> tuple[int, int, int]:
+        """Segments of the arc and of each side, and layers, at density 1."""
+        return self.long, SHORT, self.layers
 
     @property
     def corners(self) -> tuple[float, float, float, float]:
@@ -118,7 +125,7 @@ def disc_mesh(disc: Disc, density: int | Fraction) -> SectionMesh:
         raise ValueError(
             f"disc_mesh: density {density} is not allowed, it is a multiple of 1/3 and at least 2/3"
         )
-    long, short, layers = (int(n * density) for n in (disc.long, SHORT, LAYERS))
+    long, short, layers = (int(n * density) for n in disc.parts)
     loop = _loop(disc, long, short)
     ring = disc.centre + disc.radius * disc.direction(loop[0])
     inner = loop[1]

@@ -1,6 +1,7 @@
 """Graded meshes: contact edges, shape of the elements, the contact and the film on them."""
 
 from functools import cache
+from math import inf, radians
 
 import numpy as np
 import pytest
@@ -9,14 +10,15 @@ from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.grading import graded_layout
-from softehl.cases.seal.layout import RoundLayout
+from softehl.cases.seal.layout import MOST_LAYERS, STEEPEST_GROWTH, RoundLayout, uniform_layout
 from softehl.cases.seal.method import run
 from softehl.cases.seal.order import OrderPair
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.state import Outcome, Silent
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.sections import corner_jacobians
+from softehl.runtime.mesh.sections import SHORT, corner_jacobians
+from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 from tests.cases.oring_cases import oring
 
 
@@ -105,3 +107,41 @@ def test_another_pressure_order_has_the_same_mesh() -> None:
     system, _ = _contact(2)
     low = build_system(oring(density=2, mesh="graded", pressure_order=2), system.section.layout)
     assert OrderPair.of(low).high.mesh.points.tolist() == system.mesh.points.tolist()
+
+
+@pytest.mark.parametrize(("depth", "layers"), [(inf, 3), (5e-2, 3), (1e-2, 3), (1e-3, 6)])
+def test_layers_below_the_arc_are_as_thin_as_the_inlet_is_long(depth: float, layers: int) -> None:
+    layout, spacing = _placed()
+    plain, thin = layout.graded(spacing, 33), layout.graded(spacing, 33, depth)
+    thicknesses = np.diff([_depth(thin, ring) for ring in range(2 * layers + 1)])
+    ratios = thicknesses[1:] / thicknesses[:-1]
+    assert thin.disc.layers == layers
+    assert thicknesses[0] <= depth
+    assert np.all(ratios > 1.0)
+    assert np.all(ratios <= STEEPEST_GROWTH + 1e-9)
+    assert corner_jacobians(thin.mesh(2)).min() > 0.1
+    assert (thin == plain) == (depth > _depth(plain, 1))
+
+
+def test_more_layers_than_there_may_be_are_not_made() -> None:
+    layout, spacing = _placed()
+    thinnest = layout.graded(spacing, 33, 1e-9)
+    assert thinnest.disc.layers == MOST_LAYERS
+    assert thinnest.disc.layer_growth == STEEPEST_GROWTH ** (2 * MOST_LAYERS)
+
+
+def _placed() -> tuple[RoundLayout, Spacing]:
+    """A section whose arc goes from -35 to 35 degrees."""
+    guide = uniform_layout(ORing())
+    assert isinstance(guide, RoundLayout)
+    start, end = (radians(angle) * guide.disc.radius for angle in (40.0, 110.0))
+    spacing = graded(1.0, [Spot(0.2), Spot(0.8)], 66, coarsest=0.1, rate=0.3)
+    return guide.between(guide, (start, end)), spacing
+
+
+def _depth(layout: RoundLayout, ring: int) -> float:
+    """How far a ring of nodes is below the arc's middle at density 2, mm."""
+    disc, mesh = layout.disc, layout.mesh(2)
+    around = 2 * (2 * disc.long + 2 * SHORT)
+    node = ring * around + disc.long
+    return float(disc.radius - np.linalg.norm(mesh.points[node] - disc.centre))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,8 @@ from softehl.runtime.mesh.prolongation import (
     prolong_chain,
     prolong_elements,
     prolong_nodes,
+    resampled_elements,
+    resampled_nodes,
     restrict_chain,
     restrict_elements,
     restrict_nodes,
@@ -107,3 +111,17 @@ def test_restriction_undoes_prolongation(rng: np.random.Generator) -> None:
     assert restrict_nodes(prolong_nodes(values, 1), 2) == pytest.approx(values)
     chain = rng.normal(size=7)
     assert restrict_chain(prolong_chain(chain)).tolist() == chain.tolist()
+
+
+@pytest.mark.parametrize("parts", [(27, 6, 3), (33, 6, 6)])
+def test_a_mesh_of_any_density_is_nearly_the_resampled_one(parts: tuple[int, int, int]) -> None:
+    disc = Disc(0.0, 26.0, 1.7, -34.0, 43.0, long=parts[0], layers=parts[2])
+    finer, coarser = disc_mesh(disc, 2), disc_mesh(disc, Fraction(5, 3))
+    found = resampled_nodes(finer.points, 2, Fraction(5, 3), parts)
+    assert found == pytest.approx(coarser.points, abs=1e-4)
+    before, after = (mesh.points[mesh.quads].mean(axis=1)[:, 0] for mesh in (finer, coarser))
+    found = resampled_elements(before.copy(), 2, Fraction(5, 3), parts)
+    assert found == pytest.approx(after, abs=0.02)
+    assert resampled_elements(before[::-1].copy(), 2, Fraction(5, 3), parts) != pytest.approx(
+        after, abs=0.02
+    )
