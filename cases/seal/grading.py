@@ -83,8 +83,8 @@ def placed_layout(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGME
     """
     s, edges = system.section.places, contact_edges(system, x)
     ends = _way_out(system, x, s, 0, p), _way_out(system, x, s, 1, p)
-    seen = system.section.layout.touching(
-        system.mesh, system.pressing(ROD, x) > 0.0, system.pressing(BORE, x) > 0.0
+    seen = system.section.layout.held(
+        system.mesh, system.pressing(ROD, x), system.pressing(BORE, x), p.sealed_pressure
     )
     layout = uniform_layout(p).between(seen, ends)
     if p.mesh == "uniform" or not edges:

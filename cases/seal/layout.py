@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from softehl.cases.seal.parameters import ORing
-from softehl.runtime.arrays import Array, Flags
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.postprocess import run_around
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.outline_mesh import outline_mesh
@@ -58,9 +58,10 @@ class Layout(Protocol):
     def pressed(self, mesh: SectionMesh) -> int:
         """The first outer segment that the sealed pressure acts on, which it does up to the arc."""
 
-    def touching(self, mesh: SectionMesh, rod: Flags, housing: Flags) -> Layout:
-        """The same where it touches rod (arc nodes,) and housing (outer nodes,) of this mesh there:
-        the sealed pressure ends at a place of contact.
+    def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> Layout:
+        """The same with the sealed pressure ending where contact holds it back.
+
+        rod, housing: pressures in excess of it, (arc nodes,) and (outer nodes,) of this mesh, MPa.
         """
 
     def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
@@ -137,8 +138,8 @@ class RoundLayout:
         """See `Layout`."""
         return int(np.argmin(mesh.points[mesh.arc_nodes, 1]))
 
-    def touching(self, mesh: SectionMesh, rod: Flags, housing: Flags) -> RoundLayout:
-        """See `Layout`: a disc touches with its lowest point and its crown."""
+    def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> RoundLayout:
+        """See `Layout`: a disc holds it back with its lowest point and its crown."""
         return self
 
     def pressed(self, mesh: SectionMesh) -> int:
@@ -205,7 +206,7 @@ def _growth_to(first: float, count: int, least: float) -> float:
 class OutlineLayout:
     """A section of any outline.
 
-    film: ends (s0, s1) of the lubricated part of the outline, mm. held: places on it at which the
+    film: ends (s0, s1) of the lubricated part of the outline, mm. dams: places on it at which the
     sealed pressure ends on the rod and on the housing, mm; None: where the shape has them.
     """
 
@@ -213,7 +214,7 @@ class OutlineLayout:
     film: tuple[float, float]
     spacing: Spacing | None
     long: int
-    held: tuple[float | None, float | None] = (None, None)
+    dams: tuple[float | None, float | None] = (None, None)
 
     @property
     def flat(self) -> bool:
@@ -238,34 +239,36 @@ class OutlineLayout:
 
     def pressed(self, mesh: SectionMesh) -> int:
         """See `Layout`: from the node nearest to where the housing ends the pressure."""
-        begin, crown = mesh.places[0], self.held[1]
+        begin, crown = mesh.places[0], self.dams[1]
         crown = self.shape.pressure[0] if crown is None else crown
         crown = begin + (crown - begin) % mesh.length
         return int(np.argmin(np.abs(mesh.places[mesh.arc :] - crown)))
 
     def lowest(self, mesh: SectionMesh) -> int:
         """See `Layout`: the middle of a flat, the first of two lobes."""
-        if self.held[0] is not None:
-            return int(np.argmin(np.abs(self.places(mesh) - (self.held[0] - self.film[0]))))
+        if self.dams[0] is not None:
+            return int(np.argmin(np.abs(self.places(mesh) - (self.dams[0] - self.film[0]))))
         r = mesh.points[mesh.arc_nodes, 1]
         level = np.flatnonzero(r <= r.min() + _LEVEL * float(np.ptp(mesh.points[:, 1])))
         flat = level[: int(np.argmax(np.append(np.diff(level) > 1, True))) + 1]
         return int(flat[len(flat) // 2])
 
-    def touching(self, mesh: SectionMesh, rod: Flags, housing: Flags) -> OutlineLayout:
-        """See `Layout`: where contact has left the places of before, the middle of the nearest."""
-        lip, crown = self.held
-        if rod.any() and not rod[self.lowest(mesh)]:
-            lip = self.film[0] + float(self.places(mesh)[_nearest(rod, self.lowest(mesh))])
-        if housing.any() and not housing[self.pressed(mesh)]:
-            crown = float(mesh.places[mesh.arc + _nearest(housing[:-1], self.pressed(mesh))])
-        return replace(self, held=(lip, crown))
+    def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> OutlineLayout:
+        """See `Layout`: lips turn, and lie elsewhere than they were made to."""
+        lip, crown = self.dams
+        place = dam(rod, self.lowest(mesh), p_s)
+        if place is not None:
+            lip = self.film[0] + float(self.places(mesh)[place])
+        place = dam(housing[::-1], len(housing) - 1 - self.pressed(mesh), p_s)
+        if place is not None:
+            crown = float(mesh.places[mesh.arc + len(housing) - 1 - place])
+        return replace(self, dams=(lip, crown))
 
     def between(self, old: Layout, ends: tuple[float, float]) -> OutlineLayout:
         """See `Layout`."""
         assert isinstance(old, OutlineLayout)
         begin, end = (old.film[0] + place for place in ends)
-        return replace(self, film=(begin, end), held=old.held)
+        return replace(self, film=(begin, end), dams=old.dams)
 
     def graded(
         self, spacing: Spacing, long: int, depth: float = inf, first: float | None = None
@@ -274,11 +277,19 @@ class OutlineLayout:
         return replace(self, spacing=spacing, long=long)
 
 
-def _nearest(flags: Flags, index: int) -> int:
-    """The middle of the run of true flags that is nearest to an index."""
-    true = np.flatnonzero(flags)
-    run = run_around(flags, int(true[np.argmin(np.abs(true - index))]))
-    return int(run.start + run.stop - 1) // 2
+def dam(excess: Array, index: int, p_s: float) -> int | None:
+    """Where contact holds back a pressure that is taken to act up to an index, None if just there.
+
+    excess: (n,) of contact over the pressure, which is p_s up to there and zero beyond. Where less
+    than p_s holds it back it goes on, at most to where contact presses most.
+    """
+    touching = excess > 0.0
+    if not touching.any() or (touching[index] and excess[min(index + 1, len(excess) - 1)] >= p_s):
+        return None
+    nodes = np.flatnonzero(touching)
+    run = run_around(touching, int(nodes[np.argmin(np.abs(nodes - index))]))
+    total = excess + np.where(np.arange(len(excess)) <= index, p_s, 0.0)
+    return int(run.start + np.argmax(total[run]))
 
 
 def uniform_layout(p: ORing) -> Layout:
