@@ -45,6 +45,8 @@ def contact_key(parameters: ORing) -> str:
     """Name of a contact state: all parameters but those without influence, and the kernels."""
     kernels = contact_kernels(parameters)
     given = parameters.model_dump(exclude=set(WITHOUT_INFLUENCE))
+    if parameters.outline is not None:
+        given["outline"] = hashlib.sha256(Path(parameters.outline).read_bytes()).hexdigest()
     given["kernels"] = {name: load_kernel(name).signature for name in kernels}
     return hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()[:32]
 

@@ -13,7 +13,7 @@ from softehl.cases.seal.catalogue import Ring
 from softehl.cases.seal.fitting import fitted
 from softehl.cases.seal.oils import with_oil
 from softehl.cases.seal.rubber import require_stable, with_rubber
-from softehl.cases.seal.sections.keys import NAMES, ROUND, SectionKeys, lobes, shape_of
+from softehl.cases.seal.sections.keys import SectionKeys, lobes, with_outline
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness, Surfaces
 from softehl.cases.seal.tolerances import read_tolerances
 from softehl.runtime.mesh.outline import Shape
@@ -292,23 +292,12 @@ class ORing(SectionKeys):
     @classmethod
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
         """Diameters and width from ring, rod, squeeze and gland; rubber and oil.  ValueError."""
-        return with_oil(with_rubber(fitted(given)))
-
-    @property
-    def round(self) -> bool:
-        """Whether the section is a disc, which the O-grid of the paper is laid into."""
-        return self.section == ROUND
-
-    @property
-    def named(self) -> str:
-        """What the seal is called."""
-        return NAMES[self.section]
+        return with_oil(with_rubber(fitted(with_outline(dict(given)))))
 
     @property
     def free_section(self) -> Shape:
         """The free section where it is."""
-        sizes = self.sized(self.section_diameter)
-        return shape_of(self.section, sizes, self.inner_diameter)
+        return self.free(self.section_diameter, self.inner_diameter)
 
     @property
     def free_ring(self) -> Ring:

@@ -134,7 +134,7 @@ def test_every_parameter_either_matters_or_does_not() -> None:
     assert contact_key(case(rod=50.5)) == contact_key(case(rod_diameter=50.5))
     assert contact_key(case(rod=50.5)) != contact_key(case())
     sections = {name: section for section in SECTIONS for name in dimensions(section)}
-    known = {*CHANGED, *RUBBERS, *sections, "section"}
+    known = {*CHANGED, *RUBBERS, *sections, "section", "outline"}
     assert known == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
     key = contact_key(case())
     assert contact_key(case(**OTHER)) == contact_key(case(**ROUGH)) == key

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import ValidationError, create_model
 
 from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.given import number, put
 from softehl.cases.seal.sections import SECTIONS
+from softehl.cases.seal.sections.files import read_mesh, read_outline
 from softehl.runtime.mesh.outline import Shape
 
 Name = Literal["round", "rectangular", "x_ring", "d_ring", "trapezoid", "u_cup"]
@@ -54,7 +57,14 @@ def _declared() -> dict[str, Any]:
             use = section, str(extra["meaning"]), float(str(extra["part"]))
             found.setdefault(name, []).append(use)
     keys = {name: (float | None, _key(uses)) for name, uses in found.items()}
-    return {"section": (Name, key(ROUND, "section of the seal (docs/sections.md)")), **keys}
+    section = key(ROUND, "section of the seal (docs/sections.md)")
+    outline = key(
+        None,
+        "instead of `section`: one that is drawn, given by points, or bounds a mesh",
+        bounds="a .dxf, .csv or mesh file (.msh, .vtu, ...), see docs/sections.md",
+        file=True,
+    )
+    return {"section": (Name, section), "outline": (str | None, outline), **keys}
 
 
 def _key(uses: list[tuple[str, str, float]]) -> Any:
@@ -69,6 +79,7 @@ if TYPE_CHECKING:
 
     class _Keys(Parameters):
         section: Name = ROUND
+        outline: str | None = None
 
 else:
     _Keys = create_model("_Keys", __base__=Parameters, **_declared())
@@ -76,6 +87,26 @@ else:
 
 class SectionKeys(_Keys):
     """Which section a seal has, and the dimensions of it."""
+
+    @property
+    def round(self) -> bool:
+        """Whether the section is a disc, which the O-grid of the paper is laid into."""
+        return self.section == ROUND and self.outline is None
+
+    @property
+    def named(self) -> str:
+        """What the seal is called."""
+        return NAMES[self.section] if self.outline is None else f"ring of {Path(self.outline).name}"
+
+    def free(self, height: float, inner_diameter: float) -> Shape:
+        """The free section where it is, mm.  ValueError where there is none."""
+        sizes = self.sized(height)
+        if self.outline is None:
+            return shape_of(self.section, sizes, inner_diameter)
+        if self.section != ROUND or len(sizes) > 1:
+            others = [name for name in sizes if name != "height"] or ["section"]
+            raise ValueError(f"outline and {', '.join(others)}: give one of them")
+        return shape_of_file(Path(self.outline), inner_diameter)
 
     def sized(self, height: float) -> dict[str, float]:
         """The dimensions that are given, as their page calls them.  ValueError for others'."""
@@ -96,6 +127,32 @@ class SectionKeys(_Keys):
 def shape_of(section: str, sizes: Mapping[str, float], inner_diameter: float) -> Shape:
     """The shape of a section of these dimensions.  ValueError where they bound none."""
     return _shape(section, tuple(sorted(sizes.items())), inner_diameter)
+
+
+def shape_of_file(path: Path, inner_diameter: float | None = None) -> Shape:
+    """The shape of a file; where it was drawn without an inner_diameter.  ValueError, one line."""
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError:
+        raise ValueError(f'outline = "{path}": there is no such file') from None
+    return _shape_of_file(path, changed, inner_diameter)
+
+
+@lru_cache(maxsize=32)
+def _shape_of_file(path: Path, _changed: int, inner_diameter: float | None) -> Shape:
+    if path.suffix.lower() in (".dxf", ".csv"):
+        return read_outline(path, inner_diameter)
+    return read_mesh(path, inner_diameter)[0]
+
+
+def with_outline(values: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a case with the height of an outline that is given.  ValueError."""
+    if isinstance(values.get("outline"), str):
+        inner = values.get("inner_diameter", 50.39)
+        inner = float(inner) if number(inner) and inner > 0.0 else 50.39  # refused with its key
+        _, low, _, high = shape_of_file(Path(values["outline"]), inner).outline.box
+        put(values, "section_diameter", high - low, f"outline = {values['outline']}")
+    return values
 
 
 @lru_cache(maxsize=32)

@@ -1,0 +1,202 @@
+"""Seals of any section: keys, edges of flats, several contacts, known limits, the O-ring again."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.contact_store import contact_key
+from softehl.cases.seal.contacts import contact_edges, contacts, groups
+from softehl.cases.seal.equations import SealSystem, build_system
+from softehl.cases.seal.layout import dam
+from softehl.cases.seal.method import run
+from softehl.cases.seal.overlap import crossing
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.results import contact_peaks, contact_pressure, film_parts
+from softehl.cases.seal.sections import SECTIONS
+from softehl.cases.seal.state import Outcome, Silent
+from softehl.cases.seal.verdict import ContactNumbers, FilmNumbers, Verdict
+from softehl.runtime.arrays import Array
+
+GROOVE: dict[str, Any] = {"housing_diameter": 56.4, "groove_width": 4.3}
+X_RING: dict[str, Any] = {"section": "x_ring", "lobe_radius": 0.9, "fillet_radius": 0.6, **GROOVE}
+
+
+@cache
+def _contact(**changes: Any) -> tuple[SealSystem, Array]:
+    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+    found = route.contact(ORing(**changes))
+    assert not isinstance(found, StageFailed)
+    return found
+
+
+@cache
+def _curve(**changes: Any) -> Outcome:
+    return run(ORing(**{"error_estimate": False, **changes}), Silent())
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"section": "x_ring", "corner_radius": 0.4}, "corner_radius is no dimension of section ="),
+        ({"lobe_radius": 0.9}, 'section = "round": section_diameter alone'),
+        ({"section": "x_ring", "lobe_radius": 3.0}, "lobe_radius = 3 mm; at most half"),
+        ({"section": "u_cup"}, "at least the width of the section, 4.589 mm"),
+        ({"section": "d_ring", "extrusion_gap": 0.05}, 'extrusion_gap: for section = "round" only'),
+        ({"section": "d_ring", "sensitivity": True}, 'sensitivity: for section = "round" only'),
+        ({"section": "quad"}, "'round', 'rectangular', 'x_ring'"),
+        ({"outline": "nothing.dxf"}, "there is no such file"),
+    ],
+)
+def test_a_section_that_is_not_one(changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        ORing(**changes)
+
+
+def test_a_width_that_is_given_is_that_of_the_section() -> None:
+    given: dict[str, Any] = {"section": "rectangular", "section_width": 3.0}
+    p = ORing(**given)
+    assert p.axial_width == pytest.approx(3.0, rel=1e-12)
+    assert p.free_section.outline.area == pytest.approx(3.0 * 3.53 - (4 - np.pi) * 0.4236**2)
+
+
+def test_sections_of_two_lobes_conserve_mass() -> None:
+    wide: dict[str, Any] = {"groove_width": 8.0}
+    lobes = {name: ORing(**{"section": name, **wide}).lobes for name in SECTIONS}
+    assert lobes == {name: 2 if name == "x_ring" else 1 for name in SECTIONS}
+    assert ORing(section="x_ring").conserving
+    assert not ORing(section="x_ring", cavitation="penalty").conserving
+    circle: dict[str, Any] = {"section": "x_ring", "lobe_radius": 1.765}
+    assert not ORing(**circle).conserving
+
+
+def test_a_file_of_points_is_a_section_and_known_by_what_it_holds(tmp_path: Path) -> None:
+    file = tmp_path / "square.csv"
+    file.write_text("z_mm,r_mm\n0,0\n3,0\n3,3.4\n0,3.4\n")
+    p = ORing(outline=str(file))
+    assert p.section_diameter == pytest.approx(3.4)
+    assert p.free_section.outline.box[1] == pytest.approx(0.5 * p.inner_diameter)
+    before = contact_key(p)
+    file.write_text("z_mm,r_mm\n0,0\n3,0\n3,3.4\n0.1,3.4\n")
+    assert contact_key(ORing(outline=str(file))) != before
+    with pytest.raises(ValueError, match="contradict"):
+        ORing(outline=str(file), section_diameter=3.0)
+
+
+def test_contacts_are_parted_where_the_gap_is_wide() -> None:
+    h = np.array([9.0, 0.0, 0.0, 0.01, 0.0, 0.5, 0.0, 0.0, 9.0])
+    assert [list(k) for k in groups(h, h == 0.0)] == [[1, 2, 4], [6, 7]]
+    assert groups(h, h < -1.0) == []
+    assert film_parts(h) == [slice(0, 5), slice(5, 8)]
+    assert film_parts(np.full(4, 0.5)) == [slice(0, 3)]
+
+
+def test_a_pressure_goes_on_to_where_contact_holds_it_back() -> None:
+    excess = np.array([0.0, 0.0, 0.3, 0.5, 1.4, 1.1, 0.2, 0.0])
+    assert dam(excess, 4, 1.0) is None  # held back there
+    assert dam(excess, 2, 1.0) == 4  # less than 1 MPa: the fluid goes on
+    assert dam(excess, 7, 1.0) in (4, 5)  # nothing touches there
+    assert dam(np.zeros(8), 2, 1.0) is None
+
+
+def test_an_outline_that_runs_into_itself_is_seen() -> None:
+    square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    assert crossing(square) is None
+    cup = np.array([[0, 0], [6, 0], [6, 4], [0, 4], [0, 1.5], [4, 2.5], [4, 1.5], [0, 2.5]])
+    assert crossing(cup.astype(float)) is not None
+
+
+def test_corner_peaks_do_not_place_an_edge() -> None:
+    system = build_system(ORing(section="rectangular", **GROOVE))
+    s, x = system.section.places, system.at_rest()
+    touching = slice(20, 40)
+    pressure = np.zeros(len(s))
+    pressure[touching] = 1.0
+    pressure[21], pressure[38] = 5.0, 5.0  # a straight line through these falls outwards
+    system.rod_multipliers(x)[:] = -pressure
+    first, last = contact_edges(system, x)
+    assert s[19] <= first.place <= s[20]
+    assert s[39] <= last.place <= s[40]
+    assert first.rise > 0.0
+    assert last.rise > 0.0
+
+
+def _numbers(*fluxes: float) -> FilmNumbers:
+    film = FilmNumbers(400.0, 0.27, 1.36e-3, 1e-3, 3.7, 5.0, 1e-10, 0.0, 0.03, 5.0)
+    sealed, air = (
+        ContactNumbers(q, p, 1e-3, 0.0, 1.0, 0.0) for q, p in zip(fluxes, (2.0, 3.7), strict=True)
+    )
+    return replace(film, contacts=(sealed, air))
+
+
+def test_two_contacts_that_carry_different_fluxes_are_not_believed() -> None:
+    verdict = Verdict(3.8, references=(2.1, 3.8))
+    assert verdict.after(_numbers(0.27, 0.27)).word == OK
+    apart = verdict.after(_numbers(0.27, 0.24))
+    assert apart.word == "uncertain"
+    assert "differ by 11 %" in apart.advice
+    assert 'cavitation = "mass-conserving"' in apart.advice
+
+
+def test_every_contact_is_judged_against_its_own_pressure() -> None:
+    assert Verdict(3.8, references=(1.0, 3.8)).after(_numbers(0.27, 0.27)).word == "collapsed"
+    assert Verdict(3.8).after(_numbers(0.27, 0.27)).word == OK
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("stretch", "pressure"), [(0.85, 2.421), (0.90, 1.554)])
+def test_a_frictionless_rectangle_in_plane_strain(stretch: float, pressure: float) -> None:
+    """p = mu (lambda^-2 - lambda^2) for mu = 3.66 MPa; the rod is held 10 um off."""
+    gap = stretch * 3.53 + 0.01
+    system, x = _contact(
+        section="rectangular",
+        corner_radius=0.2,
+        inner_diameter=1000.0,
+        rod_diameter=1000.0,
+        housing_diameter=1000.0 + 2.0 * gap,
+        groove_width=5.0,
+        bulk_modulus=2e4,
+        sealed_pressure=0.0,
+    )
+    z, _ = system.arc_film(x)
+    found = contact_pressure(system, 0.0, x)[int(np.argmin(np.abs(z)))]
+    assert found == pytest.approx(pressure, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_lobes_of_an_x_ring_are_equal_without_pressure() -> None:
+    system, x = _contact(sealed_pressure=0.0, **X_RING)
+    assert len(contacts(system, x)) == 2
+    sealed, air = contact_peaks(system, 0.0, x)
+    assert sealed == pytest.approx(air, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_an_x_ring_whose_lobes_are_one_circle_is_the_o_ring() -> None:
+    given: dict[str, Any] = {"stroke": "out", "speeds": (800.0, 100.0), "density": 2}
+    circle = _curve(section="x_ring", lobe_radius=1.765, **given)
+    ring = _curve(**given)
+    for a, b in zip(circle.states, ring.states, strict=True):
+        assert a.h_star_um == pytest.approx(b.h_star_um, rel=4e-3)
+        assert a.verdict == b.verdict == OK
+
+
+@pytest.mark.slow
+def test_the_films_of_a_rectangle_and_of_an_x_ring() -> None:
+    """Against a study of its own code at density 2; um at 800 mm/s."""
+    flat = _curve(section="rectangular", corner_radius=0.4, speeds=(800.0,), **GROOVE)
+    assert [s.h_star_um for s in flat.states] == pytest.approx([1.087, 0.937], rel=0.01)
+    lobes = _curve(speeds=(800.0,), **X_RING)
+    assert [s.h_star_um for s in lobes.states] == pytest.approx([1.592, 1.268], rel=0.015)
+    for state in (*flat.states, *lobes.states):
+        assert state.verdict == OK
+    for state in lobes.states:
+        assert abs(state.flux_mismatch_percent) < 1e-6
+        assert state.contact_start_mm < state.groove_start_mm < state.groove_end_mm
+        assert min(state.h_min_sealed_um, state.h_min_air_um) == pytest.approx(state.h_min_um)
