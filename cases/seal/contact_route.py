@@ -28,6 +28,7 @@ from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import carried_contact, finer
+from softehl.cases.seal.results import unsealed
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
 
@@ -44,6 +45,9 @@ COARSE = 1
 
 _JUMPS = (0.003, 0.006, 0.015, 0.04)
 """Steps of the pressure over a kink of the path, one after the other, in shear moduli."""
+
+SEALS = 3
+"""How often a mesh is made anew because the sealed pressure ends where nothing touches."""
 
 GUIDE = 2
 """Least density of a mesh whose contact shows where another one is to be fine."""
@@ -165,12 +169,23 @@ class ContactRoute:
             if not isinstance(state, StageFailed) and guide < density:
                 state = self._finer(state, density)
             if not isinstance(state, StageFailed):
-                state = self._on(placed_layout(*state, p), _at(p, density), state, PASSES)
+                state = self._sealed(_at(p, density), state)
             if not isinstance(state, StageFailed):
                 state = self._refined(*state, p.density)
             if not isinstance(state, StageFailed):
                 break
         return state
+
+    def _sealed(self, p: ORing, state: State) -> State | StageFailed:
+        """On the last of the graded meshes; on more where pressure ends outside the contact."""
+        found: State | StageFailed = state
+        for number in range(PASSES, PASSES + SEALS):
+            if isinstance(found, StageFailed):
+                break
+            found = self._on(placed_layout(*found, p), p, found, number)
+            if isinstance(found, StageFailed) or not unsealed(*found):
+                break
+        return found
 
     def _finer(self, state: State, density: int) -> State | StageFailed:
         """From a contact state to that of the same mesh at `density`, if need be from rest."""

@@ -99,9 +99,14 @@ MOST_LAYERS, STEEPEST_GROWTH = 6, 2.0
 
 @dataclass(frozen=True)
 class RoundLayout:
-    """A disc under an O-grid."""
+    """A disc under an O-grid.
+
+    dams: angles from the bottom at which the sealed pressure ends on the rod and on the housing,
+    degrees, counterclockwise; None: at the lowest point, at the crown.
+    """
 
     disc: Disc
+    dams: tuple[float | None, float | None] = (None, None)
 
     @property
     def long(self) -> int:
@@ -136,23 +141,40 @@ class RoundLayout:
 
     def lowest(self, mesh: SectionMesh) -> int:
         """See `Layout`."""
+        if self.dams[0] is not None:
+            return _closest(self._angles(mesh.points[mesh.arc_nodes]), self.dams[0])
         return int(np.argmin(mesh.points[mesh.arc_nodes, 1]))
 
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> RoundLayout:
-        """See `Layout`: a disc holds it back with its lowest point and its crown."""
-        return self
+        """See `Layout`: by its lowest point and its crown as long as these do."""
+        lip, crown = self.dams
+        place = dam(rod, self.lowest(mesh), p_s)
+        if place is not None:
+            lip = float(self._angles(mesh.points[mesh.arc_nodes[place]]))
+        place = dam(housing[::-1], len(housing) - 1 - self.pressed(mesh), p_s)
+        if place is not None:
+            crown = float(self._angles(mesh.points[mesh.outer_nodes[len(housing) - 1 - place]]))
+        return replace(self, dams=(lip, crown))
 
     def pressed(self, mesh: SectionMesh) -> int:
         """See `Layout`: from the crown on."""
+        if self.dams[1] is not None:
+            return _closest(self._angles(mesh.points[mesh.outer_nodes[:-1]]), self.dams[1])
         middle = mesh.points[mesh.outer_segments].mean(axis=1)
         return int(np.flatnonzero(middle[:, 0] < 0.0)[0])
+
+    def _angles(self, points: Array) -> Array:
+        """Of points (..., 2) on its circle from the bottom, degrees in (-180, 180]."""
+        z, r = np.moveaxis(points - self.disc.centre, -1, 0)
+        return np.asarray(np.degrees(np.arctan2(z, -r)))
 
     def between(self, old: Layout, ends: tuple[float, float]) -> RoundLayout:
         """See `Layout`."""
         assert isinstance(old, RoundLayout)
         before = old.disc
         start, end = (before.arc_start + float(np.degrees(e / before.radius)) for e in ends)
-        return RoundLayout(replace(self.disc, arc_start=start, arc_end=end))
+        disc = replace(self.disc, arc_start=start, arc_end=end)
+        return RoundLayout(disc, old.dams)
 
     def graded(
         self, spacing: Spacing, long: int, depth: float = inf, first: float | None = None
@@ -164,18 +186,17 @@ class RoundLayout:
             side = self.disc.radius * np.radians(top - end)
             growth = _growth_to(first / side, SHORT * _DENSITY, _ROW_GROWTH)
         layers, layer_growth = _layers(depth / self._deepest)
-        return RoundLayout(
-            replace(
-                self.disc,
-                spacing=spacing,
-                long=long,
-                top=top,
-                corner_radius=_CORNERS,
-                layers=layers,
-                layer_growth=layer_growth,
-                row_growth=growth,
-            )
+        disc = replace(
+            self.disc,
+            spacing=spacing,
+            long=long,
+            top=top,
+            corner_radius=_CORNERS,
+            layers=layers,
+            layer_growth=layer_growth,
+            row_growth=growth,
         )
+        return RoundLayout(disc, self.dams)
 
     @property
     def _deepest(self) -> float:
@@ -275,6 +296,11 @@ class OutlineLayout:
     ) -> OutlineLayout:
         """See `Layout`; the depth of its elements follows from its segments."""
         return replace(self, spacing=spacing, long=long)
+
+
+def _closest(angles: Array, angle: float) -> int:
+    """Index of that of several angles which is closest to another one, degrees."""
+    return int(np.argmin(np.abs((angles - angle + 180.0) % 360.0 - 180.0)))
 
 
 def dam(excess: Array, index: int, p_s: float) -> int | None:

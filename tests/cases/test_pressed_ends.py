@@ -1,0 +1,110 @@
+"""The sealed pressure ends where something touches: found from the contact, not from the shape."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from softehl.cases.seal.contact_route import ContactRoute, State
+from softehl.cases.seal.equations import SealSystem, build_system
+from softehl.cases.seal.grading import placed_layout
+from softehl.cases.seal.layout import RoundLayout
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.results import contact_pressure, unsealed
+from softehl.cases.seal.state import Silent
+from softehl.cases.seal.system import BORE, ROD
+from softehl.runtime.mesh.sections import Disc
+
+P = ORing(ring="AS568-210", rod=19.0, gland="dynamic", density=1, sealed_pressure=3.0)
+
+
+def route() -> ContactRoute:
+    return ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+
+
+@cache
+def usual() -> State:
+    found = route().contact(P)
+    assert not isinstance(found, StageFailed)
+    return found
+
+
+def ending_at(lip: float | None, crown: float | None) -> State:
+    """The state on the mesh of the usual one, its pressure ending at other angles, degrees."""
+    system, x = usual()
+    layout = system.section.layout
+    assert isinstance(layout, RoundLayout)
+    new = build_system(P, replace(layout, dams=(lip, crown)))
+    found = route().elsewhere(system, x, new)
+    assert not isinstance(found, StageFailed)
+    return new, found
+
+
+def corrected(system: SealSystem, x: np.ndarray) -> RoundLayout:
+    rod, housing = (system.pressing(name, x) for name in (ROD, BORE))
+    layout = system.section.layout.held(system.mesh, rod, housing, P.sealed_pressure)
+    assert isinstance(layout, RoundLayout)
+    return layout
+
+
+def test_where_in_the_contact_pressure_ends_does_not_matter() -> None:
+    system, x = usual()
+    assert unsealed(system, x) == ""
+    assert corrected(system, x).dams == (None, None)
+    other, y = ending_at(12.0, -170.0)
+    assert unsealed(other, y) == ""
+    assert other.section.pressed_ends != system.section.pressed_ends
+    assert other.displacements(y) == pytest.approx(system.displacements(x), abs=1e-4)
+    there, here = contact_pressure(other, 3.0, y), contact_pressure(system, 3.0, x)
+    away = np.ones(len(here), dtype=bool)
+    away[[system.section.lowest, other.section.lowest]] = False  # half of p_s, near enough
+    assert np.abs(there - here)[away].max() < 1e-3 * here.max()
+
+
+@pytest.mark.parametrize(
+    ("lip", "crown", "where"), [(-33.0, None, "lowest point"), (None, -95.0, "crown")]
+)
+def test_pressure_that_ends_outside_the_contact_is_led_to_it(
+    lip: float | None, crown: float | None, where: str
+) -> None:
+    """A state that was `uncertain`: the pressure missed a part of the section, or had too much."""
+    right, _ = usual()
+    system, x = ending_at(lip, crown)
+    assert where in unsealed(system, x)
+    layout = corrected(system, x)
+    assert layout.dams != (lip, crown)
+    new = build_system(P, layout)
+    y = route().elsewhere(system, x, new)
+    assert not isinstance(y, StageFailed)
+    assert unsealed(new, y) == ""
+    wrong = np.abs(system.displacements(x) - right.displacements(usual()[1])).max()
+    assert wrong > 1e-3
+    error = np.abs(new.displacements(y) - right.displacements(usual()[1])).max()
+    assert error < 0.1 * wrong
+
+
+def test_meshes_are_made_until_the_pressure_ends_in_the_contact() -> None:
+    """The whole route, from a state whose pressure ends before the contact begins."""
+    start = ending_at(-33.0, None)
+    found = route()._sealed(P, start)
+    assert not isinstance(found, StageFailed)
+    system, x = found
+    assert unsealed(system, x) == ""
+    layout = placed_layout(*start, P)
+    assert isinstance(layout, RoundLayout)
+    assert layout.dams[0] is not None
+    assert isinstance(system.section.layout, RoundLayout)
+    assert system.section.layout.dams[0] == layout.dams[0]
+
+
+def test_angles_are_measured_round_the_circle() -> None:
+    layout = RoundLayout(Disc(0.0, 10.0, 1.0, -75.0, 75.0, top=118.0), dams=(-20.0, -179.5))
+    mesh = layout.mesh(2)
+    z, r = (mesh.points[mesh.arc_nodes[layout.lowest(mesh)]] - layout.disc.centre).T
+    assert np.degrees(np.arctan2(z, -r)) == pytest.approx(-20.0, abs=2.0)
+    z, r = (mesh.points[mesh.outer_nodes[layout.pressed(mesh)]] - layout.disc.centre).T
+    assert abs(np.degrees(np.arctan2(z, -r))) == pytest.approx(179.5, abs=5.0)
