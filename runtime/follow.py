@@ -10,6 +10,7 @@ import numpy as np
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.result import Result
 from softehl.runtime.solve.arclength import Arclength
+from softehl.runtime.solve.held import FirstStep
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import LimitPoint, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
@@ -50,10 +51,12 @@ class ArcSteps:
             results.append(Result(system, problem, point, state[0][1]))
             self.on_step(results[-1])
 
+        problem, first_step = problem_at(self.step), FirstStep(self.newton)
         with np.errstate(all="ignore"):
-            first = self.newton.solve(problem_at(self.step), state[0][0])
+            first = first_step.newton.solve(problem, state[0][0])
         if not first.converged:
             raise NotConverged(first)
+        first_step.check(problem, first)
         scale = float(np.sqrt(np.mean((first.x - state[0][0]) ** 2))) / self.step
         rule = StepRule(self.step, 1e-6 * self.step, self.step)
         path = Arclength(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.result import Result
 from softehl.runtime.solve.continuation import Continuation
+from softehl.runtime.solve.held import FirstStep
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
@@ -33,19 +34,21 @@ class LoadSteps:
         histories = system.histories() if start is None else share.own_state(start.state)
         state = [(x0, histories)]  # after the last converged step
         reached: list[Result] = []
+        first_step = FirstStep(self.newton)
 
         def problem_at(t: float) -> Problem:
             return system.problem(system.still(t, *state[0]))
 
         def keep(point: Point) -> None:
             problem, x = problem_at(point.parameter), point.solution.x
+            first_step.check(problem, point.solution)
             state[0] = x, system.committed(problem, x, state[0][1])
             reached[:] = [Result(system, problem, point, state[0][1])]
             self.on_step(reached[0])
 
         first = abs(until - begin) / self.steps
         rule = StepRule(first, min(SMALLEST, first), first)
-        path = Continuation(self.newton, rule, name="load factor")
+        path = Continuation(first_step.newton, rule, name="load factor")
         branch = path.follow(problem_at, begin, until, x0, on_point=keep)
         if not branch.converged:
             raise NotConverged(branch, reached[0] if reached else None)

@@ -14,6 +14,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.share import Share
+from softehl.runtime.solve.held import FirstStep
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point, Solution
 from softehl.runtime.statement.records import StudyError
@@ -95,9 +96,12 @@ class March:
     ) -> Iterator[Result]:
         """Every converged step until the end.  Raises NotConverged."""
         length = until - clock.t
+        first_step = FirstStep(self.newton)
+        settings = replace(self, newton=first_step.newton)
         while until - clock.t > _ROUNDING * abs(length):
             dt = _towards(until - clock.t, clock.dt)
-            result, clock = self._step(system, clock, dt)
+            result, clock = settings._step(system, clock, dt)
+            first_step.check(result.problem, result.point.solution)
             if checkpoint is not None:
                 clock.save(checkpoint, system.share)
             yield result
