@@ -12,7 +12,7 @@ import json
 import math
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -101,9 +101,11 @@ class Watch(Silent):
         self.states.append(state)
 
 
-def solved(number: int, limit: float, **changes: Any) -> dict[str, Any]:
+def solved(
+    number: int, limit: float, draw: Callable[[int], ORing] = drawn, **changes: Any
+) -> dict[str, Any]:
     """What came out of a gland, as it is written to the file."""
-    p, watch, begin = drawn(number).model_copy(update=changes), Watch(), time.process_time()
+    p, watch, begin = draw(number).model_copy(update=changes), Watch(), time.process_time()
     message, factorisations = f"not ended within {limit:g} s", 0
     try:
         with _limited(limit):
@@ -115,6 +117,7 @@ def solved(number: int, limit: float, **changes: Any) -> dict[str, Any]:
     keys = ("h_star_um", "h_star_error_percent", "inlet_ratio", "inlet_segments", "verdict")
     return {
         "number": number,
+        "section": p.section,
         "density": p.density,
         "p_s/mu": round(p.sealed_pressure / p.shear_modulus, 2),
         "seconds": round(time.process_time() - begin, 1),
@@ -127,29 +130,37 @@ def solved(number: int, limit: float, **changes: Any) -> dict[str, Any]:
     }
 
 
-def main(arguments: argparse.Namespace) -> None:
-    """Solve, print and keep."""
+def main(draw: Callable[[int], ORing], words: str | None) -> None:
+    """Solve, print and keep what the command line asks for."""
+    arguments = asked(words)
     file, done = Path(arguments.file), set[int]()
     if file.exists():
         done = {int(json.loads(line)["number"]) for line in file.read_text().splitlines()}
     for number in range(arguments.first, arguments.last, arguments.every):
         if number in done:
             continue
-        found = solved(number, arguments.limit, density=arguments.density)
+        found = solved(number, arguments.limit, draw, density=arguments.density)
         with file.open("a") as lines:
             lines.write(json.dumps(found) + "\n")
-        words = [f"{s['speed']:+g}: {s['verdict']} {s['h_star_um']:.4g}" for s in found["states"]]
+        each = [f"{s['speed']:+g}: {s['verdict']} {s['h_star_um']:.4g}" for s in found["states"]]
         ok = sum(s["verdict"] == OK for s in found["states"])
-        print(f"{number} p_s/mu {found['p_s/mu']} {found['seconds']} s, ", end="")
-        print(f"{ok} of {2 * len(SPEEDS)} ok;", ", ".join(words), found["message"], flush=True)
+        print(
+            f"{number} {found['section']} p_s/mu {found['p_s/mu']} {found['seconds']} s, ", end=""
+        )
+        print(f"{ok} of {2 * len(SPEEDS)} ok;", ", ".join(each), found["message"], flush=True)
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
+def asked(words: str | None) -> argparse.Namespace:
+    """The options of the command line."""
+    parser = argparse.ArgumentParser(description=words)
     parser.add_argument("first", type=int)
     parser.add_argument("last", type=int)
     parser.add_argument("file")
     parser.add_argument("--density", type=int, default=2)
     parser.add_argument("--every", type=int, default=1)
     parser.add_argument("--limit", type=float, default=100.0)
-    main(parser.parse_args())
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main(drawn, __doc__)
