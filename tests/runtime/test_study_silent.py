@@ -1,0 +1,141 @@
+"""What once gave wrong numbers without a word, asked of Study: each is right, or a named error.
+
+Not repeated here: misspelt parameters, texts for numbers, two values for one unknown and cells
+that are inside out (`test_study`), node orders of all elements (`test_study_elements`), bodies that
+float (`test_held`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from softehl import Definition, Mesh, Model, Study, element, kinematics, quadrature
+from softehl.codegen.language.lower import ModelError
+from softehl.runtime.solve.solution import NotConverged
+from tests.runtime import solid_page as pages
+
+SOLID: dict[str, Any] = {"mu": 0.4, "lame": 2.0, "thickness": 1.0}
+
+
+def nodal(law: Callable[[Model, Any, Any], Any], name: str) -> Definition:
+    """One unknown at a node, whose equation is what `law` makes of it and of a load f."""
+    m = Model(name, nodes=1, rule=quadrature.point_rule())
+    ((u,),) = m.nodal_unknowns("u")
+    (f,) = m.parameters(f="load")
+    m.weak_form([(law(m, u, f), u)])
+    return m.finish()
+
+
+def solution(page: Definition, f: float, start: float = 0.0) -> float:
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("law", page, on="right", f=f)
+    study.add("rest", nodal(lambda m, u, f: u - f, "rest"), on="left", f=0.0)
+    study.start(u=start)
+    return float(study.solve().at((1.0,))["u"])
+
+
+def through_a_name(m: Model, u: Any, f: Any) -> Any:
+    """d/du of (1 + u)^4 / 4, written with SymPy's own diff through two names."""
+    a = m.define("a", 1 + u)
+    b = m.define("b", a**2)
+    return sp.diff(b**2 / 4, u) - f
+
+
+def test_derivatives_through_names() -> None:
+    assert solution(nodal(through_a_name, "named"), 8.0) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("f", [1e-11, 1e-6, 1.0])
+def test_local_unknowns_of_any_size(f: float) -> None:
+    """s + s^3 = u at the point, and s = f: u = f + f^3, however small."""
+
+    def law(m: Model, u: Any, f: Any) -> Any:
+        s = m.implicit("s", lambda s: s + s**3 - u, start=u)
+        return s - f
+
+    assert solution(nodal(law, "local"), f) == pytest.approx(f + f**3, rel=1e-9)
+
+
+def test_a_side_that_is_not_taken_needs_no_value() -> None:
+    """log(u) sqrt(u - 1) is nowhere below 1, where the path may start."""
+
+    def law(m: Model, u: Any, f: Any) -> Any:
+        beyond = u + sp.log(u) * sp.sqrt(u - 1)
+        s = m.implicit("s", lambda s: s - sp.Piecewise((u, u < 1), (beyond, True)), start=0)
+        return s - f
+
+    page = nodal(law, "sides")
+    assert solution(page, 0.5) == pytest.approx(0.5, rel=1e-12)
+    found = solution(page, 2.0, start=1.5)
+    assert found + np.log(found) * np.sqrt(found - 1) == pytest.approx(2.0, rel=1e-9)
+
+
+def test_a_chain_of_many_names() -> None:
+    def law(m: Model, u: Any, f: Any) -> Any:
+        value = u
+        for k in range(300):
+            value = m.define(f"v{k}", value + u / 300)
+        return value - f
+
+    assert solution(nodal(law, "chain"), 3.0) == pytest.approx(1.5, rel=1e-12)
+
+
+@pytest.mark.parametrize("load", [4e-10, 4e-4])
+def test_small_loads_are_solved_to_their_own_digits(load: float) -> None:
+    """A load of 4e-10 N was once converged before the first iteration."""
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(2, 1)))
+    study.add("body", pages.solid(), **SOLID)
+    study.fix("left", u_x=0.0)
+    study.fix((0.0, 0.0), u_y=0.0)
+    study.load("right", u_x=load)
+    found = study.solve()
+    assert found.iterations > 0
+    modulus = 4 * SOLID["mu"] * (SOLID["lame"] + SOLID["mu"]) / (SOLID["lame"] + 2 * SOLID["mu"])
+    assert found.at((2.0, 0.0))["u_x"] == pytest.approx(2.0 * load / modulus, rel=2 * load + 1e-9)
+    assert found.reaction("left")["u_x"] == pytest.approx(-load, rel=1e-9)
+
+
+def test_a_value_that_is_no_number_is_named() -> None:
+    def law(m: Model, u: Any, f: Any) -> Any:
+        return m.define("inside", sp.log(u - 1)) - f
+
+    with pytest.raises(NotConverged, match=r"not finite.*block 'law'") as error:
+        solution(nodal(law, "logarithm"), 1.0)
+    assert "\n" not in str(error.value)
+
+
+ILLEGAL: dict[str, Callable[[Model, Any, Any], Any]] = {
+    "division by zero": lambda m, u, f: u / sp.Integer(0) - f,
+    "a branch of Python": lambda m, u, f: u if u > 0 else f,
+    "no last side": lambda m, u, f: sp.Piecewise((u, u > 0)) - f,
+}
+
+
+@pytest.mark.parametrize("name", ILLEGAL)
+def test_pages_that_say_what_no_kernel_can_hold(name: str) -> None:
+    with pytest.raises((ModelError, TypeError)) as error:
+        solution(nodal(ILLEGAL[name], "illegal"), 1.0)
+    assert "\n" not in str(error.value)
+
+
+def test_a_page_of_another_element_is_refused() -> None:
+    """A page of 9 nodes on cells of 8, and one whose sides have another number of nodes."""
+    cell = element("quad9")
+    m = Model("nine", nodes=9, rule=cell.rule)
+    X = m.coordinates("X", "Y")
+    (u,) = m.nodal_unknowns("u")
+    e = kinematics.isoparametric(m, X, cell.gradient(*m.point()))
+    slope = sp.Matrix(e.dN).T * sp.Matrix(u)
+    m.potential(m.integral("Pi", slope.dot(slope) * e.detJ))
+    study = Study(Mesh.rectangle(1, 1, cells=(1, 1), order=2, shape="serendipity"))
+    with pytest.raises(ValueError, match="9 nodes, the mesh has 1 quad8"):
+        study.add("body", m.finish())
+
+
+def test_another_law_has_another_solution() -> None:
+    assert solution(nodal(lambda m, u, f: 2 * u - f, "twice"), 1.0) == pytest.approx(0.5)
