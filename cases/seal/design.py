@@ -1,6 +1,7 @@
 """One target by one parameter: what value of a key gives a quantity of a film its wanted change.
 
-Log-linear steps by exact sensitivities, each followed by a nonlinear solve on a mesh of its own.
+Log-linear steps by exact sensitivities, each followed by a nonlinear solve on a mesh of its own;
+near the target the mesh is held, so that the steps settle.
 """
 
 from __future__ import annotations
@@ -17,6 +18,12 @@ from softehl.cases.seal.state import FilmState
 
 TOLERANCE = 0.01
 """Of the quantity, relative: about what two meshes of neighbouring values differ by."""
+
+SETTLED = 1e-4
+"""Of the quantity, relative, on one mesh."""
+
+Change = Callable[[float], float | None]
+"""Factor of a key -> that of the quantity on the held mesh, None where there is no film."""
 
 STEPS = 6
 """Nonlinear solves after the first."""
@@ -69,12 +76,17 @@ def value_of(state: FilmState, quantity: str) -> float:
 
 
 def designed(
-    p: ORing, target: Target, key: str, solve: Callable[[ORing], FilmState | None]
+    p: ORing,
+    target: Target,
+    key: str,
+    solve: Callable[[ORing], FilmState | None],
+    hold: Callable[[ORing], Change | None],
 ) -> list[Step]:
     """Steps to the value of a key of p that meets the target; the last one does.
 
-    solve: the one film of a case with its sensitivities, None where there is none. Raises
-    NoDesignError, and pydantic.ValidationError for a value that a case cannot have.
+    solve: the one film of a case with its sensitivities, None where there is none. hold: how its
+    quantity changes with the key on its mesh. Raises NoDesignError, and
+    pydantic.ValidationError for a value that a case cannot have.
     """
     state, value = _film(p, key, solve), float(getattr(p, key))
     wanted = target.factor * value_of(state, target.quantity)
@@ -89,14 +101,40 @@ def designed(
                 "this target; choose another key (sensitivity.csv shows which have an influence)"
             )
         value *= math.exp(way / slope)
-        state = _film(ORing(**{**p.model_dump(), key: value}), key, solve)
+        state = _film(ORing(**{**p.settled(), key: value}), key, solve)
         steps.append(Step(value, value_of(state, target.quantity), wanted))
         if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:
-            return steps
+            change = hold(ORing(**{**p.settled(), key: value}))
+            return [*steps, *settled(steps[-1], wanted, slope, change)]
     raise NoDesignError(
         f"after {STEPS} solves {target.quantity} is still {steps[-1].quantity:.4g}, wanted was "
         f"{wanted:.4g}: ask for a smaller change"
     )
+
+
+def settled(near: Step, wanted: float, slope: float, change: Change | None) -> list[Step]:
+    """Steps on the mesh of `near`, until the quantity is what was wanted, to `SETTLED`.
+
+    slope: d log quantity / d log key. Raises NoDesignError.
+    """
+    steps = [near]
+    while change and abs(steps[-1].quantity / wanted - 1.0) > SETTLED and len(steps) <= STEPS:
+        value = steps[-1].value * (wanted / steps[-1].quantity) ** (1.0 / slope)
+        found = change(value / near.value)
+        if found is None:
+            break
+        step = Step(value, near.quantity * found, wanted)
+        rise = math.log(step.quantity / steps[-1].quantity) / math.log(value / steps[-1].value)
+        steps.append(step)
+        if rise * slope <= 0.0:
+            break
+        slope = rise
+    if abs(steps[-1].quantity / wanted - 1.0) > SETTLED:
+        raise NoDesignError(
+            f"near {near.value:.6g} no value gives {wanted:.5g} on one mesh: the film is at a kink "
+            "or an end; use a larger density, or ask for another change"
+        )
+    return steps[1:]
 
 
 def _film(p: ORing, key: str, solve: Callable[[ORing], FilmState | None]) -> FilmState:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from softehl.__main__ import main
-from softehl.cases.seal.design import NoDesignError, Step, Target, designed
+from softehl.cases.seal.design import Change, NoDesignError, Step, Target, designed, settled
+from softehl.cases.seal.held import HeldFilm
+from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import FilmState
+from softehl.cases.seal.state import FilmState, Silent
 from tests.cases.oring_cases import film_values
 
 P = ORing()
@@ -33,35 +37,51 @@ def power_law(p: ORing, slope: float = POWER, **given: Any) -> FilmState:
     return replace(state, **given)
 
 
+def held(p: ORing) -> Change:
+    """How the same friction changes where the mesh is held: not quite as from mesh to mesh."""
+    return lambda factor: factor ** (1.01 * POWER)
+
+
+def steps(target: Target, solve: Callable[[ORing], FilmState | None]) -> list[Step]:
+    return designed(P, target, "rod_diameter", solve, held)
+
+
 def test_a_power_law_is_met_in_one_step() -> None:
-    steps = designed(P, Target.of("friction -3%"), "rod_diameter", power_law)
-    assert isinstance(steps[0], Step)
-    assert (steps[0].value, steps[0].quantity) == (50.0, 5.0)
-    assert math.isnan(steps[0].predicted)
-    assert len(steps) == 2
-    assert steps[1].value == pytest.approx(50.0 * 0.97 ** (1.0 / POWER))
-    assert steps[1].quantity == pytest.approx(0.97 * 5.0)
+    found = steps(Target.of("friction -3%"), power_law)
+    assert isinstance(found[0], Step)
+    assert (found[0].value, found[0].quantity) == (50.0, 5.0)
+    assert math.isnan(found[0].predicted)
+    assert len(found) == 2
+    assert found[1].value == pytest.approx(50.0 * 0.97 ** (1.0 / POWER))
+    assert found[1].quantity == pytest.approx(0.97 * 5.0)
 
 
 def test_a_wrong_slope_needs_more_steps_and_a_wrong_sign_never_ends() -> None:
     target = Target.of("friction -6 %")
-    steps = designed(P, target, "rod_diameter", lambda p: power_law(p, 1.5 * POWER))
-    assert len(steps) > 2
-    assert steps[-1].quantity == pytest.approx(0.94 * 5.0, rel=0.01)
+    found = steps(target, lambda p: power_law(p, 1.5 * POWER))
+    assert len(found) > 2
+    assert found[-1].quantity == pytest.approx(0.94 * 5.0, rel=1e-4)
     with pytest.raises((NoDesignError, ValueError)):
-        designed(P, target, "rod_diameter", lambda p: power_law(p, -POWER))
+        steps(target, lambda p: power_law(p, -POWER))
+
+
+def test_the_last_steps_settle_on_a_mesh_that_is_held() -> None:
+    """A first step within one per cent is not the end; a film that is lost there is said."""
+    near, wanted = Step(50.0, 5.03, 5.0), 5.0
+    found = settled(near, wanted, POWER, lambda factor: factor ** (1.3 * POWER))
+    assert len(found) >= 2
+    assert found[-1].quantity == pytest.approx(wanted, rel=1e-4)
+    assert 5.03 * (found[-1].value / 50.0) ** (1.3 * POWER) == pytest.approx(wanted, rel=1e-4)
+    for lost in (None, lambda _: None, lambda _: 1.001):
+        with pytest.raises(NoDesignError, match="near 50 no value gives 5 on one mesh"):
+            settled(near, wanted, POWER, lost)
 
 
 def test_what_is_out_of_reach_is_said() -> None:
     with pytest.raises(NoDesignError, match="too little for this target; choose another key"):
-        designed(P, Target.of("friction -50%"), "rod_diameter", lambda p: power_law(p, slope=-0.01))
+        steps(Target.of("friction -50%"), lambda p: power_law(p, slope=-0.01))
     with pytest.raises(NoDesignError, match="has the verdict under-resolved"):
-        designed(
-            P,
-            Target.of("friction -5%"),
-            "rod_diameter",
-            lambda p: power_law(p, verdict="under-resolved"),
-        )
+        steps(Target.of("friction -5%"), lambda p: power_law(p, verdict="under-resolved"))
     for wrong in ("friction", "colour -3%", "friction -100%", "friction 3"):
         with pytest.raises(NoDesignError, match="is not understood"):
             Target.of(wrong)
@@ -76,8 +96,25 @@ def test_a_key_that_is_no_number_is_refused(capsys: pytest.CaptureFixture[str]) 
 
 @pytest.mark.slow
 def test_ten_per_cent_less_friction_by_the_rod(capsys: pytest.CaptureFixture[str]) -> None:
-    given = ["--by", "rod_diameter", "--set", "speeds=[400]"]
-    assert main(["design", "oring", "friction -10%", *given]) == 0
+    """On one mesh to 1e-4; a run of its own, on its own mesh, agrees as well as two meshes do."""
+    wanted = ["design", "oring", "friction -10%", "--by", "rod_diameter", "--set", "speeds=[400]"]
+    assert main(wanted) == 0
     printed = capsys.readouterr().out
-    value = float(printed.split("friction ")[-1].split(" %")[0])
-    assert value == pytest.approx(-10.0, abs=0.95)
+    assert re.search(r"friction -(10\.00|9\.99|10\.01) % \(wanted -10 %\)", printed)
+    rod = float(printed.split("by rod_diameter = ")[-1].split()[0])
+    given = [P.model_copy(update={**ONE, "rod_diameter": d}) for d in (50.0, rod)]
+    before, after = (run(p, Silent()).states[0] for p in given)
+    assert after.rod_friction_N / before.rod_friction_N == pytest.approx(0.9, rel=0.01)
+
+
+ONE = {"speeds": (400.0,), "stroke": "out", "error_estimate": False}
+
+
+@pytest.mark.slow
+def test_the_held_mesh_gives_what_the_run_did() -> None:
+    held_film = HeldFilm.of(P.model_copy(update={**ONE, "density": 1}))
+    assert held_film is not None
+    assert held_film.change("friction", "rod_diameter", 1.0) == pytest.approx(1.0, abs=1e-7)
+    changed = held_film.change("friction", "rod_diameter", 0.9995)
+    assert changed is not None
+    assert 0.95 < changed < 0.99
