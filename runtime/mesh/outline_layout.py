@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from itertools import pairwise
 from math import ceil, radians
 
@@ -133,10 +134,12 @@ def normals(outline: Outline, s: Array, over: Array | float) -> Array:
     return np.stack([-chord[:, 1], chord[:, 0]], axis=1)
 
 
+@lru_cache(maxsize=8)
 def ball_radii(outline: Outline, side: float) -> Array:
     """Radii (stations,) of the largest balls that touch the outline: inside (1) or outside (-1).
 
-    What lies within two strips along the outline does not count: corners stay blunt.
+    What lies within two strips along the outline does not count: corners stay blunt. Kept for the
+    next mesh of the same outline, and not to be written into.
     """
     s = np.arange(_STATIONS) * outline.length / _STATIONS
     over = max(SMOOTH, _usual_depth(outline))
@@ -147,4 +150,6 @@ def ball_radii(outline: Outline, side: float) -> Array:
     apart = np.minimum(apart, outline.length - apart)
     seen = (inwards > 1e-9) & (apart > 2.0 * over)
     radii = (away**2).sum(axis=2) / (2.0 * np.where(seen, inwards, 1.0))
-    return np.asarray(radii.min(axis=1, where=seen, initial=np.inf))
+    result = np.asarray(radii.min(axis=1, where=seen, initial=np.inf))
+    result.flags.writeable = False
+    return result
