@@ -23,6 +23,8 @@ TRANSIENT = "transient"
 """Verdict of a cycle that differs from the one before by more than PERIODIC."""
 PERIODIC = 1.0  # per cent
 
+PICTURES, ANIMATION = ("friction_loop", "film_map"), "cycle.gif"
+
 Points = tuple[Annotated[tuple[float, float], Field(strict=False)], ...]
 
 
@@ -51,6 +53,7 @@ class Cycle(ORing):
     )
     cycles: int = key(3, "cycles to compute", ge=1, le=1000)
     time_order: Literal[1, 2] = key(2, "1: backward Euler, 2: BDF2", bounds="1 or 2")
+    animation: bool = key(False, "whether the last cycle is drawn as cycle.gif")
     time_tolerance: float = key(0.02, "error of h in a step, relative to it", gt=0, le=0.5)
 
     @classmethod
@@ -86,7 +89,7 @@ class Cycle(ORing):
 class CycleRow(Row):
     """A row of curve.csv: one cycle."""
 
-    files = ("loop_{}.csv", "film_{}.csv")
+    files = ("loop_{}.csv", "film_{}.csv", "state_{}.csv")
     cycle: float = column("", "number of the cycle", head="cycle", shown="g")
     leak_mm3: float = column("mm3", "oil past the air end, + = out", head="leak", shown=".4g")
     leak_sealed_mm3: float = column("mm3", "oil past the sealed end, + = to the air side")
@@ -147,11 +150,11 @@ def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) ->
 
 
 def cycle_tables(films: Any) -> list[dict[str, Array]]:
-    """The friction loop with all readings, and the film over time and place."""
+    """The friction loop with all readings, the film over time and place, where the next starts."""
     names = asdict(films.readings[0])
     loop = {n: np.array([getattr(r, n) for r in films.readings], dtype=float) for n in names}
     film = {n: np.concatenate([f[n] for f in films.films]) for n in films.films[0]}
-    return [loop, film]
+    return [loop, film, films.end]
 
 
 class CycleCase(Case[Cycle, CycleRow]):
@@ -160,15 +163,15 @@ class CycleCase(Case[Cycle, CycleRow]):
     name = "cycle"
     title = "reciprocating O-ring seal in time: friction loop and leakage of every cycle"
     parameters, row = Cycle, CycleRow
-    selection = ("cycles",)
-    files = ("rows.png",)
+    selection = ("cycles", "animation")
+    files = ("rows.png", *(f"{n}.{k}" for n in PICTURES for k in ("png", "svg")), ANIMATION)
 
     def requested(self, parameters: Cycle) -> list[float]:
         """See :class:`Case`."""
         return [float(n + 1) for n in range(parameters.cycles)]
 
     def pieces(self, parameters: Cycle, rows: Sequence[CycleRow], jobs: int) -> list[Cycle]:
-        """See :class:`Case`; a run that goes on computes the cycles again that are there."""
+        """See :class:`Case`; a run that goes on starts from the last cycle that is there."""
         return [] if len(rows) >= parameters.cycles else [parameters]
 
     def piece_name(self, piece: Cycle) -> str:
@@ -193,9 +196,20 @@ class CycleCase(Case[Cycle, CycleRow]):
         rows: Sequence[CycleRow],
         rejected: Sequence[CycleRow],
     ) -> None:
-        """See :class:`Case`: the friction loops."""
-        tables = {row.label(row.key): read_table(folder / row.file_names()[0]) for row in rows}
-        draw_columns(folder / "rows.png", tables, ("place_mm", "friction_N", "flux_air_mm2_s"))
+        """See :class:`Case`: friction loops, and the film of the last cycle."""
+        import matplotlib
+
+        from softehl.cases.seal.report.cycle import loop_figure, map_figure, write_animation
+        from softehl.cases.seal.report.style import STYLE, save
+
+        loops = {row.label(row.key): read_table(folder / row.file_names()[0]) for row in rows}
+        draw_columns(folder / "rows.png", loops, ("place_mm", "friction_N", "flux_air_mm2_s"))
+        film, last = read_table(folder / rows[-1].file_names()[1]), [*loops.values()][-1]
+        with matplotlib.rc_context(STYLE):
+            save(loop_figure(loops), folder / PICTURES[0])
+            save(map_figure(film, last), folder / PICTURES[1])
+            if parameters.animation:
+                write_animation(folder / ANIMATION, film, last)
 
 
 CASE = CycleCase()

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from softehl.cases.harness.files import Content
 from softehl.cases.harness.row import Row
+from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Status
 
 
@@ -100,4 +101,11 @@ class Observer(Protocol):
 
     def files(self, contents: Mapping[str, Content]) -> None:
         """Files that belong to no row, by name."""
+        return None
+
+    def kept(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
+        """A row that an earlier run left here, and its tables; None where there is none.
+
+        Of a run in this process only.
+        """
         return None

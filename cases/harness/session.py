@@ -16,7 +16,10 @@ from softehl.cases.harness.files import Content
 from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.progress import Display, make_display
 from softehl.cases.harness.record import RunRecord, StageLog
+from softehl.cases.harness.row import Row
 from softehl.cases.harness.workers import solve_side_by_side
+from softehl.runtime.arrays import Array
+from softehl.runtime.io import read_table
 from softehl.runtime.kernels import MissingKernelsError, StaleKernelsError
 from softehl.runtime.solve.backends import MissingBackend
 from softehl.runtime.solve.solution import Status
@@ -111,6 +114,14 @@ class Reporter(Observer):
         """See :class:`Observer`."""
         with writing(self.record.folder):
             self.record.files(contents)
+
+    def kept(self, key: float) -> tuple[Row, Sequence[Mapping[str, Array]]] | None:
+        """See :class:`Observer`."""
+        for row in self.record.curve.rows:
+            if row.key == key:
+                paths = [self.record.folder / name for name in row.file_names()]
+                return row, [read_table(path) for path in paths if path.suffix == ".csv"]
+        return None
 
 
 @contextmanager

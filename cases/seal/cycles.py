@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,21 +18,24 @@ from softehl.cases.seal.method import BuiltFilm, FilmPath
 from softehl.cases.seal.motion import Motion
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.restart import leave_films, packed, readings, unpacked
 from softehl.cases.seal.telling import Teller
 from softehl.cases.seal.transient import Instant, March, Reading, StuckError, TimeSteps
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.schur import StaleTangent
 from softehl.runtime.solve.solution import Point, Status
 
 
 @dataclass
 class Films:
-    """Readings of the cycle that is computed, and what its film was."""
+    """Readings of the cycle that is computed, what its film was, and where the next one starts."""
 
     readings: list[Reading] = field(default_factory=list)
     films: list[dict[str, Array]] = field(default_factory=list)
+    end: dict[str, Array] = field(default_factory=dict)
 
 
 Log = Callable[[int, Films, Reading, Any], Any]
@@ -80,11 +83,19 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
 
 
 def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> None:
-    period, last = march.motion.period, None
-    before = march.begin(x)
-    for number in range(1, count + 1):
+    period = march.motion.period
+    before, done, last = march.begin(x), 0, None
+    while (kept := observer.kept(float(done + 1))) is not None:
+        last, (loop, _, state) = kept
+        past = readings(loop)
+        leave_films(march, past)
+        unpacked(march, state)
+        before, done = past[-1], done + 1
+    for number in range(done + 1, count + 1):
         films = Films()
         name = f"cycle {number}"
+        # its condensations are its own, so that a run that goes on from here does the same
+        march.corrector = replace(march.corrector, tangent=StaleTangent())
         observer.stage(name, title=name, where={})
 
         def told(instant: Instant, reading: Reading, films: Films = films) -> None:
@@ -99,6 +110,7 @@ def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) ->
             )
 
         march.until(number * period, told)
+        films.end = packed(march)
         last = log(number, films, before, last)
         before = films.readings[-1]
 

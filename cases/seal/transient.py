@@ -116,6 +116,11 @@ class March:
             dt = left if dt >= left * (1.0 - 1e-9) else min(dt, 0.5 * left)
             self._step(now, dt, on_step)
 
+    def left(self, reading: Reading) -> float | None:
+        """Film (mm) that an outstroke leaves on the rod, None at instroke."""
+        U = reading.rod_speed_mm_s
+        return 2.0 * reading.flux_air_mm2_s / max(U, 1e-3 * self._fastest) if U > 0.0 else None
+
     # --- inside -----------------------------------------------------------------------------------
 
     def _step(self, now: float, dt: float, on_step: Callable[[Instant, Reading], None]) -> None:
@@ -133,8 +138,8 @@ class March:
         instant = self._instant(problem, solution.x, dt)
         reading = self._reading(problem, film, instant, solution.iterations)
         self.behind = [instant, *self.behind[:2]]
-        if film.rod_speed > 0.0:
-            left = 2.0 * reading.flux_air_mm2_s / max(film.rod_speed, 1e-3 * self._fastest)
+        left = self.left(reading)
+        if left is not None:
             self.rod.leave(reading.place_mm, left)
         on_step(instant, reading)
         power = 1.0 / 3.0 if len(self.behind) > 2 else 0.5
