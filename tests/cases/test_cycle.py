@@ -10,11 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from pydantic import ValidationError
 
 import softehl
 from softehl.cases.cycle import Cycle
 from softehl.cases.seal.motion import Motion, RodFilm, Table, differences
+from softehl.cases.seal.report.cycle import (
+    film_map,
+    loop_figure,
+    map_figure,
+    work_mJ,
+    write_animation,
+)
 from softehl.cases.seal.strip import Oil, Strip
 from softehl.cases.seal.system import FILM, PRESSURE, SQUEEZE, VOID
 from softehl.runtime.arrays import Array
@@ -192,6 +200,95 @@ def test_long_periods_give_the_steady_curve(tmp_path: Path) -> None:
         table = cycle(tmp_path / str(n), "cycles=2", f"motion=[{motion}]")
         leaks.append(table["leak_mm3"][-1] * frequency)
     assert abs(leaks[2] - leaks[1]) < 0.2 * abs(leaks[1] - leaks[0])
+
+
+@pytest.mark.slow
+def test_a_run_that_goes_on_does_the_same_to_the_last_bit(tmp_path: Path) -> None:
+    """From the end of the last cycle that is there, with what the rod carries then."""
+    given = ("supply=returned", "frequency=10", "time_tolerance=0.05")
+    whole = cycle(tmp_path / "whole", *given, "cycles=2")
+    assert whole["cycle"].tolist() == [1.0, 2.0]
+    cycle(tmp_path / "parts", *given, "cycles=1")
+    keys = [f"--set={s}" for s in ("density=1", "roughness=0.3", *given, "cycles=2")]
+    parts = tmp_path / "parts"
+    begun = (parts / "loop_1.csv").stat().st_mtime_ns
+    assert softehl.main(["run", "cycle", *keys, "--out", str(parts), "--resume", "--quiet"]) == 0
+    assert (parts / "loop_1.csv").stat().st_mtime_ns == begun
+    for name in ("curve.csv", "loop_2.csv", "film_2.csv", "state_2.csv"):
+        assert (parts / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+MOTIONS = {
+    "trapezoidal": ("motion={stroke=20, frequency=2, shape='trapezoidal'}", "supply=returned"),
+    "from a file": ("motion=motion.csv", "supply=returned"),
+    "pressure": ("pressures=[[0, 1], [0.2, 1], [0.25, 2], [0.45, 2], [0.5, 1]]",),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MOTIONS)
+def test_other_motions_balance_too(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = "t_s,U_mm_s\n0,100\n0.1,100\n0.15,-100\n0.35,-100\n0.4,100\n"
+    Path("motion.csv").write_text(rows)
+    table = cycle(tmp_path / "c", *MOTIONS[name], "cycles=2")
+    assert table["mass_error"].max() < 1e-9
+    assert table["change_percent"][-1] < 1.0
+    loop = read_table(tmp_path / "c" / "loop_2.csv")
+    assert loop["friction_N"].min() < 0.0 < loop["friction_N"].max()
+    highest = 2.0 if name == "pressure" else 1.0
+    assert loop["sealed_pressure_MPa"].max() == pytest.approx(highest)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency", [0.5, 10.0])
+def test_slow_and_fast_cycles_are_periodic_by_the_third(frequency: float, tmp_path: Path) -> None:
+    table = cycle(tmp_path / "c", f"frequency={frequency}")
+    assert table["mass_error"].max() < 1e-9
+    assert table["change_percent"][-1] < 0.5
+
+
+def film_and_loop(times: int = 12, nodes: int = 9) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Tables of a made-up cycle: h = 1 + x^2 + t um, friction 2 N against the rod."""
+    t, x = np.linspace(0.1, 1.0, times), np.linspace(-1.0, 1.0, nodes)
+    h = 1.0 + x**2 + t[:, None]
+    film = {
+        "t_s": np.repeat(t, nodes),
+        "x_mm": np.tile(x, times),
+        "h_um": h.ravel(),
+        "p_MPa": np.tile(1.0 - x**2, times),
+    }
+    U = 10.0 * np.cos(2.0 * np.pi * t)
+    loop = {"t_s": t, "rod_speed_mm_s": U, "place_mm": np.sin(t), "friction_N": 2.0 * np.sign(U)}
+    return film, loop
+
+
+def test_the_map_of_a_film_has_a_line_for_every_time() -> None:
+    film, loop = film_and_loop()
+    times, x, h, p = film_map(film)
+    assert h.shape == p.shape == (len(times), len(x)) == (12, 9)
+    np.testing.assert_allclose(h, 1.0 + x**2 + times[:, None])
+    speed, axes, _ = map_figure(film, loop).axes
+    assert speed.get_ylim() == axes.get_ylim()
+
+
+def test_the_loop_says_what_a_cycle_costs() -> None:
+    _, loop = film_and_loop(times=901)
+    way = float(np.trapezoid(abs(loop["rod_speed_mm_s"]), loop["t_s"]))
+    assert work_mJ(loop) == pytest.approx(2.0 * way, rel=1e-3)
+    (axes,) = loop_figure({"cycle = 1": loop}).axes
+    (text,) = axes.get_legend().get_texts()
+    assert f"{work_mJ(loop):.4g} mJ" in text.get_text()
+
+
+def test_an_animation_moves(tmp_path: Path) -> None:
+    film, loop = film_and_loop()
+    write_animation(tmp_path / "cycle.gif", film, loop)
+    with Image.open(tmp_path / "cycle.gif") as image:
+        assert getattr(image, "n_frames", 1) >= 12
+    assert [path.name for path in tmp_path.iterdir()] == ["cycle.gif"]
 
 
 @pytest.mark.parametrize(
