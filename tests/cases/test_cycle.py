@@ -279,7 +279,9 @@ def test_the_loop_says_what_a_cycle_costs() -> None:
     way = float(np.trapezoid(abs(loop["rod_speed_mm_s"]), loop["t_s"]))
     assert work_mJ(loop) == pytest.approx(2.0 * way, rel=1e-3)
     (axes,) = loop_figure({"cycle = 1": loop}).axes
-    (text,) = axes.get_legend().get_texts()
+    legend = axes.get_legend()
+    assert legend is not None
+    (text,) = legend.get_texts()
     assert f"{work_mJ(loop):.4g} mJ" in text.get_text()
 
 

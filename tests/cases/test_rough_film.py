@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -179,3 +180,30 @@ def test_a_rough_film_on_a_section_that_rubs_on_its_housing() -> None:
     assert all(state.verdict == OK for state in rubbing.values())
     for speed, state in held.items():
         assert rubbing[speed].rod_friction_N == pytest.approx(state.rod_friction_N, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("what", "keys"),
+    [
+        ("K halved", {"asperity_stiffness": 7.32}),
+        ("both surfaces equally rough", {"roughness": [0.3 / 2**0.5, 0.3 / 2**0.5]}),
+    ],
+)
+def test_how_much_uncertain_coefficients_matter(what: str, keys: dict[str, Any]) -> None:
+    """Rows of the table in docs/film-physics.md."""
+    page = (Path(__file__).parents[2] / "docs" / "film-physics.md").read_text(encoding="utf-8")
+    (line,) = [line for line in page.splitlines() if line.startswith(f"| {what}")]
+    said = [[float(v) for v in cell.split(",")] for cell in line.split("|")[2:4]]
+    speeds = (1.0, 20.0, 200.0)
+    given: dict[str, Any] = {
+        "roughness": 0.3,
+        "speeds": speeds,
+        "stroke": "out",
+        "density": 2,
+    }
+    usual, varied = solved(**given), solved(**{**given, **keys})
+    for number, speed in enumerate(speeds):
+        for name, column in zip(("mean_gap_um", "rod_friction_N"), said, strict=True):
+            found = getattr(varied[speed], name) / getattr(usual[speed], name)
+            assert 100.0 * (found - 1.0) == pytest.approx(column[number], abs=0.3)
