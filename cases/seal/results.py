@@ -43,7 +43,7 @@ from softehl.runtime.fem.rules import trace_rule
 
 MICROMETRE = 1e-3  # mm
 
-EXIT_SLOPE = 50.0
+EXIT_SLOPE = 40.0
 """Slope beyond which a film has ended, degrees: the corner of a flat, the heel of a cup."""
 
 INLET = (10.0, 1.5)

@@ -187,6 +187,36 @@ def test_an_x_ring_whose_lobes_are_one_circle_is_the_o_ring() -> None:
         assert a.verdict == b.verdict == OK
 
 
+def _documented() -> dict[str, list[float]]:
+    """Section -> the four films that docs/sections.md gives, um."""
+    text = (Path(__file__).parents[2] / "docs" / "sections.md").read_text(encoding="utf-8")
+    table = text.split("<!-- films of sections -->")[1].split("<!-- end -->")[0]
+    rows = [line.strip("| ").split("|") for line in table.strip().splitlines()[2:]]
+    return {row[0].strip(" `"): [float(cell) for cell in row[2:]] for row in rows}
+
+
+SIZES: dict[str, dict[str, Any]] = {
+    "rectangular": {"corner_radius": 0.4},
+    "x_ring": {"lobe_radius": 0.9, "fillet_radius": 0.6},
+    "u_cup": {"groove_width": 6.0},
+}
+
+
+def test_every_section_but_the_round_one_has_its_films_documented() -> None:
+    assert set(_documented()) == set(SECTIONS) - {"round"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("section", [name for name in SECTIONS if name != "round"])
+def test_the_films_that_are_documented(section: str) -> None:
+    given = {**GROOVE, "section": section, **SIZES.get(section, {})}
+    found = _curve(stroke="out", speeds=(800.0, 50.0), **given)
+    assert [s.h_star_um for s in found.states] == pytest.approx(
+        _documented()[section][:2], rel=0.01
+    )
+    assert [s.verdict for s in found.states] == [OK, OK]
+
+
 @pytest.mark.slow
 def test_the_films_of_a_rectangle_and_of_an_x_ring() -> None:
     """Against a study of its own code at density 2; um at 800 mm/s."""
