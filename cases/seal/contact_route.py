@@ -14,6 +14,7 @@ from typing import TypeAlias
 from softehl.cases.seal.contact import (
     against_wall,
     along,
+    approach_stage,
     held_place,
     lean_stage,
     let_go_stage,
@@ -22,8 +23,15 @@ from softehl.cases.seal.contact import (
     wedged,
 )
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
+from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.grading import PASSES, graded_layout, placed_layout
+from softehl.cases.seal.grading import (
+    PASSES,
+    graded_layout,
+    inlet_length,
+    placed_layout,
+    slowest_film,
+)
 from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
@@ -51,6 +59,10 @@ SEALS = 3
 
 GUIDE = 2
 """Least density of a mesh whose contact shows where another one is to be fine."""
+
+NEARER, SHORT_INLET = 2, 0.5
+"""Meshes that are graded by a contact near the rod, and below which inlet, in offsets of the rod,
+they are: its way from there moves the edges by about as much as it is long."""
 
 
 @dataclass(frozen=True)
@@ -171,10 +183,39 @@ class ContactRoute:
             if not isinstance(state, StageFailed):
                 state = self._sealed(_at(p, density), state)
             if not isinstance(state, StageFailed):
+                state = self._slow(_at(p, density), state)
+            if not isinstance(state, StageFailed):
                 state = self._refined(*state, p.density)
             if not isinstance(state, StageFailed):
                 break
         return state
+
+    def _slow(self, p: ORing, state: State) -> State | StageFailed:
+        """The last mesh again where the inlet of the slowest film is short: by where that film is.
+
+        Contact holds the rod farther off than a slow film does, and its edges are elsewhere then.
+        """
+        found: State | StageFailed = state
+        for number in range(NEARER):
+            if isinstance(found, StageFailed) or not self._short(*found):
+                break
+            system, x = found
+            offset = slowest_film(system, x)
+            stage = approach_stage(system, self.settings, offset)
+            near = self.follow(self._quicker(system, stage), x)
+            if isinstance(near, StageFailed):
+                break
+            layout = placed_layout(system, near, p)
+            found = self._on(layout, p, found, PASSES + SEALS + number)
+        return found
+
+    def _short(self, system: SealSystem, x: Array) -> bool:
+        """Whether the edges of the contact x move by inlets when the rod comes nearer."""
+        p, edges = system.parameters, contact_edges(system, x)
+        if p.mesh == "uniform" or p.rubs or p.rough or not edges:
+            return False
+        length = inlet_length(p, max(edge.rise for edge in edges))
+        return length < SHORT_INLET * self.settings.offset
 
     def _sealed(self, p: ORing, state: State) -> State | StageFailed:
         """On the last of the graded meshes; on more where pressure ends outside the contact."""

@@ -135,6 +135,12 @@ def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
     return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
 
 
+def slowest_film(system: SealSystem, x: Array) -> float:
+    """About the least h* (mm) of a case whose contact state is x."""
+    p = system.parameters
+    return 1.75 * film_thickness(p, contact_edges(system, x), min(p.speeds))
+
+
 def _way_out(system: SealSystem, x: Array, s: Array, side: int, p: ORing) -> float:
     """Where on the arc (mm) an end of the film is to be: side 0 the sealed, 1 the air end."""
     z, h = system.arc_film(x)
