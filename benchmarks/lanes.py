@@ -124,8 +124,10 @@ def seconds(call: Callable[[int], None], repeats: int) -> float:
     return (times[0] - times[1]) / repeats / ELEMENTS
 
 
-def measure(name: str, folders: Sequence[Path], rounds: int) -> tuple[list[float], float]:
-    """Nanoseconds of an element by each folder, and the median of the ratios of each round."""
+def measure(name: str, folders: Sequence[Path], rounds: int) -> tuple[list[float], list[float]]:
+    """Nanoseconds of an element by each folder; the median of each round's ratios, and the ratio
+    of the least times, which other work of the machine disturbs least.
+    """
     sizes, arrays = states(name)
     calls = [caller(f, name, sizes, arrays) for f in folders]
     for call, _ in calls:
@@ -138,7 +140,8 @@ def measure(name: str, folders: Sequence[Path], rounds: int) -> tuple[list[float
     repeats = max(1, int(2e-3 / ELEMENTS / max(seconds(calls[0][0], 1), 1e-9)))
     samples = [[seconds(c, repeats) for c, _ in calls] for _ in range(rounds)]
     best = [median(column) * 1e9 for column in zip(*samples, strict=True)]
-    return best, median(a / b for a, b in samples)
+    before, now = (min(column) for column in zip(*samples, strict=True))
+    return best, [median(a / b for a, b in samples), before / now]
 
 
 def main() -> None:
@@ -154,11 +157,11 @@ def main() -> None:
         old = "simd" if given.before else "scalar"
         before, _ = made(given.names, folders[0], old, given.before)
         now, _ = made(given.names, folders[1], "simd", None)
-        print("| tangent | operations before | now | ns before | ns now | ratio |")
-        print("|---|---|---|---|---|---|")
+        print("| tangent | operations before | now | ns before | ns now | ratio | of least |")
+        print("|---|---|---|---|---|---|---|")
         for name in given.names:
-            (a, b), ratio = measure(name, folders, given.rounds)
-            row = f"{before[name]} | {now[name]} | {a:.0f} | {b:.0f} | {ratio:.2f}"
+            (a, b), (ratio, least) = measure(name, folders, given.rounds)
+            row = f"{before[name]} | {now[name]} | {a:.0f} | {b:.0f} | {ratio:.2f} | {least:.2f}"
             print(f"| {name} | {row} |", flush=True)
 
 

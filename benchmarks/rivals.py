@@ -40,13 +40,13 @@ def newton(assemble, solve, u, free):
     raise RuntimeError("no convergence")
 
 
-def timed(action, rounds=7):
+def timed(action, rounds=30):
     found = []
     for _ in range(rounds):
         start = time.perf_counter()
         action()
         found.append(time.perf_counter() - start)
-    return float(np.median(found))
+    return min(found)
 
 
 def free_solver(free):
