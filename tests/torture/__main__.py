@@ -5,6 +5,7 @@ Bounded to 15 minutes. The exit code is 1 if anything was lost or ended in a tra
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
 import sys
@@ -179,9 +180,49 @@ def sweeps(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
     tally.count("" if last.returncode == 0 else last.stderr.strip()[-200:])
 
 
+STUDY = """
+case = "slider"
+segments = 40
+speeds = [400]
+[latin_hypercube]
+count = 200
+between.h0 = ["1 um", "3 um"]
+between.ratio = [1.5, 4]
+"""
+
+
+def studies(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
+    """A study of 200 runs, killed twice and resumed: the table is that of an uninterrupted one."""
+    (work / "study.toml").write_text(STUDY)
+    command = ("sweep", "study.toml", "--quiet", "--jobs", "2", "--resume", "--out")
+    tally.count(done(*command, "whole", cwd=work).fault)
+    expected = (work / "whole" / "sweep.csv").read_bytes()
+    for number in range(10):
+        folder = f"killed{number}"
+        for _ in range(2):
+            if killed(begun(*command, folder, cwd=work), rng.uniform(3.0, 8.0)):
+                tally.count(_half_tables(work / folder))
+        last = done(*command, folder, cwd=work)
+        table = (work / folder / "sweep.csv").read_bytes()
+        tally.count(last.fault or ("" if table == expected else "another table"))
+        if clock.left() < 0:
+            break
+
+
+def _half_tables(folder: Path) -> str:
+    """What of a study that was killed is no whole file, empty if everything is."""
+    for path in (*folder.glob("run.json"), *folder.glob("runs/*/run.json")):
+        try:
+            json.loads(path.read_text())
+        except ValueError as error:
+            return f"half a file: {path.name}: {error}"
+    return ""
+
+
 GROUPS = (
-    (kills, 0.35, "kill -9 of a run", "no half file, nothing lost; resumed to the same curve"),
+    (kills, 0.25, "kill -9 of a run", "no half file, nothing lost; resumed to the same curve"),
     (sweeps, 0.1, "kill -9 of a sweep", "no half file; begun again it ends"),
+    (studies, 0.1, "kill -9 of a study of 200 runs", "resumed to the same table, byte by byte"),
     (pairs, 0.1, "two processes at once", "one of them, or both, right; the other says why not"),
     (
         damages,
