@@ -34,7 +34,7 @@ _NEAR = 0.3  # residual at which the section is in equilibrium well enough to be
 _LOOSE = 1e-3  # between contact and film, whose states are not results
 _FIRM = 1e-6  # of the state from which speeds fall: a section is condensed there that is at rest
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
-_SHEAR_STEPS = StepRule(1.0, 0.05, target_iterations=8)
+_SHEAR_STEPS = StepRule(1.0, 0.005, target_iterations=8)
 _SPEED_STEPS = StepRule(math.log(2.0), 0.004, math.log(2.0) + 1e-9, target_iterations=30)
 
 
