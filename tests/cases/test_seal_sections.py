@@ -156,11 +156,12 @@ def test_a_frictionless_rectangle_in_plane_strain(stretch: float, pressure: floa
     gap = stretch * 3.53 + 0.01
     system, x = _contact(
         section="rectangular",
-        corner_radius=0.2,
+        section_width=9.0,
+        corner_radius=0.1,
         inner_diameter=1000.0,
         rod_diameter=1000.0,
         housing_diameter=1000.0 + 2.0 * gap,
-        groove_width=5.0,
+        groove_width=12.0,
         bulk_modulus=2e4,
         sealed_pressure=0.0,
     )
