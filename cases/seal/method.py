@@ -162,20 +162,39 @@ class FilmPath:
 
     def rise(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> StageFailed | None:
         """Rough films: from asperities in contact at x to dry sliding, then to higher speeds."""
-        system, settings, p = self.system, self.settings, self.system.parameters
+        system, p = self.system, self.system.parameters
         film = dry_film(system, stroke, x)
         y = self.driver.follow_all(wetting_stages(system, film, x), x)
         if not isinstance(y, StageFailed):
-            y = self.driver.follow_all(sliding_stages(system, settings, film, y), y)
+            fast = self._modified(y)
+            y = self._sliding(film, y, fast)
         if isinstance(y, StageFailed):
             return y
         shear = 1.0 if p.shear_traction else 0.0
         moment = 0.0 if p.rotation == "free" else film.moment
-        return self._faster(replace(film, shear=shear, moment=moment), y, on_speed)
+        return self._faster(replace(film, shear=shear, moment=moment), y, on_speed, fast)
 
-    def _faster(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+    def _modified(self, x: Array) -> FastFilm | None:
+        """Modified Newton iterations of a stroke begun at x (n,), None where they do not serve."""
+        linear = self.driver.newton.linear
+        if not self.quick or not isinstance(linear, Condenser):
+            return None
+        return FastFilm.of(self.system, linear, x)
+
+    def _sliding(self, film: FilmLoads, x: Array, fast: FastFilm | None) -> Followed:
+        """The dry film x (n,) with its friction; by Newton's method where the fast way fails."""
+        stages = sliding_stages(self.system, self.settings, film, x)
+        if fast:
+            y = self.driver.follow_all(map(fast.shear, stages), x)
+            if not isinstance(y, StageFailed):
+                return y
+        return self.driver.follow_all(stages, x)
+
+    def _faster(
+        self, film: FilmLoads, x: Array, on_speed: OnSpeed, fast: FastFilm | None
+    ) -> StageFailed | None:
         """Rising speeds by modified Newton iterations; by Newton's method where they fail."""
-        system, p, linear = self.system, self.system.parameters, self.driver.newton.linear
+        system, p = self.system, self.system.parameters
         reached = [(film, x)]
 
         def keep(at: FilmLoads, point: Point) -> None:
@@ -187,10 +206,9 @@ class FilmPath:
             speeds = tuple(u for u in p.speeds if u >= start.speed)
             return rising_stage(system, self.settings, start, speeds, keep)
 
-        if self.quick:
-            assert isinstance(linear, Condenser)
-            fast = FastFilm.of(system, linear, x)
-            if not isinstance(self.driver.follow(fast.rising(stage(film)), x), StageFailed):
+        if fast:
+            end = self.driver.follow(fast.rising(stage(film)), x)
+            if not isinstance(end, StageFailed):
                 return None
         film, x = reached[-1]
         reached[:] = [(film, x)]
