@@ -20,7 +20,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.results import contact_peaks, contact_pressure, film_parts
 from softehl.cases.seal.sections import SECTIONS
-from softehl.cases.seal.state import Outcome, Silent
+from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
 from softehl.cases.seal.verdict import ContactNumbers, FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
 
@@ -215,7 +215,8 @@ def test_the_films_that_are_documented(section: str) -> None:
     assert [s.h_star_um for s in found.states] == pytest.approx(
         _documented()[section][:2], rel=0.01
     )
-    assert [s.verdict for s in found.states] == [OK, OK]
+    slow = OSCILLATING if section == "x_ring" else OK  # as the page says
+    assert [s.verdict for s in found.states] == [OK, slow]
 
 
 @pytest.mark.slow
