@@ -231,7 +231,7 @@ def test_other_motions_balance_too(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    rows = "t_s,U_mm_s\n0,100\n0.1,100\n0.15,-100\n0.35,-100\n0.4,100\n"
+    rows = "t_s,U_mm_s\n0,100\n0.1,100\n0.15,-100\n0.35,-100\n0.4,100\n0.5,100\n"
     Path("motion.csv").write_text(rows)
     table = cycle(tmp_path / "c", *MOTIONS[name], "cycles=2")
     assert table["mass_error"].max() < 1e-9
