@@ -10,7 +10,7 @@ from softehl.cases.harness.row import Record
 from softehl.cases.seal import catalogue, plan
 from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.report import PICTURES, SOME, write_plots
+from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmRow
@@ -28,7 +28,7 @@ class ORingCase(Case[ORing, FilmRow]):
     ways = ("solver", "linear")
     files = (
         *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv", "tornado.png", "tornado.svg"),
-        *("leakage.csv", "fit.csv", "contact_*.csv", "contact_*.vtu"),
+        *("leakage.csv", "fit.csv", "contact_*.csv", "contact_*.vtu", *paraview.FILES),
         *(f"{name}.{kind}" for name in (*PICTURES, *SOME) for kind in ("png", "svg")),
     )
     shared = "contacts"
@@ -101,6 +101,7 @@ class ORingCase(Case[ORing, FilmRow]):
         self, parameters: ORing, folder: Path, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]
     ) -> None:
         """See :class:`Case`."""
+        paraview.write_paraview(parameters, folder, rows)
         write_plots(parameters, folder, rows, rejected)
         if parameters.sensitivity:
             from softehl.cases.seal.report.sensitivity import write_sensitivities

@@ -14,6 +14,7 @@ import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -143,6 +144,10 @@ def _plain(value: object) -> object:
     return value
 
 
+_KINDS = {2: "line", 4: "quad"}
+"""What meshio calls a cell of so many nodes."""
+
+
 def write_vtu(
     path: Path,
     points: Array,
@@ -150,10 +155,10 @@ def write_vtu(
     point_data: Mapping[str, Array],
     cell_data: Mapping[str, Array],
 ) -> None:
-    """Write four-node cells in the plane as VTK XML, atomically.
+    """Write four-node cells, or lines, in the plane as VTK XML, atomically.
 
-    points: (n, 2), written as (z, r, 0).  cells: (m, 4).  point_data: name -> (n,) or (n, k);
-    cell_data: name -> (m,) or (m, k).
+    points: (n, 2), written as (z, r, 0).  cells: (m, 4) or (m, 2).  point_data: name -> (n,) or
+    (n, k); cell_data: name -> (m,) or (m, k).
     """
     import meshio  # only here: it is slow to import
 
@@ -161,7 +166,7 @@ def write_vtu(
     flat[:, :2] = points
     mesh = meshio.Mesh(
         flat,
-        [("quad", np.asarray(cells, dtype=np.int64))],
+        [(_KINDS[cells.shape[1]], np.asarray(cells, dtype=np.int64))],
         point_data={name: np.asarray(data) for name, data in point_data.items()},
         cell_data={name: [np.asarray(data)] for name, data in cell_data.items()},
     )
@@ -187,3 +192,15 @@ def read_vtu(
     except Exception as error:  # damage may show as almost anything: in XML, base64, zlib, shapes
         raise ValueError(f"{path}: not a section that can be read: {error}") from error
     return points, cells, {name: np.asarray(data) for name, data in mesh.point_data.items()}
+
+
+def write_pvd(path: Path, entries: Iterable[tuple[float, str]]) -> None:
+    """Write a series for ParaView, atomically: times, and the files beside it that show them."""
+    rows = [
+        f'    <DataSet timestep="{t!r}" part="0" file={quoteattr(file)}/>\n' for t, file in entries
+    ]
+    text = (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+        f"{''.join(rows)}  </Collection>\n</VTKFile>\n"
+    )
+    write_text(path, text)

@@ -7,9 +7,8 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
-from softehl.runtime.io import replacing
+from softehl.runtime.io import write_pvd
 from softehl.runtime.result import Result
 from softehl.runtime.statement.records import StudyError
 
@@ -41,18 +40,8 @@ class Series:
         name = f"{self.path.stem}_{len(self.entries) + 1:04d}.vtu"
         result.write(self.path.with_name(name))
         self.entries.append((result.t, name))
-        if not result.system.share.first:
-            return
-        rows = [
-            f'    <DataSet timestep="{t!r}" part="0" file={quoteattr(file)}/>\n'
-            for t, file in self.entries
-        ]
-        text = (
-            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-            f"{''.join(rows)}  </Collection>\n</VTKFile>\n"
-        )
-        with replacing(self.path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        if result.system.share.first:
+            write_pvd(self.path, self.entries)
 
 
 def read_series(path: Path) -> list[tuple[float, str]]:

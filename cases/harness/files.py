@@ -11,9 +11,10 @@ from softehl.runtime.io import write_columns, write_vtu
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Four-node cells in the plane.
+    """Four-node cells in the plane, or lines.
 
-    points: (n, 2).  cells: (m, 4), counterclockwise node numbers.  point_data: name -> (n,) or
+    points: (n, 2).  cells: (m, 4), counterclockwise node numbers, or
+    (m, 2).  point_data: name -> (n,) or
     (n, k).  cell_data: name -> (m,) or (m, k).
     """
 

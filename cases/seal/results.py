@@ -14,7 +14,8 @@ from softehl.cases.seal.contacts import CONTACT_FILM, contacts, groups
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import ContactState, FilmState, Profile, Section
+from softehl.cases.seal.section_view import film_pressure, section_view
+from softehl.cases.seal.state import ContactState, FilmState, Profile
 from softehl.cases.seal.surfaces import regime
 from softehl.cases.seal.system import (
     AIR_WALL,
@@ -23,7 +24,6 @@ from softehl.cases.seal.system import (
     FILM,
     ROD,
     SEALED_WALL,
-    SOLID,
     WALLS,
 )
 from softehl.cases.seal.verdict import ContactNumbers, FilmNumbers, Verdict
@@ -34,7 +34,6 @@ from softehl.runtime.fem.postprocess import (
     element_means,
     first_below,
     interval_below,
-    nodal_average,
     relative_spread,
     run_around,
 )
@@ -250,7 +249,7 @@ def contact_state(
         contact_end_mm=float(ends[1]),
         x_mm=arc[:, 0].copy(),
         p_MPa=pressure,
-        section=section_view(system, problem, x),
+        section=section_view(system, problem, x, pressure),
     )
 
 
@@ -326,21 +325,6 @@ def mean_motion(system: SealSystem, x: Array) -> dict[str, float]:
     }
 
 
-def housing_pressure(system: SealSystem, x: Array) -> Array:
-    """True pressure (nodes,) where the housing or a wall is touched, zero elsewhere, MPa.
-
-    The multipliers per current area, and p_s where it acts.
-    """
-    pressure, force = np.zeros(len(system.mesh.points)), system.wall_forces(x)
-    nodes, segments = system.mesh.boundary, system.mesh.segments
-    deformed = system.deformed(x)
-    current = tributary_areas(deformed, segments, nodes)
-    wet = tributary_areas(deformed, system.section.elements["sealed_side"], nodes)
-    fluid = wet * system.parameters.sealed_pressure
-    pressure[nodes] = np.where(force[nodes] > 0.0, (force[nodes] + fluid) / current, 0.0)
-    return pressure
-
-
 def film_state(
     system: SealSystem,
     problem: Problem,
@@ -379,7 +363,7 @@ def film_state(
         verdict=verdict.word,
         advice=verdict.advice,
         profile=_profile(system, problem, x),
-        section=section_view(system, problem, x),
+        section=section_view(system, problem, x, film_pressure(system, x)),
     )
     return _with_groove(state, numbers) if len(numbers.contacts) > 1 else state
 
@@ -395,30 +379,6 @@ def _with_groove(state: FilmState, numbers: FilmNumbers) -> FilmState:
         h_min_sealed_um=sealed.h_min / MICROMETRE,
         h_min_air_um=air.h_min / MICROMETRE,
         flux_mismatch_percent=numbers.mismatch,
-    )
-
-
-def section_view(system: SealSystem, problem: Problem, x: Array) -> Section:
-    """The deformed section with its nodal displacements (mm) and Cauchy stresses (MPa).
-
-    contact_pressure: that of the housing and its walls, zero elsewhere (MPa).
-    """
-    mesh = system.mesh
-    stresses = problem.fields(SOLID, x)
-    nodal = nodal_average(
-        mesh.quads,
-        {name: value for name, value in stresses.items() if name not in ("z", "r")},
-        len(mesh.points),
-    )
-    displacement = system.displacements(x).copy()
-    return Section(
-        points=system.deformed(x),
-        cells=mesh.quads,
-        point_data={
-            "displacement": displacement,
-            "contact_pressure": housing_pressure(system, x),
-            **nodal,
-        },
     )
 
 

@@ -87,6 +87,12 @@ def nodal_average(cells: Integers, values: Mapping[str, Array], nodes: int) -> d
     return result
 
 
+def von_mises(zz: Array, rr: Array, tt: Array, zr: Array) -> Array:
+    """Von Mises stress from an axisymmetric stress; arrays of one shape."""
+    normal = 0.5 * ((zz - rr) ** 2 + (rr - tt) ** 2 + (tt - zz) ** 2)
+    return np.asarray(np.sqrt(normal + 3.0 * zr**2))
+
+
 def local_exponent(x0: float, y0: float, x1: float, y1: float) -> float:
     """d log y / d log x between two points of positive coordinates."""
     return float(np.log(y1 / y0) / np.log(x1 / x0))

@@ -58,6 +58,7 @@ FILES = {
     *("contact_1.csv", "contact_1.vtu"),
     *(f"profile_1_{u}.csv" for u in (400, 100, -400, -100)),
     *(f"section_1_{u}.vtu" for u in (400, 100, -400, -100)),
+    *("gland.vtu", "section_out.pvd", "section_in.pvd"),
 }
 USED = {"film": kernel_signatures()["film"]}
 

@@ -19,7 +19,12 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure, fitted_exponent, plain_ticks
 from softehl.cases.seal.report.profiles import profiles_figure
-from softehl.cases.seal.report.section import View, boundary_edges, section_figure, von_mises
+from softehl.cases.seal.report.section import (
+    View,
+    boundary_edges,
+    nodal_von_mises,
+    section_figure,
+)
 from softehl.cases.seal.report.stribeck import crossing, hersey_um, stribeck_figure
 from softehl.cases.seal.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
 from softehl.cases.seal.surfaces import regime
@@ -224,7 +229,7 @@ def test_profiles_have_a_panel_a_stroke_and_a_line_a_speed() -> None:
 def test_von_mises_of_plain_stress_states() -> None:
     def of(**stress: float) -> float:
         data = {f"sigma_{at}": np.array([stress.get(at, 0.0)]) for at in ("zz", "rr", "tt", "zr")}
-        return float(von_mises(Section(np.zeros((1, 2)), np.zeros((0, 4), int), data))[0])
+        return float(nodal_von_mises(Section(np.zeros((1, 2)), np.zeros((0, 4), int), data))[0])
 
     assert of(zz=-5.0, rr=-5.0, tt=-5.0) == pytest.approx(0.0, abs=1e-12)
     assert of(rr=3.0) == pytest.approx(3.0)

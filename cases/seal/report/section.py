@@ -11,6 +11,7 @@ import numpy as np
 from softehl.cases.seal.report import style
 from softehl.cases.seal.state import FilmRow, Profile, Section
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.postprocess import von_mises
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,11 +47,9 @@ class View:
         return self.section.point_data.keys() >= _NEEDED
 
 
-def von_mises(section: Section) -> Array:
+def nodal_von_mises(section: Section) -> Array:
     """Von Mises stress (n,) at the nodes of a section that has its Cauchy stresses, MPa."""
-    z, r, t, s = (section.point_data[f"sigma_{name}"] for name in ("zz", "rr", "tt", "zr"))
-    normal = 0.5 * ((z - r) ** 2 + (r - t) ** 2 + (t - z) ** 2)
-    return np.asarray(np.sqrt(normal + 3.0 * s**2))
+    return von_mises(*(section.point_data[f"sigma_{name}"] for name in ("zz", "rr", "tt", "zr")))
 
 
 def boundary_edges(cells: Integers) -> Integers:
@@ -74,7 +73,7 @@ class Scale:
         """One scale for several states."""
         from matplotlib.ticker import MaxNLocator
 
-        stress = max(float(von_mises(view.section).max()) for view in views)
+        stress = max(float(nodal_von_mises(view.section).max()) for view in views)
         pressure = max(
             float(max(view.profile.p_MPa.max(), view.section.point_data["contact_pressure"].max()))
             for view in views
@@ -146,7 +145,8 @@ def _draw_ring(axes: Axes, section: Section, levels: Array) -> TriContourSet:
     cells = section.cells
     triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     grid = Triangulation(section.points[:, 0], section.points[:, 1], triangles)
-    shown: TriContourSet = axes.tricontourf(grid, von_mises(section), levels=levels, cmap="YlOrRd")
+    stress = nodal_von_mises(section)
+    shown: TriContourSet = axes.tricontourf(grid, stress, levels=levels, cmap="YlOrRd")
     edges = section.points[boundary_edges(cells)]
     axes.add_collection(LineCollection(list(edges), colors=_LINE, linewidths=0.9))
     return shown
