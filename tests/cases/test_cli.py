@@ -257,6 +257,7 @@ def names(folder: Path) -> set[str]:
 
 BAD = {
     "unknown key": (["oring", "--set", "densty=4"], "did you mean 'density'"),
+    "half a key": (["oring", "--set", "pressure=3"], "'pressure_order' or 'sealed_pressure'"),
     "wrong type": (["oring", "--set", "sealed_pressure=high"], 'sealed_pressure = "high"'),
     "negative pressure": (["oring", "--set", "sealed_pressure=-1"], "sealed_pressure = -1"),
     "nan pressure": (["oring", "--set", "sealed_pressure=nan"], "sealed_pressure = NaN"),
