@@ -22,6 +22,7 @@ from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import (
     View,
     boundary_edges,
+    draw_gland,
     nodal_von_mises,
     section_figure,
 )
@@ -316,3 +317,12 @@ def test_films_that_flow_against_the_rod_are_left_out_of_the_curve() -> None:
     (axes,) = curve_figure(SEAL, rows).axes
     drawn = np.concatenate([np.asarray(line.get_ydata()) for line in axes.get_lines()])
     assert np.min(drawn) > 0.0
+
+
+def test_the_sealed_fluid_reaches_to_where_the_seal_touches() -> None:
+    """Into the mouth of a U-cup, which is deeper than the middle of the groove."""
+    for middle, end in ((None, 0.0), (0.9, 0.9)):
+        axes = Figure().subplots()
+        draw_gland(axes, ORing(sealed_pressure=1.0), middle)
+        fluid = axes.patches[0].get_path()
+        assert fluid.get_extents().x1 == pytest.approx(end)

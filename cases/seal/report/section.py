@@ -107,7 +107,7 @@ def section_figure(p: ORing, views: Sequence[View]) -> Figure:
 
 def draw_view(axes: Axes, p: ORing, view: View, scale: Scale) -> TriContourSet:
     """One state in its gland; what a colour bar needs."""
-    draw_gland(axes, p)
+    draw_gland(axes, p, 0.5 * (view.row.contact_start_mm + view.row.contact_end_mm))
     shown = _draw_ring(axes, view.section, scale.levels)
     _draw_film(axes, p, view.profile, scale.height)
     _draw_contact(axes, p, view.section, scale.height)
@@ -115,16 +115,19 @@ def draw_view(axes: Axes, p: ORing, view: View, scale: Scale) -> TriContourSet:
     return shown
 
 
-def draw_gland(axes: Axes, p: ORing) -> None:
-    """Rod, housing with its walls, and the fluid on the sealed side; limits of the picture."""
+def draw_gland(axes: Axes, p: ORing, middle: float | None = None) -> None:
+    """Rod, housing with its walls, and the fluid on the sealed side; limits of the picture.
+
+    middle: where the seal touches the rod and hides the end of the fluid, mm; that of the groove.
+    """
     size, lip = p.section_diameter, 0.5 * p.rod_diameter + _CLEARANCE * p.section_diameter
     rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
     beside, below, above = (share * size for share in _AROUND)
     start, end = (p.groove_centre + side * 0.5 * p.groove_width for side in (-1, 1))
     left, right, bottom, top = start - size, end + size, rod - size, housing + size  # out of sight
     if p.sealed_pressure:
-        middle = p.groove_centre
-        axes.fill([left, middle, middle, left], [rod, rod, housing, housing], color=_FLUID, lw=0)
+        edge = p.groove_centre if middle is None else middle
+        axes.fill([left, edge, edge, left], [rod, rod, housing, housing], color=_FLUID, lw=0)
     metal: Any = {"facecolor": _METAL, "edgecolor": _LINE, "linewidth": 0.9}
     axes.fill([left, right, right, left], [bottom, bottom, rod, rod], **metal)
     axes.fill(
