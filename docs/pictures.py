@@ -1,6 +1,6 @@
-"""The pictures of the README and of docs/oring.md, from our own runs: `make pictures`.
+"""Pictures of README, docs/oring.md and docs/first-seal.md, from our own runs: `make pictures`.
 
-Five runs of the O-ring are solved (half a minute); the times of the kernels are those of
+Eight runs of seals are solved (a minute or two); the times of the kernels are those of
 benchmarks/README.md.  The files are the same every time on one machine.
 """
 
@@ -34,6 +34,15 @@ DEFAULT = softehl.ORing()
 SWEPT = softehl.ORing(stroke="in", speeds=SPEEDS, error_estimate=False)
 STABLE = softehl.ORing(stroke="in", speeds=(100.0,), error_estimate=False)
 PAPERS = STABLE.model_copy(update=PAPER)
+_FIRST: Any = {"stroke": "out", "speeds": (800.0,), "error_estimate": False}
+_NBR_90: Any = {"ring": "AS568-210", "rod": 19.0, "shore_A": 90.0, "sealed_pressure": 10.0}
+_GLAND: Any = {"housing_diameter": 56.4}
+FIRST = {
+    "first_o_ring": softehl.ORing(**_FIRST, **_NBR_90),
+    "first_x_ring": softehl.ORing(**_FIRST, **_GLAND, section="x_ring", groove_width=4.3),
+    "first_u_cup": softehl.ORing(**_FIRST, **_GLAND, section="u_cup", groove_width=6.0),
+}
+"""The worked designs of docs/first-seal.md, by the names of their pictures."""
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "README.md"
 
 _STYLE: Any = {
@@ -63,6 +72,7 @@ def main(folder: Path) -> None:
             "swept": SWEPT,
             "stable": STABLE,
             "papers": PAPERS,
+            **FIRST,
         }
         curves = dict(zip(runs, softehl.solve_cases(runs, place), strict=True))
         with matplotlib.rc_context(_STYLE):
@@ -71,6 +81,7 @@ def main(folder: Path) -> None:
                 "films": films(curves["swept"]),
                 "stabilised": stabilised(curves["papers"], curves["stable"]),
                 "kernels": kernels(BENCHMARKS.read_text(encoding="utf-8")),
+                **{name: section(curves[name]) for name in FIRST},
             }
             folder.mkdir(parents=True, exist_ok=True)
             for name, figure in pictures.items():

@@ -5,6 +5,7 @@ A block is opened by three backticks and a word:
     python FILE   the content of FILE; must be that of docs/models/FILE, and is written for the rest
     python        is run, all of a page in one namespace
     text          what the `python` block before it prints
+    toml FILE     is written for the rest
     console       lines `$ command` and what it prints, compared without the numbers
 """
 
@@ -62,6 +63,8 @@ class Reader:
             self.printed = self._output(lambda: exec(code, self.namespace))
         elif block.kind == "text":
             assert self.printed == block.text, f"line {block.line}: printed {self.printed!r}"
+        elif block.kind == "toml" and block.name:
+            Path(block.name).write_text(block.text, encoding="utf-8")
         elif block.kind == "console":
             self._console(block)
         else:
