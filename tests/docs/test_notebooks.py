@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -26,7 +27,11 @@ nbformat.write(notebook, sys.argv[1])
 def run(path: Path) -> subprocess.CompletedProcess[str]:
     """Run a notebook where it stands, and write its outputs into it."""
     command = [sys.executable, "-c", RUN, str(path)]
-    return subprocess.run(command, cwd=path.parent, capture_output=True, text=True, check=False)
+    # the command line, which other tests call, sends pictures to files
+    shown = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
+    return subprocess.run(
+        command, cwd=path.parent, env=shown, capture_output=True, text=True, check=False
+    )
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

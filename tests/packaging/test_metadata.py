@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OPTIONAL = {
     **{"distributed": "cluster", "pypardiso": "fast", "petsc4py": "mpi", "mpi4py": "mpi"},
+    "ezdxf": "cad",
     **dict.fromkeys(("bokeh", "jinja2", "openpyxl"), "report"),
 }
 DISTRIBUTION = {"PIL": "pillow"}
@@ -56,5 +57,5 @@ def test_deriving_needs_one_extra_more() -> None:
 
 
 def test_there_is_an_extra_for_each_purpose() -> None:
-    wanted = {"benchmarks", "cluster", "dev", "docs", "fast", "generate", "mpi", "report"}
+    wanted = {"benchmarks", "cad", "cluster", "dev", "docs", "fast", "generate", "mpi", "report"}
     assert set(PROJECT["optional-dependencies"]) == wanted
