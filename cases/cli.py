@@ -3,13 +3,28 @@
 What is heavy is imported when a command needs it.
 """
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
 
 import click
 
 from softehl.cases.shipped import SHIPPED
 
 _NAMES = ", ".join(SHIPPED)
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+def _into(words: str) -> Callable[[_Command], _Command]:
+    """The folder that a command writes to; None if it is left out."""
+    kind = click.Path(path_type=Path)
+    return click.option("--out", "folder", metavar="DIR", type=kind, help=words)
+
+
+def _jobs(words: str) -> Callable[[_Command], _Command]:
+    """The number of processes."""
+    kind = click.IntRange(min=1)
+    return click.option("--jobs", metavar="N", type=kind, default=1, help=words)
 
 
 @click.command(
@@ -28,13 +43,7 @@ _NAMES = ", ".join(SHIPPED)
     multiple=True,
     help="Change a parameter; VALUE is a TOML value, a bare word is a string. Repeatable.",
 )
-@click.option(
-    "--out",
-    "folder",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    help="Folder for the files, results/<case> if left out.",
-)
+@_into("Folder for the files, results/<case> if left out.")
 @click.option(
     "--tolerance",
     metavar="PERCENT",
@@ -47,13 +56,7 @@ _NAMES = ", ".join(SHIPPED)
 )
 @click.option("--resume", is_flag=True, help="Keep the rows that DIR has and run the others.")
 @click.option("--overwrite", is_flag=True, help="Begin anew in a DIR that holds a run.")
-@click.option(
-    "--jobs",
-    metavar="N",
-    type=click.IntRange(min=1),
-    default=1,
-    help="Up to N parts of the run (such as the two strokes) side by side, in a process each.",
-)
+@_jobs("Up to N parts of the run (such as the two strokes) side by side, in a process each.")
 @click.option(
     "--engine",
     type=click.Choice(["serial", "petsc"]),
@@ -104,22 +107,10 @@ def run(
 @click.option(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
 )
-@click.option(
-    "--out",
-    "folder",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    help="Folder for table, pictures and runs, results/<name of the study> if left out.",
-)
+@_into("Folder for table, pictures and runs, results/<name of the study> if left out.")
 @click.option("--resume", is_flag=True, help="Keep the runs that DIR has and run the others.")
 @click.option("--overwrite", is_flag=True, help="Begin anew in a DIR that holds a sweep.")
-@click.option(
-    "--jobs",
-    metavar="N",
-    type=click.IntRange(min=1),
-    default=1,
-    help="N runs side by side, in a process each.",
-)
+@_jobs("N runs side by side, in a process each.")
 @click.option("--dask", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
 @click.option("--mpi", is_flag=True, help="Run on the processes that mpiexec started.")
 @click.option("--quiet", is_flag=True, help="No progress.")
@@ -276,13 +267,7 @@ def design(case: str, target: str, key: str, assignments: tuple[str, ...]) -> in
     help="Folder for pictures, tables and runs.",
 )
 @click.option("--resume", is_flag=True, help="Keep the states that DIR has and run the rest.")
-@click.option(
-    "--jobs",
-    metavar="N",
-    type=click.IntRange(min=1),
-    default=1,
-    help="Number of runs side by side, in a process each.",
-)
+@_jobs("Number of runs side by side, in a process each.")
 def reproduce(
     items: tuple[str, ...], density: str | None, folder: Path, resume: bool, jobs: int
 ) -> int:

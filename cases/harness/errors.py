@@ -10,3 +10,8 @@ class BadInput(click.ClickException):
 
     def __init__(self, message: str) -> None:
         super().__init__(" ".join(message.split()))
+
+
+def one_line(error: BaseException) -> str:
+    """A failure of the program in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

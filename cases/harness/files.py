@@ -13,9 +13,8 @@ from softehl.runtime.io import write_columns, write_vtu
 class Cells:
     """Four-node cells in the plane, or lines.
 
-    points: (n, 2).  cells: (m, 4), counterclockwise node numbers, or
-    (m, 2).  point_data: name -> (n,) or
-    (n, k).  cell_data: name -> (m,) or (m, k).
+    points: (n, 2).  cells: (m, 4), counterclockwise node numbers, or (m, 2).
+    point_data: name -> (n,) or (n, k).  cell_data: name -> (m,) or (m, k).
     """
 
     points: Array

@@ -125,7 +125,7 @@ class RunRecord:
         self.folder.mkdir(parents=True, exist_ok=True)
         self._lock.take()
         if self._existing == "refuse" and holds_a_run(self.folder):
-            raise self._refusal()  # somebody else was faster
+            raise refusal(self.folder, "rows")  # somebody else was faster
         self._began = time.perf_counter()
         if not self._earlier.content:
             _remove_earlier(self.folder, self.run.case)
@@ -200,16 +200,10 @@ class RunRecord:
             cells = [record.cells() for record in records]
             write_csv(self.folder / f"{name}.csv", records[0].header(), cells)
 
-    def _refusal(self) -> BadInput:
-        return BadInput(
-            f"{self.folder} holds an earlier run; --resume keeps its rows, --overwrite begins "
-            "anew, --out names another folder"
-        )
-
     def _take(self, existing: Existing) -> None:
         """Resume an earlier run, leave it to be overwritten, or refuse."""
         if existing == "refuse":
-            raise self._refusal()
+            raise refusal(self.folder, "rows")
         try:
             self._lock.take()
         except OSError as error:
@@ -224,6 +218,14 @@ class RunRecord:
             content = self._earlier.content
             self._size = {key: content.get(key) for key in self._size}
             self.curve.keep(self._earlier.rows)
+
+
+def refusal(folder: Path, kept: str) -> BadInput:
+    """For a folder that holds an earlier run; kept: what --resume keeps of it."""
+    return BadInput(
+        f"{folder} holds an earlier run; --resume keeps its {kept}, --overwrite begins anew, "
+        "--out names another folder"
+    )
 
 
 def require_folder(folder: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from softehl.cases.harness.case import AnyCase, Run
 from softehl.cases.harness.earlier import Existing
-from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.errors import BadInput, one_line
 from softehl.cases.harness.parameters import Parameters
 from softehl.cases.harness.processes import completed
 from softehl.cases.harness.progress import Display
@@ -108,8 +108,7 @@ def kept_task(task: Task) -> Curve:
     except BadInput:
         raise
     except Exception as error:
-        words = " ".join(f"{type(error).__name__}: {error}".split())
-        return Curve(task.run.parameters, task.folder, (), (words,), failed=True)
+        return Curve(task.run.parameters, task.folder, (), (one_line(error),), failed=True)
 
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.errors import BadInput, one_line
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.processes import processes
 from softehl.cases.harness.progress import make_counter
@@ -83,7 +83,7 @@ def sweep_study(record: SweepRecord, workers: Workers, *, quiet: bool) -> int:
         try:
             _run(record, record.missing, workers, quiet=quiet)
         except BaseException as error:
-            record.save("interrupted", " ".join(f"{type(error).__name__}: {error}".split()))
+            record.save("interrupted", one_line(error))
             raise
         return _finish(record, quiet=quiet)
 

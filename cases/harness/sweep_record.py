@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any, Self
 
 from softehl.cases.harness.case import Run
-from softehl.cases.harness.earlier import Existing, read_earlier
+from softehl.cases.harness.earlier import Existing, holds_a_run, read_earlier
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.lock import FolderLock
-from softehl.cases.harness.record import package_versions, require_folder
+from softehl.cases.harness.record import package_versions, refusal, require_folder
 from softehl.cases.harness.study_file import Study
 from softehl.cases.harness.sweep import Curve, Task, shared_folder
 from softehl.runtime.io import Cell, read_json, write_csv, write_json
@@ -154,17 +154,14 @@ class SweepRecord:
                 shutil.rmtree(path)
 
     def _holds(self) -> bool:
-        return any((self.folder / name).exists() for name in ("run.json", "curve.csv", TABLE))
+        return holds_a_run(self.folder) or (self.folder / TABLE).exists()
 
     def _read(self) -> Mapping[str, Any]:
         """What an earlier sweep says of itself, empty if it is overwritten.  Raises BadInput."""
         if self._existing == "overwrite":
             return {}
         if self._existing == "refuse":
-            raise BadInput(
-                f"{self.folder} holds an earlier run; --resume keeps its runs, --overwrite begins "
-                "anew, --out names another folder"
-            )
+            raise refusal(self.folder, "runs")
         try:
             content = read_json(self.folder / "run.json")
             points, now = content["points"], self._described()
