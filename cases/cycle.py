@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.integrate import trapezoid
 
 from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome, State
@@ -132,7 +133,7 @@ def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) ->
         leak_sealed_mm3=around * (end.volume_sealed_mm2 - before.volume_sealed_mm2),
         friction_out_N=float(F.max()),
         friction_in_N=float(F.min()),
-        energy_mJ=float(0.5 * ((F * U)[1:] + (F * U)[:-1]) @ np.diff(t)),
+        energy_mJ=float(trapezoid(F * U, t)),
         h_min_um=min(r.h_min_um for r in films.readings),
         p_max_MPa=max(r.p_max_MPa for r in films.readings),
         asperity_load_percent=max(r.asperity_load_percent for r in films.readings),

@@ -98,14 +98,14 @@ def placed_layout(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGME
         spots.append(Spot(place, k**-0.3, rates if side == 0 else rates[::-1]))
     if p.opens:
         spots.append(_edge_spot(system, x, p, ends))
-    parts = len(edges) // 2
+    parts, inlet = len(edges) // 2, inlet_length(p, steepest)
     coarsest = length / (parts * _PLACED_COARSEST)
     for long in range(layout.long, max(parts * most, layout.long) + 1, parts * _MULTIPLE):
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
-        if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet_length(p, steepest):
+        if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet:
             break
     first = 0.25 * p.corner_fillet if p.opens else None
-    return layout.graded(spacing, long, DEPTH * inlet_length(p, steepest), first)
+    return layout.graded(spacing, long, DEPTH * inlet, first)
 
 
 def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:

@@ -1,7 +1,7 @@
 """How the mesh of a section is laid out: everything that knows the shape of a seal.
 
 `RoundLayout` is the O-grid of the paper in a disc. Whatever comes behind asks a `Layout` for its
-mesh and for places along the part of its boundary that is lubricated.
+mesh and for where the sealed pressure ends.
 """
 
 from __future__ import annotations
@@ -46,9 +46,6 @@ class Layout(Protocol):
 
     def mesh(self, density: int | Fraction) -> SectionMesh:
         """The mesh of a density."""
-
-    def places(self, mesh: SectionMesh) -> Array:
-        """Lengths (arc nodes,) along the undeformed arc from its sealed end, mm."""
 
     def lowest(self, mesh: SectionMesh) -> int:
         """The arc node at which the sealed pressure of the contact ends: that nearest to the rod,
@@ -133,12 +130,6 @@ class RoundLayout:
         """See `Layout`."""
         return disc_mesh(self.disc, density)
 
-    def places(self, mesh: SectionMesh) -> Array:
-        """See `Layout`."""
-        z, r = (mesh.points[mesh.arc_nodes] - self.disc.centre).T
-        angle = np.arctan2(z, -r)
-        return np.asarray(self.disc.radius * (angle - angle[0]))
-
     def lowest(self, mesh: SectionMesh) -> int:
         """See `Layout`."""
         if self.dams[0] is not None:
@@ -147,14 +138,10 @@ class RoundLayout:
 
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> RoundLayout:
         """See `Layout`: by its lowest point and its crown as long as these do."""
-        lip, crown = self.dams
-        place = dam(rod, self.lowest(mesh), p_s)
-        if place is not None:
-            lip = float(self._angles(mesh.points[mesh.arc_nodes[place]]))
-        place = dam(housing[::-1], len(housing) - 1 - self.pressed(mesh), p_s)
-        if place is not None:
-            crown = float(self._angles(mesh.points[mesh.outer_nodes[len(housing) - 1 - place]]))
-        return replace(self, dams=(lip, crown))
+        nodes = _dam_nodes(self, mesh, rod, housing, p_s)
+        return replace(
+            self, dams=_moved(self.dams, nodes, self._angles(mesh.points[mesh.boundary]))
+        )
 
     def pressed(self, mesh: SectionMesh) -> int:
         """See `Layout`: from the crown on."""
@@ -253,11 +240,6 @@ class OutlineLayout:
         """See `Layout`."""
         return outline_mesh(self.shape, self.film, self.spacing, self.long, density)
 
-    def places(self, mesh: SectionMesh) -> Array:
-        """See `Layout`."""
-        ends = np.append(mesh.places, mesh.places[0] + mesh.length)
-        return np.asarray(ends[: mesh.arc + 1] - ends[0])
-
     def pressed(self, mesh: SectionMesh) -> int:
         """See `Layout`: from the node nearest to where the housing ends the pressure."""
         begin, crown = mesh.places[0], self.dams[1]
@@ -268,7 +250,7 @@ class OutlineLayout:
     def lowest(self, mesh: SectionMesh) -> int:
         """See `Layout`: the middle of a flat, the first of two lobes."""
         if self.dams[0] is not None:
-            return int(np.argmin(np.abs(self.places(mesh) - (self.dams[0] - self.film[0]))))
+            return int(np.argmin(np.abs(mesh.arc_places - (self.dams[0] - self.film[0]))))
         r = mesh.points[mesh.arc_nodes, 1]
         level = np.flatnonzero(r <= r.min() + _LEVEL * float(np.ptp(mesh.points[:, 1])))
         flat = level[: int(np.argmax(np.append(np.diff(level) > 1, True))) + 1]
@@ -276,14 +258,8 @@ class OutlineLayout:
 
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> OutlineLayout:
         """See `Layout`: lips turn, and lie elsewhere than they were made to."""
-        lip, crown = self.dams
-        place = dam(rod, self.lowest(mesh), p_s)
-        if place is not None:
-            lip = self.film[0] + float(self.places(mesh)[place])
-        place = dam(housing[::-1], len(housing) - 1 - self.pressed(mesh), p_s)
-        if place is not None:
-            crown = float(mesh.places[mesh.arc + len(housing) - 1 - place])
-        return replace(self, dams=(lip, crown))
+        nodes = _dam_nodes(self, mesh, rod, housing, p_s)
+        return replace(self, dams=_moved(self.dams, nodes, mesh.places))
 
     def between(self, old: Layout, ends: tuple[float, float]) -> OutlineLayout:
         """See `Layout`."""
@@ -301,6 +277,29 @@ class OutlineLayout:
 def _closest(angles: Array, angle: float) -> int:
     """Index of that of several angles which is closest to another one, degrees."""
     return int(np.argmin(np.abs((angles - angle + 180.0) % 360.0 - 180.0)))
+
+
+def _dam_nodes(
+    layout: Layout, mesh: SectionMesh, rod: Array, housing: Array, p_s: float
+) -> tuple[int | None, int | None]:
+    """Numbers along the boundary of the nodes that `Layout.held` moves the pressure's ends to.
+
+    Of that on the rod and that on the housing; None where it stays.
+    """
+    last = len(housing) - 1  # the pressure comes from there, round the sealed side
+    lip = dam(rod, layout.lowest(mesh), p_s)
+    crown = dam(housing[::-1], last - layout.pressed(mesh), p_s)
+    return lip, None if crown is None else (mesh.arc + last - crown) % len(mesh.boundary)
+
+
+def _moved(
+    dams: tuple[float | None, float | None], nodes: tuple[int | None, int | None], at: Array
+) -> tuple[float | None, float | None]:
+    """The dams at these nodes of the boundary, None: as before.  at: (boundary nodes,)."""
+    lip, crown = (
+        old if node is None else float(at[node]) for old, node in zip(dams, nodes, strict=True)
+    )
+    return lip, crown
 
 
 def dam(excess: Array, index: int, p_s: float) -> int | None:

@@ -90,7 +90,7 @@ class SealSection:
     @property
     def places(self) -> Array:
         """Lengths (arc nodes,) along the undeformed arc from its sealed end, mm."""
-        return self.layout.places(self.mesh)
+        return self.mesh.arc_places
 
     def coordinates(self, elements: str) -> Array:
         """Coordinates (n, 2 k) in (z, r) of a set of elements, node by node."""

@@ -106,6 +106,11 @@ class SectionMesh:
         return self.boundary[: self.arc + 1]
 
     @property
+    def arc_places(self) -> Array:
+        """Lengths (arc + 1,) along the undeformed arc from its first node, mm."""
+        return np.asarray(self.places[: self.arc + 1] - self.places[0])
+
+    @property
     def outer_nodes(self) -> Integers:
         """Boundary nodes that are not interior to the arc, from its last end round to its first."""
         return np.concatenate([self.boundary[self.arc :], self.boundary[:1]])

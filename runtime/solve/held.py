@@ -60,9 +60,8 @@ class FirstStep:
             return
         self._memory.keeps = False
         K, factors = memory
-        number = (
-            loosest(K, factors) if issparse(K) else None
-        )  # spread over processes: not looked at
+        # one that is spread over processes is not looked at
+        number = loosest(K, factors) if issparse(K) else None
         if number is not None:
             message = f"nothing holds {problem.name_of(number)}: it can move freely"
             raise NotConverged(replace(solution, status=Status.SINGULAR, message=message))

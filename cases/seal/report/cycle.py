@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from softehl.cases.seal.report import style
 from softehl.runtime.arrays import Array
@@ -43,8 +44,7 @@ def loop_figure(loops: Mapping[str, Table]) -> Figure:
 
 def work_mJ(loop: Table) -> float:
     """Work of friction along the readings of a cycle."""
-    power = loop["friction_N"] * loop["rod_speed_mm_s"]
-    return float(0.5 * (power[1:] + power[:-1]) @ np.diff(loop["t_s"]))
+    return float(trapezoid(loop["friction_N"] * loop["rod_speed_mm_s"], loop["t_s"]))
 
 
 def film_map(film: Table) -> tuple[Array, Array, Array, Array]:

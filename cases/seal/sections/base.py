@@ -6,6 +6,7 @@ from math import dist
 from typing import Any
 
 from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.sections.seated import seat
 from softehl.runtime.mesh.outline import Outline, OutlineError, Piece, Point, Shape
 
 HEIGHT = 3.53
@@ -33,11 +34,10 @@ class Section(Parameters):
 
         Raises OutlineError, a ValueError, where the dimensions do not go together.
         """
-        a, b, c, _ = (drawn := self.drawn()).box
-        lift = 0.5 * inner_diameter - b
-        outline = drawn.moved(shift=(-0.5 * (a + c), lift))
-        z, r = self.crown()
-        return Shape.facing(outline, (z - 0.5 * (a + c), r + lift), self.called())
+        drawn, (z, r) = self.drawn(), self.crown()
+        aside, lift = seat(drawn, inner_diameter)
+        outline = drawn.moved(shift=(aside, lift))
+        return Shape.facing(outline, (z + aside, r + lift), self.called())
 
     @classmethod
     def called(cls) -> str:

@@ -1,4 +1,4 @@
-"""Sections from files: `outline = "seal.dxf"` or ".csv", points, and `mesh = "seal.msh"`."""
+"""Sections from files: drawings (.dxf), points (.csv), and the boundary of a mesh (.msh, ...)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.mesh import Mesh, MeshError
 from softehl.runtime.mesh.outline import Outline, OutlineError, Point, Shape
 from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
+from softehl.runtime.mesh.subdivide import subdivided
 
 COLUMNS = ("z_mm", "r_mm", "part")
 """Of a CSV file: points in order; part, of the side from a point to the next, may be left out."""
@@ -185,8 +186,6 @@ def _require_sound(mesh: SectionMesh, file: str) -> None:
 
 def finer(mesh: SectionMesh, k: int) -> SectionMesh:
     """The mesh with every element divided k by k; its boundary stays the same polygon."""
-    from softehl.runtime.mesh.subdivide import subdivided
-
     x = mesh.points[mesh.boundary]
     t = (np.arange(k) / k)[None, :, None]
     curve = ((1 - t) * x[:, None] + t * np.roll(x, -1, axis=0)[:, None]).reshape(-1, 2)

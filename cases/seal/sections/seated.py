@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softehl.runtime.mesh.outline import Outline, OutlineError, Shape
+from softehl.runtime.mesh.outline import Outline, OutlineError, Point, Shape
 
 FILM, PRESSURE = "FILM", "PRESSURE"
 """Layers of a drawing, or named sides of a mesh: what may carry film, what p_s acts on."""
@@ -63,9 +63,13 @@ def seated(outline: Outline, inner_diameter: float | None) -> Outline:
 
     None leaves it at the radius where it was drawn.
     """
+    return outline.moved(shift=seat(outline, inner_diameter))
+
+
+def seat(outline: Outline, inner_diameter: float | None) -> Point:
+    """How far that moves it."""
     a, b, c, _ = outline.box
-    lift = 0.0 if inner_diameter is None else 0.5 * inner_diameter - b
-    return outline.moved(shift=(-0.5 * (a + c), lift))
+    return -0.5 * (a + c), 0.0 if inner_diameter is None else 0.5 * inner_diameter - b
 
 
 def require_film_below(shape: Shape, file: str) -> Shape:
