@@ -277,7 +277,7 @@ def test_a_low_order_is_reached_from_a_higher_one() -> None:
     outcome = run(oring(pressure_order=3, **parameters), recorder)
     assert outcome.converged, outcome.message
     assert "order 4 to 3 in" in recorder.stages
-    assert outcome.states[-1].h_star_um == pytest.approx(0.725083, rel=1e-4)
+    assert outcome.states[-1].h_star_um == pytest.approx(0.726024, rel=1e-4)
 
 
 def test_a_film_that_closes_is_named() -> None:
