@@ -91,6 +91,7 @@ docs: $(VENV)/.docs
 pictures: $(VENV)/.kernels
 	$(BIN)/python docs/pictures.py
 	$(BIN)/python docs/section_pictures.py
+	$(BIN)/python docs/report_pictures.py
 	PYTHONPATH=. $(BIN)/python docs/gallery/pictures.py
 
 clean:

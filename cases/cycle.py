@@ -1,6 +1,6 @@
 """The O-ring on a rod that goes to and fro: film, friction and leakage in time, cycle by cycle."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import nan, pi
 from pathlib import Path
@@ -15,6 +15,7 @@ from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import draw_columns
 from softehl.cases.harness.row import OK, Row, column
+from softehl.cases.seal.assumed import assumed
 from softehl.cases.seal.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.parameters import ORing
 from softehl.runtime.arrays import Array
@@ -166,6 +167,10 @@ class CycleCase(Case[Cycle, CycleRow]):
     parameters, row = Cycle, CycleRow
     selection = ("cycles", "animation")
     files = ("rows.png", *(f"{n}.{k}" for n in PICTURES for k in ("png", "svg")), ANIMATION)
+
+    def assumed(self, parameters: Cycle, given: Collection[str]) -> list[str]:
+        """See :class:`Case`."""
+        return assumed(parameters, given)
 
     def requested(self, parameters: Cycle) -> list[float]:
         """See :class:`Case`."""

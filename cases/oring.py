@@ -1,6 +1,6 @@
 """The reciprocating O-ring of section 5.1: Table 1 as one seal."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from softehl.cases.harness.case import Case
@@ -8,6 +8,7 @@ from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
 from softehl.cases.seal import catalogue, plan
+from softehl.cases.seal.assumed import assumed
 from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
@@ -76,6 +77,10 @@ class ORingCase(Case[ORing, FilmRow]):
         if parameters.sensitivity:
             words += _not_differentiated(rows)
         return words
+
+    def assumed(self, parameters: ORing, given: Collection[str]) -> list[str]:
+        """See :class:`Case`."""
+        return assumed(parameters, given)
 
     def warnings(self, parameters: ORing) -> list[str]:
         """See :class:`Case`."""

@@ -5,7 +5,7 @@ fits a case whose rows follow the values of one key, a list.
 """
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -90,6 +90,10 @@ class Case(Generic[P, R]):
         """
         return [f"not a result: {self.named(rejected)}. {advice}"] if rejected else []
 
+    def assumed(self, parameters: P, given: Collection[str]) -> list[str]:
+        """What results hang on and was not said, in words.  given: the keys that were."""
+        return []
+
     def warnings(self, parameters: P) -> list[str]:
         """What is unusual about a run before it begins; it runs all the same."""
         return []
@@ -128,12 +132,14 @@ def load_case(module: str) -> AnyCase:
 class Run:
     """A case with its checked parameters.
 
-    shared: folder in which runs leave something for each other, None for none.
+    shared: folder in which runs leave something for each other, None for none.  given: the keys
+    that a user gave.
     """
 
     case: AnyCase
     parameters: Any
     shared: Path | None = None
+    given: frozenset[str] = frozenset()
 
     def solve(self, parameters: Any, observer: Observer) -> Outcome:
         """Run the case with these parameters."""

@@ -27,7 +27,7 @@ Shipped = Mapping[str, str]
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _FILE = re.compile(r"(\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./-]*\.[A-Za-z]{1,5}")
-_PHRASE = re.compile(r"[A-Za-z][A-Za-z0-9]*( [A-Za-z0-9][A-Za-z0-9.,]*)+")
+_PHRASE = re.compile(r"[A-Za-z]\w*( [A-Za-z0-9][A-Za-z0-9.,]*)+( ?%)?", re.ASCII)
 _SHOWN = 60
 _LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end
 
@@ -53,7 +53,8 @@ def read_case(
     for text, origin in typed:
         key, values[key] = read_assignment(text, origin)
         origins[key] = origin
-    return Run(case, validated(case.parameters, values, origins))
+    checked = validated(case.parameters, values, origins)
+    return Run(case, checked, given=frozenset(values))
 
 
 def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:

@@ -31,8 +31,9 @@ Nonzeros = Annotated[
 class Parameters(BaseModel):
     """Base of a parameter set: frozen, checked on construction, of strict types.
 
-    An integer is accepted where a real number is meant, and a text with a unit where a key has one
-    ("50 bar"); nothing else is converted.  Every key has a default, and is declared by :func:`key`.
+    An integer is accepted where a real number is meant, a text with a unit where a key has one
+    ("50 bar"), one value where a key wants a list of any length; nothing else is converted.  Every
+    key has a default, and is declared by :func:`key`.
     Raises pydantic.ValidationError where a value is of the wrong type, out of its range or not
     finite, and for an unknown key.
     """
@@ -47,7 +48,7 @@ class Parameters(BaseModel):
         if not isinstance(given, dict):
             return given
         return cls.completed(
-            {name: without_unit(cls, name, value) for name, value in given.items()}
+            {name: without_unit(cls, name, _listed(cls, name, v)) for name, v in given.items()}
         )
 
     @classmethod
@@ -89,6 +90,27 @@ def without_unit(kind: type[Parameters], name: str, value: object) -> object:
         raise ValueError(f"{name}: {error}") from None
 
 
+def _listed(kind: type[Parameters], name: str, value: object) -> object:
+    """A value, in a list of its own where a key wants one of such values."""
+    field = kind.model_fields.get(name)
+    item = _item(field.annotation) if field else None
+    if isinstance(value, str):
+        single = item is str or (item is float and is_quantity(value))
+    else:
+        single = item is float and type(value) in (int, float)
+    return [value] if single else value
+
+
+def _item(kind: Any) -> Any:
+    """What a type is a list of, of any length; None if it is none."""
+    if get_origin(kind) is not tuple:
+        return next(filter(None, map(_item, get_args(kind))), None)
+    first, *rest = get_args(kind)
+    if rest != [...]:
+        return None
+    return get_args(first)[0] if get_origin(first) is Annotated else first
+
+
 @dataclass(frozen=True)
 class Key:
     """A key of a case.  meaning, unit and bounds together are what an error message shows."""
@@ -126,7 +148,7 @@ def _values(kind: Any) -> str:
     if kind is bool:
         return "true or false"
     if get_origin(kind) is tuple:
-        return "a list of different numbers, none 0"
+        return "a number or a list of different ones, none 0"
     if get_origin(kind) is not Literal:
         return ""
     *others, last = map(json.dumps, get_args(kind))

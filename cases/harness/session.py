@@ -164,6 +164,8 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
         case.draw(record.run.parameters, record.folder, rows, rejected)
     if not quiet and (rows or rejected):
         table.print_rows(case, rows, rejected)
+        if words := case.assumed(record.run.parameters, record.run.given):
+            click.echo(f"assumed: {', '.join(words)}")
         for note in case.notes(rows):
             click.echo(note)
     if not quiet:

@@ -94,7 +94,7 @@ class ORing(SectionKeys):
         (1600.0, 800.0, 400.0, 200.0, 100.0),
         "rod speeds |U|",
         unit="mm/s",
-        bounds="a list of different numbers > 0, in any order",
+        bounds="a number > 0, or a list of different ones in any order",
         min_length=1,
         strict=False,
     )
@@ -186,10 +186,10 @@ class ORing(SectionKeys):
     c_20: float | None = key(None, "Yeoh coefficient of (I1bar - 3)^2", unit="MPa", ge=-1e3, le=1e3)
     c_30: float | None = key(None, "Yeoh coefficient of (I1bar - 3)^3", unit="MPa", ge=-1e3, le=1e3)
     ogden_mu: Terms | None = key(
-        None, "Ogden moduli mu_p", unit="MPa", bounds="a list of 1 to 3 numbers"
+        None, "Ogden moduli mu_p", unit="MPa", bounds="a number or a list of up to 3"
     )
     ogden_alpha: Terms | None = key(
-        None, "Ogden exponents alpha_p", bounds="a list of 1 to 3 numbers, none 0"
+        None, "Ogden exponents alpha_p", bounds="a number or a list of up to 3, none 0"
     )
     lambda_m: float | None = key(
         None, "Arruda-Boyce stretch at which the chains lock", gt=1, le=1000

@@ -43,6 +43,26 @@ def test_an_integer_is_a_number() -> None:
     assert repr(parameters.speeds) == "(400.0, 100.0)"
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "listed"),
+    [
+        ("speeds", 400, (400.0,)),
+        ("speeds", "0.4 m/s", (400.0,)),
+        ("tolerances", "viscosity 10 %", ("viscosity 10 %",)),
+    ],
+)
+def test_one_value_is_a_list_of_one(key: str, value: Any, listed: tuple[Any, ...]) -> None:
+    for given in (value, [value]):
+        values: dict[str, Any] = {"sensitivity": True, key: given}
+        assert getattr(ORing(**values), key) == listed
+
+
+def test_one_term_of_ogden_is_a_list_of_one() -> None:
+    values: dict[str, Any] = {"material": "ogden", "ogden_mu": 1.2, "ogden_alpha": 2}
+    ring = ORing(**values)
+    assert (ring.ogden_mu, ring.ogden_alpha) == ((1.2,), (2.0,))
+
+
 def test_parameters_are_frozen() -> None:
     with pytest.raises(ValidationError, match="frozen"):
         ORing().density = 4
@@ -67,7 +87,10 @@ def test_every_density_of_the_list(density: int) -> None:
         ("sealed_pressure", float("nan")),
         ("sealed_pressure", float("inf")),
         ("speeds", []),
-        ("speeds", 100.0),
+        ("speeds", True),
+        ("speeds", 0.0),
+        ("speeds", "fast"),
+        ("speeds", "30 bar"),
         ("speeds", [100.0, 0.0]),
         ("speeds", [100.0, float("nan")]),
         ("speeds", [100.0, True]),
@@ -110,6 +133,8 @@ def test_a_seal_that_cannot_be_mounted(changes: dict[str, Any], reason: str) -> 
         ("a=in", "in"),
         ('a="in"', "in"),
         ("a=[400, 100]", [400, 100]),
+        ("a=rod_diameter 0.05 mm", "rod_diameter 0.05 mm"),
+        ("a=viscosity 10 %", "viscosity 10 %"),
         ("a=x=1", None),
         ("a=", None),
         ("a", None),

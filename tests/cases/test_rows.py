@@ -88,7 +88,7 @@ def test_pieces_share_what_is_missing() -> None:
 def test_bounds_come_from_limits_and_types() -> None:
     bounds = {one.name: one.bounds for one in keys_of(Stone)}
     assert bounds == {
-        "heights": "a list of different numbers, none 0",
+        "heights": "a number or a list of different ones, none 0",
         "hard": "true or false",
         "kind": '"round", "flat" or "sharp"',
         "mass": "> 0 and <= 5",

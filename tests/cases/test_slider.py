@@ -293,7 +293,7 @@ def test_resume_and_jobs(tmp_path: Path) -> None:
         ("start=2", "start = 2 must be less than end = 0.75"),
         ("speeds=[0]", "a number is 0; allowed: speeds U"),
         ("speeds=[1, 1.0]", "a number is given twice"),
-        ("speeds=100", "a list of different numbers"),
+        ("speeds=true", "a number or a list of different ones"),
         ("amplitude=1", "> -1 and < 1"),
         ("segments=2", ">= 4"),
         ("h_0=1", "did you mean 'h0'"),

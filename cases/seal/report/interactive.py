@@ -47,8 +47,9 @@ def film_plot(run: FinishedRun) -> Any:
         for panel, name in zip(panels, ("p", "h"), strict=True):
             look = {"line_color": style.COLOURS[stroke], "line_dash": _DASHES[stroke]}
             panel.line("x", name, source=source, legend_label=style.STROKES[stroke], **look)
-    for panel, place in zip(panels, ("bottom_center", "top_center"), strict=True):
-        panel.legend.location = place
+    for panel in panels:  # a film of two contacts leaves no room inside
+        panel.legend.orientation = "horizontal"
+        panel.add_layout(panel.legend[0], "above")
     titles = [f"{run.name}: |U| = {speed:g} mm/s" for speed in speeds]
     both = row(*panels)
     if len(speeds) == 1:

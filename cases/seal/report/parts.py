@@ -99,7 +99,7 @@ def _curve(runs: Sequence[FinishedRun]) -> Part:
     ]
     text = (
         "h* over the rod speed; bars are the estimated error, a hollow mark is a state that is no "
-        "plain result. `ok` means right within the stated error, and within 2 %."
+        "plain result. 'ok' means right within the stated error, and within 2 %."
     )
     return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)
 
