@@ -228,6 +228,10 @@ class SealSystem:
         """The fields that contact knows: film pressures are all zero in it."""
         return tuple(field for field in self._fields if field.on != "film")
 
+    def film_fields(self) -> tuple[Field, ...]:
+        """The fields that the film alone has."""
+        return tuple(field for field in self._fields if field.on == "film")
+
     # --- loads ------------------------------------------------------------------------------------
 
     def contact_problem(self, loads: ContactLoads) -> Problem:
@@ -316,7 +320,7 @@ class SealSystem:
         shared = np.concatenate(
             [start + 2 * nodes, start + 2 * nodes + 1, moment, self._walls_of_arc(x)]
         )
-        own = [self.layout.dofs(field.name) for field in self._fields if field.on == "film"]
+        own = [self.layout.dofs(field.name) for field in self.film_fields()]
         inner = np.concatenate(own)
         if self.parameters.conserving:  # side by side along the film: their matrix is a band
             inner = np.stack([pressures[1:-1] for pressures in own], axis=1).ravel()
@@ -358,7 +362,7 @@ class SealSystem:
         given = {b: values_at_rest(b, self.parameters, self.section) for b in self.blocks}
         chosen = {b.name: self._chosen(b, values) for b, values in given.items() if values}
         problem = self.problem.with_parameters(**chosen)
-        pressures = [field.name for field in self._fields if field.on == "film"]
+        pressures = [field.name for field in self.film_fields()]
         return problem.with_fixed([self.layout.dofs(n) for n in pressures], [0.0] * len(pressures))
 
     def _film_parameters(self, film: FilmLoads, shares: Mapping[str, float]) -> dict[str, Values]:

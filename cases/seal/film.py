@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.contact import held_moment, held_place
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem
@@ -35,6 +36,7 @@ _LOOSE = 1e-3  # between contact and film, whose states are not results
 _FIRM = 1e-6  # of the state from which speeds fall: a section is condensed there that is at rest
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
 _SHEAR_STEPS = StepRule(1.0, 0.005, target_iterations=8)
+_FROM_SPEED_TO_SPEED = StepRule(1e3, 1e3)
 _SPEED_STEPS = StepRule(math.log(2.0), 0.004, math.log(2.0) + 1e-9, target_iterations=30)
 
 
@@ -189,6 +191,27 @@ class FastFilm:
     def speed(self, stage: Stage) -> Stage:
         """The stage of falling speed, to the full tolerance."""
         return replace(self._stage(stage, self.corrector, _SPEED_STEPS), predictor="parabola")
+
+    def carried(self, stage: Stage, known: CoarserFilms, x: Array) -> tuple[Stage, Array]:
+        """The stage of falling speed with the changes that a coarser mesh has seen, and its start.
+
+        x: (n,) the contact state. The stage ends where these do not lead on. Raises SingularMatrix.
+        """
+        begin = self.speed(stage)
+        corrector = self.corrector
+
+        def at(parameter: float, x: Array, change: Array) -> Array:
+            problem = begin.problem_at(parameter)
+            assert isinstance(problem, Layered)
+            return corrector.moved(problem, x, change)
+
+        def guess(here: Point, parameter: float) -> Array:
+            before, speed = (abs(stage.shown(t)) for t in (here.parameter, parameter))
+            x = here.solution.x
+            return at(parameter, x, known.next(before, speed)) - x
+
+        start = at(stage.start, x, known.built(abs(stage.shown(stage.start))))
+        return replace(begin, predictor=guess, steps=_FROM_SPEED_TO_SPEED), start
 
     def rising(self, stage: Stage) -> Stage:
         """The stage of rising speed of a rough film, to the full tolerance, with its own steps."""

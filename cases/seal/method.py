@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 
+from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.contact import along, approach_stage, assembly, contact_problem
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
@@ -125,6 +126,24 @@ class FilmPath:
             stages.append(fast.shear(shear_stage(system, settings, film)))
         stages.append(fast.speed(speed_stage(system, settings, film, p.speeds, on_speed)))
         end = self.driver.follow_all(stages, x)
+        return end if isinstance(end, StageFailed) else None
+
+    def carried(
+        self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """The films that a coarser mesh has, as far as they lead from one to the next."""
+        linear, speeds = self.driver.newton.linear, tuple(sorted(known.films, reverse=True))
+        if not (self.quick and isinstance(linear, Condenser) and speeds):
+            return None
+        film = first_film(self.system, self.settings, stroke, x)
+        _, gap = self.system.arc_film(x + known.built(speeds[0]))
+        film = replace(film, speed=speeds[0], gap=gap)
+        stage = speed_stage(self.system, self.settings, film, speeds, on_speed)
+        try:
+            stage, start = FastFilm.of(self.system, linear, x).carried(stage, known, x)
+        except SingularMatrix:
+            return None
+        end = self.driver.follow(stage, start)
         return end if isinstance(end, StageFailed) else None
 
     def begun(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> tuple[FilmLoads, Array] | None:
@@ -262,7 +281,8 @@ class SealRun:
         references = contact_peaks(self.system, p.sealed_pressure, self.x)
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
         ratios = INLET_RATIO if p.mesh == "graded" else ANY_RATIO
-        coarser = _thicknesses(*self.coarser, stroke) if self.coarser else {}
+        known = _known(*self.coarser, stroke, self.system) if self.coarser else None
+        coarser = known.thicknesses if known else {}
         verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
         verdict = replace(
             verdict,
@@ -277,7 +297,9 @@ class SealRun:
 
         if p.rough:
             return path.rise(stroke, self.x, on_speed)
-        start = path.begun(stroke, self.x, on_speed)
+        if known:
+            path.carried(stroke, self.x, known, on_speed)
+        start = path.begun(stroke, self.x, on_speed) if progress.missing else None
         if start is None:
             return None
         built = progress.slowest or path.build(*start)
@@ -355,18 +377,18 @@ def _below(speeds: tuple[float, ...], speed: float) -> tuple[float, ...]:
     return tuple(u for u in speeds if u < speed)
 
 
-def _thicknesses(path: FilmPath, x: Array, stroke: Stroke) -> dict[float, float]:
-    """h* (mm) at the requested speeds, as far as they are reached; nothing is reported."""
-    system, found = path.system, dict[float, float]()
-    speeds = system.parameters.speeds
+def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> CoarserFilms:
+    """The films at the requested speeds, as far as they are reached; nothing is reported."""
+    known, speeds = CoarserFilms(path.system, finer, x), path.system.parameters.speeds
 
     def keep(film: FilmLoads, point: Point) -> None:
         if film.speed in speeds:
-            problem = system.film_problem(film)
-            found[film.speed] = film_numbers(system, problem, film, point.solution.x).h_star
+            problem, y = path.system.film_problem(film), point.solution.x
+            known.films[film.speed] = y
+            known.thicknesses[film.speed] = film_numbers(path.system, problem, film, y).h_star
 
     path.films(stroke, x, keep)
-    return found
+    return known
 
 
 def run(

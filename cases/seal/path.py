@@ -18,7 +18,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
-from softehl.runtime.solve.predictor import Predictor
+from softehl.runtime.solve.predictor import Guess, Predictor
 from softehl.runtime.solve.solution import Branch, Point
 from softehl.runtime.solve.steps import StepRule
 
@@ -90,7 +90,7 @@ class Stage:
     waypoints: tuple[float, ...] = ()
     method: str = "newton"
     corrector: Corrector | None = None
-    predictor: Predictor = "secant"
+    predictor: Predictor | Guess = "secant"
     on_point: Callable[[Point], None] = _nothing
     shown: Callable[[float], float] = float
 

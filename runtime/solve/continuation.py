@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Corrector, NonlinearProblem
-from softehl.runtime.solve.predictor import POINTS, Predictor, admissible_fraction, extrapolated
+from softehl.runtime.solve.predictor import Guess, Predictor, admissible_fraction, predicted
 from softehl.runtime.solve.record import OnPoint, Record
 from softehl.runtime.solve.solution import Branch, Point, Solution, Status
 from softehl.runtime.solve.steps import StepRule, goals_of, next_parameter
@@ -26,15 +26,15 @@ class Continuation:
 
     newton: the corrector; steps: the step rule, lengths in units of the parameter (which the
     caller may have transformed, for instance to log U); predictor: "secant" through the last two
-    points, "parabola" through the last three (the secant until there are three), or "previous"
-    point; keep_all: keep x at every point, not just the last two;
+    points, "parabola" through the last three (the secant until there are three), "previous" point,
+    or a guess; keep_all: keep x at every point, not just the last two;
     name: what messages call the parameter; starter: the corrector of the start, which has no
     predictor and may deserve more iterations than a step that is better cut (None: the same).
     """
 
     newton: Corrector
     steps: StepRule
-    predictor: Predictor = "secant"
+    predictor: Predictor | Guess = "secant"
     keep_all: bool = False
     name: str = "parameter"
     starter: Corrector | None = None
@@ -87,5 +87,5 @@ class Continuation:
         admits, and correct.
         """
         x = known[0].solution.x
-        dx = extrapolated(known[: POINTS[self.predictor]], parameter)
+        dx = predicted(self.predictor, known, parameter)
         return self.newton.solve(problem, x + admissible_fraction(problem, x, dx) * dx)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -15,6 +15,9 @@ from softehl.runtime.solve.solution import Point
 Predictor: TypeAlias = Literal["secant", "parabola", "previous"]
 POINTS: dict[Predictor, int] = {"previous": 1, "secant": 2, "parabola": 3}
 """How many known points a predictor uses."""
+
+Guess: TypeAlias = Callable[[Point, float], Array]
+"""Change (n,) from a known point to a parameter, by whoever knows better than its neighbours."""
 
 _LONGEST_EXTRAPOLATION = 10.0  # a secant prolonged further mostly amplifies its own error
 _PARABOLA = 2.5  # the same for a parabola, in lengths of the shorter chord
@@ -38,6 +41,13 @@ def extrapolated(known: Sequence[Point], parameter: float) -> Array:
         rest = math.prod((t - e) / (d - e) for e in distances if e != d)
         dx += (t / d) * rest * (point.solution.x - here.solution.x)
     return dx
+
+
+def predicted(predictor: Predictor | Guess, known: Sequence[Point], parameter: float) -> Array:
+    """Change (n,) from the first of the known points to `parameter`."""
+    if callable(predictor):
+        return predictor(known[0], parameter)
+    return extrapolated(known[: POINTS[predictor]], parameter)
 
 
 def admissible_fraction(problem: NonlinearProblem, x: Array, dx: Array) -> float:

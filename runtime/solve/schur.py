@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.condensed import LayeredProblem
 from softehl.runtime.solve.linear import Condensed, Condenser, SingularMatrix
@@ -21,18 +23,26 @@ class StaleTangent:
 
     condensed, state: the condensation and the state (n,) at which it was made. accepted: (n,) the
     last solution. outdated: the next solve begins with a new condensation, made at `accepted`.
+    unreported: condensations that no solution has counted yet.
     """
 
     condensed: Condensed | None = None
     state: Array | None = None
     accepted: Array | None = None
     outdated: bool = False
+    unreported: int = 0
 
     def renew(self, linear: Condenser, problem: LayeredProblem, state: Array) -> None:
         """Condense the body of the problem at a state (n,); raises SingularMatrix."""
         self.condensed = None  # gives its memory back before the new one needs it
         self.condensed = linear.condense(problem.body(state), problem.shared)
         self.state, self.outdated = state, False
+        self.unreported += 1
+
+    def reported(self) -> int:
+        """Number of the condensations that were not counted yet; now they are."""
+        count, self.unreported = self.unreported, 0
+        return count
 
 
 @dataclass(eq=False)
@@ -60,6 +70,21 @@ class SchurCorrector:
     def with_tolerance(self, tolerance: float) -> SchurCorrector:
         """A corrector with another tolerance, far above rounding, and the same `tangent`."""
         return replace(self, iteration=replace(self.iteration, tolerance=tolerance, stagnation=1.0))
+
+    def moved(self, problem: LayeredProblem, x: Array, change: Array) -> Array:
+        """x (n,) with its layer changed, and the body following as its condensation has it.
+
+        change: (n,), of which the unknowns of the layer count. A first condensation is made at x.
+        Raises SingularMatrix.
+        """
+        tangent = self.tangent
+        if tangent.condensed is None:
+            tangent.accepted = problem.admissible(x)
+            tangent.renew(self.linear, problem, tangent.accepted)
+        assert tangent.condensed is not None
+        y = x + tangent.condensed.extend(np.zeros(len(x)), change[problem.shared])
+        y[problem.own] = x[problem.own] + change[problem.own]
+        return y
 
     def solve(self, problem: LayeredProblem, x0: Array) -> Solution:
         """Solve R(x) = 0 from x0, (n,); the body may have been condensed anywhere near by."""
@@ -104,12 +129,14 @@ class SchurCorrector:
         """The solution from `start`, with a condensation made at `state` if one is given; its cost
         includes that of what was tried `before`.
         """
-        made, spent = before.factorisations + (state is not None), before.iterations
+        made, spent = before.factorisations, before.iterations
         if state is not None:
             try:
                 self.tangent.renew(self.linear, problem, state)
             except SingularMatrix as error:
+                made += 1 + self.tangent.reported()
                 return Solution(start, Status.SINGULAR, f"the body: {error}", (), made, spent)
+        made += self.tangent.reported()
         assert self.tangent.condensed is not None
         solution = self.iteration.solve(problem, self.tangent.condensed, start)
         return replace(solution, factorisations=made, iterations=spent + solution.iterations)

@@ -6,6 +6,7 @@ from math import isnan, nan
 
 import pytest
 
+from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.estimate import ORDER, coarser_density, h_star_error
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import DENSITIES, ORing
@@ -63,14 +64,35 @@ def test_the_films_of_the_coarser_mesh_are_no_results(curve: Outcome) -> None:
     assert {state.density for state in curve.states} == {2}
     names = [stage.name for stage in curve.stages]
     assert "coarser mesh: falling speed" in names
-    assert names.index("coarser mesh: contact") < names.index("contact to film")
+    assert names.index("coarser mesh: contact") < names.index("falling speed")
 
 
-def test_without_an_estimate_nothing_else_changes(curve: Outcome) -> None:
+def test_the_films_start_from_those_of_the_coarser_mesh(curve: Outcome) -> None:
+    names = [stage.name for stage in curve.stages]
+    assert names.count("falling speed") == 1
+    assert "coarser mesh: contact to film" in names
+    assert "contact to film" not in names
+
+
+def test_without_an_estimate_only_the_way_is_another(curve: Outcome) -> None:
     plain = run(_case(error_estimate=False), Silent())
     assert [s.h_star_um for s in plain.states] == pytest.approx(
-        [s.h_star_um for s in curve.states], rel=1e-12
+        [s.h_star_um for s in curve.states], rel=1e-9
     )
+    assert "contact to film" in [stage.name for stage in plain.stages]
     assert all(isnan(s.h_star_error_percent) for s in plain.states)
     assert not any(stage.name.startswith("coarser") for stage in plain.stages)
     assert isnan(h_star_error(2, 1.0, nan))
+
+
+def test_where_coarser_films_mislead_the_path_is_followed(
+    curve: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = CoarserFilms.next
+    monkeypatch.setattr(CoarserFilms, "next", lambda *given: -3.0 * usual(*given))
+    outcome = run(_case(), Silent())
+    assert outcome.converged, outcome.message
+    assert "contact to film" in [stage.name for stage in outcome.stages]
+    assert [s.h_star_um for s in outcome.states] == pytest.approx(
+        [s.h_star_um for s in curve.states], rel=1e-9
+    )
