@@ -52,10 +52,10 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def write_arrays(path: Path, arrays: Mapping[str, Array]) -> None:
-    """Write named arrays (.npz), atomically also for several processes at once.  OSError."""
+def write_arrays(path: Path, arrays: Mapping[str, Array], *, shared: bool = True) -> None:
+    """Write named arrays (.npz), atomically; shared: also by several processes.  OSError."""
     named: dict[str, Any] = dict(arrays)
-    with replacing(path, shared=True) as temporary, temporary.open("wb") as file:
+    with replacing(path, shared=shared) as temporary, temporary.open("wb") as file:
         np.savez(file, **named)
 
 

@@ -109,3 +109,14 @@ class Observer(Protocol):
         Of a run in this process only.
         """
         return None
+
+    def draft(self, key: float, arrays: Mapping[str, Array]) -> None:
+        """What there is by now of a row that takes long, for a run that goes on from here.
+
+        Of a run in this process only, like `drafted`.
+        """
+        return None
+
+    def drafted(self, key: float) -> Mapping[str, Array] | None:
+        """The last draft that an earlier run left of a row; None where there is none."""
+        return None

@@ -15,6 +15,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from softehl.cases.harness.case import AnyCase, Run
 from softehl.cases.harness.curve import CurveFolder
 from softehl.cases.harness.earlier import (
@@ -29,10 +31,13 @@ from softehl.cases.harness.files import Content, write_content
 from softehl.cases.harness.lock import FolderLock
 from softehl.cases.harness.observer import Outcome, StageRecord, State
 from softehl.cases.harness.row import Record, Row
-from softehl.runtime.io import write_csv, write_json
+from softehl.runtime.arrays import Array
+from softehl.runtime.io import read_arrays, write_arrays, write_csv, write_json
 from softehl.runtime.library import library_of
 
-_OURS = ("run.json", "curve.csv")
+_DRAFT = "unfinished.npz"
+_OURS = ("run.json", "curve.csv", _DRAFT)
+_KEY = "key"
 _SIZE = ("kernels", "kernel_library", "unknowns", "solvers", "numbers")
 _PACKAGES = (
     *("softehl", "numpy", "scipy", "cffi", "pypardiso"),
@@ -153,10 +158,23 @@ class RunRecord:
         row: Row = (self.curve if state.row.usable else self.rejected).add(state)
         if row.usable:
             self.rejected.drop(row.key)
+            (self.folder / _DRAFT).unlink(missing_ok=True)
         else:
             self.advice.add(state.advice)
         self.save("running", "")
         return row
+
+    def draft(self, key: float, arrays: Mapping[str, Array]) -> None:
+        """Keep what there is of a row that is not complete; only the last one is kept."""
+        self.begin()
+        write_arrays(self.folder / _DRAFT, {**arrays, _KEY: np.array([key])}, shared=False)
+
+    def drafted(self, key: float) -> dict[str, Array] | None:
+        """What the earlier run that is resumed had of a row, None if nothing that can be read."""
+        arrays = read_arrays(self.folder / _DRAFT) if self._earlier.content else None
+        if arrays is None or arrays.pop(_KEY, np.empty(0)).tolist() != [key]:
+            return None
+        return arrays
 
     def set_outcomes(self, outcomes: Sequence[Outcome]) -> None:
         """What is known only at the end: the size, the kernels and the cost of each stage."""

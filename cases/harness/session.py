@@ -123,6 +123,15 @@ class Reporter(Observer):
                 return row, [read_table(path) for path in paths if path.suffix == ".csv"]
         return None
 
+    def draft(self, key: float, arrays: Mapping[str, Array]) -> None:
+        """See :class:`Observer`."""
+        with writing(self.record.folder):
+            self.record.draft(key, arrays)
+
+    def drafted(self, key: float) -> Mapping[str, Array] | None:
+        """See :class:`Observer`."""
+        return self.record.drafted(key)
+
 
 @contextmanager
 def _recorded(record: RunRecord) -> Iterator[None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,7 +19,14 @@ from softehl.cases.seal.method import BuiltFilm, FilmPath
 from softehl.cases.seal.motion import Motion
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.restart import leave_films, packed, readings, unpacked
+from softehl.cases.seal.restart import (
+    drafted,
+    leave_films,
+    packed,
+    readings,
+    taken_up,
+    unpacked,
+)
 from softehl.cases.seal.telling import Teller
 from softehl.cases.seal.transient import Instant, March, Reading, StuckError, TimeSteps
 from softehl.runtime.arrays import Array
@@ -27,6 +35,9 @@ from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.schur import StaleTangent
 from softehl.runtime.solve.solution import Point, Status
+
+BETWEEN_DRAFTS = 2.0
+"""Seconds of work that are lost at most where a run is killed within a cycle."""
 
 
 @dataclass
@@ -97,10 +108,24 @@ def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) ->
         # its condensations are its own, so that a run that goes on from here does the same
         march.corrector = replace(march.corrector, tangent=StaleTangent())
         observer.stage(name, title=name, where={})
+        draft = observer.drafted(float(number))
+        if draft is not None:
+            films.readings, film = taken_up(march, draft)
+            films.films = [film]
+        saved = [time.monotonic()]
 
-        def told(instant: Instant, reading: Reading, films: Films = films) -> None:
+        def told(
+            instant: Instant,
+            reading: Reading,
+            number: int = number,
+            films: Films = films,
+            saved: list[float] = saved,
+        ) -> None:
             films.readings.append(reading)
             films.films.append(_film(march, instant))
+            if time.monotonic() - saved[0] > BETWEEN_DRAFTS:
+                observer.draft(float(number), drafted(march, films.readings, films.films))
+                saved[0] = time.monotonic()
             observer.step(
                 label="t",
                 parameter=reading.t_s,

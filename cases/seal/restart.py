@@ -1,9 +1,9 @@
-"""A march in time put into a table at the end of a cycle, and taken up again from it."""
+"""A march in time put into tables, at the end of a cycle or within it, and taken up from them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields, replace
 
 import numpy as np
 
@@ -63,3 +63,42 @@ def leave_films(march: March, past: list[Reading]) -> None:
         left = march.left(reading)
         if left is not None:
             march.rod.leave(reading.place_mm, left)
+
+
+def drafted(
+    march: March, past: Sequence[Reading], films: Sequence[Mapping[str, Array]]
+) -> dict[str, Array]:
+    """A cycle in the middle of it: its readings and films so far, the march and its tangent.
+
+    films: tables of one length each, one for every reading.
+    """
+    tangent, loop = march.corrector.tangent, [asdict(reading) for reading in past]
+    assert tangent.state is not None
+    assert tangent.accepted is not None
+    tables = {
+        "loop": {name: np.array([r[name] for r in loop], dtype=float) for name in loop[0]},
+        "film": {name: np.concatenate([film[name] for film in films]) for name in films[0]},
+        "march": packed(march),
+        "tangent": {
+            "state": tangent.state,
+            "accepted": tangent.accepted,
+            "numbers": np.array([march.condensed_at, float(tangent.outdated)]),
+        },
+    }
+    return {f"{t}/{name}": column for t, table in tables.items() for name, column in table.items()}
+
+
+def taken_up(march: March, arrays: Mapping[str, Array]) -> tuple[list[Reading], dict[str, Array]]:
+    """Put a march where `drafted` took it; the readings and the film of the cycle so far."""
+    tables: dict[str, dict[str, Array]] = {}
+    for name, column in arrays.items():
+        table, _, own = name.partition("/")
+        tables.setdefault(table, {})[own] = column
+    unpacked(march, tables["march"])
+    past, tangent = readings(tables["loop"]), tables["tangent"]
+    leave_films(march, past)
+    t, outdated = tangent["numbers"].tolist()
+    march.condense(t, tangent["state"])
+    march.corrector.tangent.accepted = tangent["accepted"]
+    march.corrector.tangent.outdated = bool(outdated)
+    return past, tables["film"]

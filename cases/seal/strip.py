@@ -74,7 +74,8 @@ class Strip:
         history = np.zeros((n, self.order + 1, 1))
         blocks = [
             ElementBlock(
-                *(FILM, flow, nodes, film, np.zeros((n, 2))), rule=rules.rupture_rule(self.order)
+                *(FILM, flow, nodes, film, np.zeros((n, 2))),
+                rule=rules.rupture_rule(self.order, polynomial=False),
             ),
             ElementBlock(CAVITATION, load_kernel("film_void"), np.empty((m, 0)), voids),
             ElementBlock(
@@ -115,17 +116,13 @@ class Strip:
     def starved(self, speed: float, supply: float | None) -> Array:
         """Void fractions (2,) of the ends where the plane brings in a film of this thickness, mm.
 
-        The film fills the gap of the first subcell as far as it goes; None: the gap is full.
+        The film fills what the first subcell lets through as far as it goes; None: all of it.
         """
         void = np.zeros(2)
         if supply is None:
             return void
-        share = 0.5 * (1.0 + rules.pressure_nodes(self.order)[1])
-        if speed > 0.0:
-            ends = self.h[0, 0], self.h[0, 0] + share * (self.h[0, 1] - self.h[0, 0])
-        else:
-            ends = self.h[-1, 1], self.h[-1, 1] + share * (self.h[-1, 0] - self.h[-1, 1])
-        void[0 if speed > 0.0 else 1] = max(0.0, 1.0 - supply / (0.5 * (ends[0] + ends[1])))
+        h, end = (self.h[0], 0) if speed > 0.0 else (self.h[-1, ::-1], 1)
+        void[end] = missing(supply, h[0], h[1], self.order)
         return void
 
     def moving(self, problem: Problem, rate: float, before: Array) -> Problem:
@@ -135,6 +132,17 @@ class Strip:
         assembler = problem.assembler.with_data(SQUEEZE, point_data=before[:, :, None])
         changed = replace(problem, assembler=assembler)
         return changed.with_parameters(**{SQUEEZE: {name: given[name] for name in names}})
+
+
+def missing(supply: float, outer: float, inner: float, order: int) -> float:
+    """Void fraction of an end of the film to which the rod brings a film of this thickness (mm).
+
+    outer, inner: h at this end and at the other of its segment, mm, which has `order` subcells.
+    Of the outmost one the rod carries h_1 h_2 over their mean (`codegen/models/mixed_film.py`).
+    """
+    share = 0.5 * (1.0 + rules.pressure_nodes(order)[1])
+    next_to = outer + share * (inner - outer)
+    return float(max(0.0, 1.0 - supply * 0.5 * (outer + next_to) / (outer * next_to)))
 
 
 def fronts(x: Array, p: Array, v: Array, p_c: float) -> tuple[float, float]:

@@ -23,7 +23,6 @@ from softehl.runtime.fem.rules import (
     facet_rule,
     film_rule,
     rupture_rule,
-    subcell_rule,
 )
 from softehl.runtime.kernels import Rule
 
@@ -32,8 +31,6 @@ Values: TypeAlias = Mapping[str, float]
 
 
 def _segment_rule(p: ORing, order: int) -> Rule:
-    if p.conserving:
-        return subcell_rule(order)
     return film_rule(order, p.quadrature, p.quadrature_points)
 
 

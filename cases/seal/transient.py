@@ -17,6 +17,7 @@ from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.motion import Motion, RodFilm, differences
 from softehl.cases.seal.results import rough_numbers
+from softehl.cases.seal.strip import missing
 from softehl.cases.seal.system import FILM, PRESSURE, SQUEEZE
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered
@@ -84,6 +85,7 @@ class March:
     """A march in time; `behind` holds the last instants, newest first, and changes with steps.
 
     film: loads that do not change. returned: whether the instroke finds what the outstroke left.
+    condensed_at: time of the problem whose body the corrector's tangent has condensed, s.
     """
 
     system: SealSystem
@@ -95,6 +97,7 @@ class March:
     rod: RodFilm = field(default_factory=lambda: RodFilm([], []))
     behind: list[Instant] = field(default_factory=list)
     dt: float = 0.0
+    condensed_at: float = 0.0
     _layer: Layer | None = None
 
     def begin(self, x: Array, t: float = 0.0) -> Reading:
@@ -104,6 +107,7 @@ class March:
         problem = self.system.film_problem(film)
         first = Instant(t, x, *self._content(x), self._fluxes(problem, x), np.zeros(2))
         self.behind = [first]
+        self._layer = self.system.film_layer(x)
         return self._reading(problem, film, first, 0)
 
     def until(self, end: float, on_step: Callable[[Instant, Reading], None]) -> None:
@@ -121,6 +125,13 @@ class March:
         U = reading.rod_speed_mm_s
         return 2.0 * reading.flux_air_mm2_s / max(U, 1e-3 * self._fastest) if U > 0.0 else None
 
+    def condense(self, t: float, state: Array) -> None:
+        """Condense the section at a state (n,) as the problem of a time has it."""
+        assert self._layer is not None
+        body = Layered(self.system.film_problem(self._loads(t)), self._layer)
+        self.corrector.tangent.renew(self.corrector.linear, body, state)
+        self.condensed_at = t
+
     # --- inside -----------------------------------------------------------------------------------
 
     def _step(self, now: float, dt: float, on_step: Callable[[Instant, Reading], None]) -> None:
@@ -128,7 +139,10 @@ class March:
         film = self._loads(now + dt)
         problem, layer = self._problem(film, dt)
         layered = Layered(problem, layer, (self.system.film_guard(),))
+        tangent = self.corrector.tangent.state
         solution = self.corrector.solve(layered, guess)
+        if self.corrector.tangent.state is not tangent:
+            self.condensed_at = now + dt
         error = self._error(solution.x, guess) if solution.converged else np.inf
         if not solution.converged or error > 4.0:
             self.dt = dt * (0.25 if not solution.converged else 0.5)
@@ -141,9 +155,9 @@ class March:
         left = self.left(reading)
         if left is not None:
             self.rod.leave(reading.place_mm, left)
-        on_step(instant, reading)
         power = 1.0 / 3.0 if len(self.behind) > 2 else 0.5
         self.dt = dt * float(np.clip(0.8 * max(error, 1e-4) ** -power, 0.3, 1.8))
+        on_step(instant, reading)
 
     @property
     def _fastest(self) -> float:
@@ -163,7 +177,8 @@ class March:
         if supply is None:
             return film
         _, h = self.system.arc_film(self.behind[0].x)
-        return replace(film, inflow=(0.0, max(0.0, 1.0 - supply / float(h[-2:].mean()))))
+        order = self.system.parameters.pressure_order
+        return replace(film, inflow=(0.0, missing(supply, float(h[-1]), float(h[-2]), order)))
 
     def _problem(self, film: FilmLoads, dt: float) -> tuple[Problem, Layer]:
         """The film at the end of a step, and its layer, both with what was before."""
@@ -175,7 +190,8 @@ class March:
         content = sum(w * i.content for w, i in pairs)
         arc = self.system.mesh.arc_segments
         moved = sum(w * self.system.displacements(i.x)[arc, 0] for w, i in pairs)
-        layer = self._layer = self._layer or self.system.film_layer(self.behind[0].x)
+        layer = self._layer
+        assert layer is not None, "begin() comes first"
         assemblers = [
             a.with_data(FILM, data=np.ascontiguousarray(moved)).with_data(
                 SQUEEZE, point_data=np.ascontiguousarray(content)[:, :, None]

@@ -1,14 +1,16 @@
 """Films that rupture, move and touch: void fraction, squeeze, roughness (docs/film-physics.md).
 
 Unknowns of a segment are displacements, pressures, and void fractions v = 1 - theta where the
-pressures stand. Where the film may rupture both are those of subcells between neighbours, pressures
-linear and void fractions upwinded: a table of shape functions says so, `v_out` is the void
-fraction of the end from which oil comes at outstroke, `v_in` at instroke. The smooth pages are the
+pressures stand. What flows between neighbours is that of a wedge, exactly: on a subcell from one
+to the other the oil has the pressure `p_cell`, linear in between, and comes with the void fraction
+`v_out` of the one end at outstroke, `v_in` of the other at instroke. What the film bears is `p`,
+the polynomial through the pressures. A table of shape functions says so. The smooth pages are the
 limit of the rough ones without roughness.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +18,7 @@ import sympy as sp
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
+from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import roughness
 from softehl.codegen.models.film import (
@@ -32,13 +35,14 @@ class Surfaces:
     """What the surfaces make of a thickness h, by (14) and (17) with flow factors.
 
     effective: thickness of flow and shear; content: mean gap; carried: thickness that a rod of
-    unit mean speed carries along; pressure_flow, couette, poiseuille: factors; asperities: their
-    pressure over the stiffness.
+    unit mean speed carries along; effective_of: the first of them for another h; pressure_flow,
+    couette, poiseuille: factors; asperities: their pressure over the stiffness.
     """
 
     effective: Any
     content: Any
     carried: Any
+    effective_of: Callable[[Any], Any]
     pressure_flow: Any = 1
     couette: Any = 1
     poiseuille: Any = 1
@@ -47,7 +51,7 @@ class Surfaces:
     @classmethod
     def smooth(cls, h: Any) -> Surfaces:
         """Without roughness."""
-        return cls(h, h, h)
+        return cls(h, h, h, lambda other: other)
 
     @classmethod
     def rough(cls, m: Model, h: Any, sigma: Any, c: Any) -> Surfaces:
@@ -59,6 +63,7 @@ class Surfaces:
             effective=m.define("h_effective", sigma * He),
             content=m.define("h_T", sigma * gap),
             carried=m.define("h_carried", sigma * (gap + c * roughness.shear_flow(He))),
+            effective_of=lambda other: sigma * roughness.effective(other / sigma),
             pressure_flow=roughness.pressure_flow(He),
             couette=roughness.shear_stress(He) + c * roughness.shear_difference(He),
             poiseuille=roughness.pressure_stress(He),
@@ -85,10 +90,11 @@ def rough_segment() -> Definition:
 
 
 def _segment(name: str, doc: str, *, rough: bool) -> Definition:
-    m = Model(name, nodes=2, rule=quadrature.gauss(2, 1), doc=doc)
+    m = Model(name, nodes=2, rule=_one_subcell(), doc=doc)
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
-    (p, p_xi), (v_out, _), (v_in, _) = m.interpolated_sides("p", "v_out", "v_in")
+    sides = m.interpolated_sides("p", "p_cell", "v_out", "v_in")
+    (p, p_xi), (p_cell, p_cell_xi), (v_out, _), (v_in, _) = sides
     R_rod, U, eta_0, alpha, force_weight, shear_weight = m.parameters(
         rod_radius="radius of the rod [mm]",
         rod_speed="rod speed U, positive towards the air side [mm/s]",
@@ -97,7 +103,7 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
         force_weight="factor on the nodal forces",
         shear_weight="factor on the shear traction",
     )
-    (xi,) = m.point()
+    xi, *ends = m.point()
     N = shapes.line2(xi)
     (w_nodes,) = m.rates("u_z")
     w = m.define("w", shapes.interpolate(N, w_nodes))
@@ -108,12 +114,15 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
     h = m.define("h", shapes.interpolate(N, nodal_h), interface=True)
     V = m.define("V", U - w)
     surfaces, p_a, tau_a = _surfaces(m, h, V, rough)
+    at_ends = [shapes.interpolate(shapes.line2(end), nodal_h) for end in ends]
+    mean, narrowing = _wedge(m, [surfaces.effective_of(h_end) for h_end in at_ends])
     slope = m.define("slope", p_xi / z_xi)
-    eta = m.define("eta", viscosity(eta_0, alpha, p))
     filled = m.define("filled", sp.Max(V, 0) * (1 - v_out) + sp.Min(V, 0) * (1 - v_in))
-    pressed = surfaces.pressure_flow * conductance(surfaces.effective, eta)
-    q = m.define("q", flux(filled, surfaces.carried, pressed, slope))
-    couette = m.define("couette", eta * filled / surfaces.effective * surfaces.couette)
+    eta_cell = m.define("eta_cell", viscosity(eta_0, alpha, p_cell))
+    pressed = surfaces.pressure_flow * narrowing**2 * conductance(mean, eta_cell)
+    q = m.define("q", flux(filled, narrowing * surfaces.carried, pressed, p_cell_xi / z_xi))
+    oil = m.define("oil", viscosity(eta_0, alpha, p))
+    couette = m.define("couette", oil * filled / surfaces.effective * surfaces.couette)
     poiseuille = m.define("poiseuille", surfaces.poiseuille * surfaces.effective / 2 * slope)
     tau = couette + tau_a - poiseuille
     load = p + p_a
@@ -121,7 +130,7 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
     ring = m.define("ring", 2 * sp.pi * force_weight * (R_rod + h))
     m.weak_form(
         [
-            (q, p_xi),
+            (q, p_cell_xi),
             (ring * (load * r_xi - shear_weight * tau * ds), shapes.interpolate(N, u[0])),
             (-ring * load * z_xi, shapes.interpolate(N, u[1])),
         ]
@@ -134,7 +143,7 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
         tau=tau,
         flux=q,
         tau_rod=couette + tau_a + poiseuille,
-        eta=eta,
+        eta=oil,
         h_T=surfaces.content,
         p_a=p_a,
         tau_a=tau_a,
@@ -143,6 +152,24 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
     )
     m.offer(pseudo_load=True, fields_rate=True)
     return m.finish()
+
+
+def _one_subcell() -> QuadratureRule:
+    """Two Gauss points with the ends of their subcell beside them, here those of the segment."""
+    line = quadrature.gauss(2, 1)
+    ends = -sp.Integer(1), sp.Integer(1)
+    return QuadratureRule(3, tuple((*point, *ends) for point in line.points), line.weights)
+
+
+def _wedge(m: Model, ends: list[Any]) -> tuple[Any, Any]:
+    """Mean of the thicknesses h_1, h_2 at the ends of a subcell, and h_1 h_2 over its square.
+
+    A flux that is the same all along a wedge asks for the mean of U/2 h^-2 - q h^-3, which are
+    1 / (h_1 h_2) and mean / (h_1 h_2)^2.
+    """
+    h_1, h_2 = (m.define(f"h_cell_{k}", h) for k, h in enumerate(ends, start=1))
+    mean = m.define("h_cell", (h_1 + h_2) / 2)
+    return mean, m.define("narrowing", h_1 * h_2 / mean**2)
 
 
 def _surfaces(m: Model, h: Any, V: Any, rough: bool) -> tuple[Surfaces, Any, Any]:

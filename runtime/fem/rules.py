@@ -150,26 +150,22 @@ def _hats(m_p: int) -> Array:
 
 
 @cache
-def subcell_rule(m_p: int) -> Rule:
-    """Rule of a segment whose pressure is linear between its m_p + 1 nodes."""
-    rule, _ = subcells(m_p)
-    return Rule(rule.points, rule.weights, _hats(m_p))
+def rupture_rule(m_p: int, *, polynomial: bool = True) -> Rule:
+    """Rule of a film that may rupture: points (q, 3) with the ends of their subcells.
 
-
-@cache
-def rupture_rule(m_p: int) -> Rule:
-    """`subcell_rule` with void fractions upwinded from the nodes: 2 (m_p + 1) modes.
-
-    Pressures come first, then void fractions; basis (points, modes, 6): value and d/dxi of p, of v
-    at the lower end of the subcell, and of v at its upper end.
+    Basis (points, 2 (m_p + 1), 8), pressures first, then void fractions: value and d/dxi of the
+    polynomial p through all pressures (of the linear one without `polynomial`), of p linear on the
+    subcell, of v at the lower end of the subcell, and of v at its upper end.
     """
     rule, cell = subcells(m_p)
-    n, here = m_p + 1, np.arange(len(cell))
-    basis = np.zeros((len(cell), 2 * n, 6))
-    basis[:, :n, :2] = _hats(m_p)
-    basis[here, n + cell, 2] = 1.0
-    basis[here, n + cell + 1, 4] = 1.0
-    return Rule(rule.points, rule.weights, basis)
+    nodes, n, here = pressure_nodes(m_p), m_p + 1, np.arange(len(cell))
+    basis, hats = np.zeros((len(cell), 2 * n, 8)), _hats(m_p)
+    basis[:, :n, :2] = lagrange(nodes, rule.points[:, 0]) if polynomial else hats
+    basis[:, :n, 2:4] = hats
+    basis[here, n + cell, 4] = 1.0
+    basis[here, n + cell + 1, 6] = 1.0
+    points = np.stack([rule.points[:, 0], nodes[cell], nodes[cell + 1]], axis=1)
+    return Rule(points, rule.weights, basis)
 
 
 @cache

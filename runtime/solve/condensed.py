@@ -160,7 +160,7 @@ class Parts:
         shared[L.indices[:first], columns[:first]] = L.data[:first]
         rows, data = L.indices[first:], L.data[first:]
         right = csc_array((data, rows, L.indptr[m:] - first), shape=(size, size - m))
-        inner = rows >= m
+        inner = (rows >= m) & (data != 0.0)  # elements couple more than their equations do
         chosen = rows[inner].astype(np.int64) - m, columns[first:][inner] - m
         return cls(shared, right, Entries(size - m, *chosen, data[inner]))
 

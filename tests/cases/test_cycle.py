@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 import softehl
 from softehl.cases.cycle import Cycle
+from softehl.cases.seal import cycles
 from softehl.cases.seal.motion import Motion, RodFilm, Table, differences
 from softehl.cases.seal.report.cycle import (
     film_map,
@@ -26,7 +27,7 @@ from softehl.cases.seal.report.cycle import (
 from softehl.cases.seal.strip import Oil, Strip
 from softehl.cases.seal.system import FILM, PRESSURE, SQUEEZE, VOID
 from softehl.runtime.arrays import Array
-from softehl.runtime.io import read_table
+from softehl.runtime.io import read_arrays, read_table
 from softehl.runtime.solve.newton import Newton
 from tests.reference.calling import fitted_order
 
@@ -203,8 +204,10 @@ def test_long_periods_give_the_steady_curve(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_that_goes_on_does_the_same_to_the_last_bit(tmp_path: Path) -> None:
-    """From the end of the last cycle that is there, with what the rod carries then."""
+def test_a_run_that_goes_on_does_the_same_to_the_last_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the end of a cycle, with what the rod carries then, and from the middle of the next."""
     given = ("supply=returned", "frequency=10", "time_tolerance=0.05")
     whole = cycle(tmp_path / "whole", *given, "cycles=2")
     assert whole["cycle"].tolist() == [1.0, 2.0]
@@ -212,7 +215,27 @@ def test_a_run_that_goes_on_does_the_same_to_the_last_bit(tmp_path: Path) -> Non
     keys = [f"--set={s}" for s in ("density=1", "roughness=0.3", *given, "cycles=2")]
     parts = tmp_path / "parts"
     begun = (parts / "loop_1.csv").stat().st_mtime_ns
-    assert softehl.main(["run", "cycle", *keys, "--out", str(parts), "--resume", "--quiet"]) == 0
+    resume = ["run", "cycle", *keys, "--out", str(parts), "--resume", "--quiet"]
+    steps, drafts = [0], parts / "unfinished.npz"
+    film_of = cycles._film
+
+    def ended(*given: Any) -> dict[str, Array]:
+        steps[0] += 1
+        if steps[0] > 23:
+            raise KeyboardInterrupt
+        return film_of(*given)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(cycles, "BETWEEN_DRAFTS", 0.0)
+        patched.setattr(cycles, "_film", ended)
+        with pytest.raises(KeyboardInterrupt):
+            softehl.main(resume)
+    held = read_arrays(drafts)
+    assert held is not None
+    assert held["key"].tolist() == [2.0]
+    assert len(held["loop/t_s"]) == 23
+    assert softehl.main(resume) == 0
+    assert not drafts.exists()
     assert (parts / "loop_1.csv").stat().st_mtime_ns == begun
     for name in ("curve.csv", "loop_2.csv", "film_2.csv", "state_2.csv"):
         assert (parts / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

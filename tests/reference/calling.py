@@ -16,7 +16,7 @@ RULES = {
     "film_rough": rules.rupture_rule,
     "film_squeeze": rules.content_rule,
     "film_squeeze_rough": rules.content_rule,
-    "film_upwind_rough": rules.subcell_rule,
+    "film_upwind_rough": rules.film_rule,
 }
 """Rules of the films that may rupture, by the order of the pressure."""
 

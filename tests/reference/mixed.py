@@ -13,7 +13,8 @@ from functools import partial
 from itertools import pairwise
 
 from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
-from tests.reference.rules import gauss, lobatto
+from tests.reference.rules import gauss, lagrange, lobatto
+from tests.reference.upwind import bubble_load
 
 
 def effective(H: Number) -> Number:
@@ -77,6 +78,9 @@ class Place:
 
     shapes: tuple[Number, Number]
     cell: int
+    ends: tuple[Number, Number]
+    xi: Number
+    z_xi: Number
     hats: tuple[Number, Number]
     width: Number
     dx: Number
@@ -91,9 +95,10 @@ Words = dict[str, Number]
 
 
 def places(X: Vector, dofs: Vector, data: Vector, given: Words) -> Iterator[Place]:
-    """Two Gauss points on every subcell."""
+    """Two Gauss points on every subcell; `ends` are thicknesses at those of the subcell."""
     z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
     nodes = lobatto(len(dofs[4:]) // 2)[0]
+    gaps = [(1 - x) / 2 * r1 + (1 + x) / 2 * r2 - given["rod_radius"] for x in nodes]
     w = [given["rate"] * dofs[2 * a] + data[a] for a in (0, 1)]
     for cell, (a, b) in enumerate(pairwise(nodes)):
         for point, weight in zip(*gauss(2), strict=True):
@@ -101,7 +106,8 @@ def places(X: Vector, dofs: Vector, data: Vector, given: Words) -> Iterator[Plac
             one, two = (1 - xi) / 2, (1 + xi) / 2
             r, own = one * r1 + two * r2, weight * (b - a) / 2
             yield Place(
-                *((one, two), cell, ((b - xi) / (b - a), (xi - a) / (b - a))),
+                *((one, two), cell, (gaps[cell], gaps[cell + 1]), xi, (z2 - z1) / 2),
+                *(((b - xi) / (b - a), (xi - a) / (b - a)),),
                 *((b - a) * (z2 - z1) / 2, own * (z2 - z1) / 2, own),
                 *(one * z1 + two * z2, r, r - given["rod_radius"], one * w[0] + two * w[1]),
             )
@@ -124,24 +130,38 @@ class Film:
 
 
 def film_at(at: Place, dofs: Vector, given: Words, rough: bool) -> Film:
-    """Flux and stresses; void fractions come from where the oil comes from."""
+    """Flux and stresses; void fractions come from where the oil comes from.
+
+    The flux has the means of h^-2 and h^-3 over the wedge of the subcell, as far as its pressure
+    goes; stresses and load have the polynomial.
+    """
     half = len(dofs[4:]) // 2
     p_ends = dofs[4 + at.cell : 6 + at.cell]
     void = dofs[4 + half + at.cell], dofs[4 + half + at.cell + 1]
-    p, slope = mp.fdot(at.hats, p_ends), (p_ends[1] - p_ends[0]) / at.width
+    p_cell, slope_cell = mp.fdot(at.hats, p_ends), (p_ends[1] - p_ends[0]) / at.width
+    shapes = lagrange(lobatto(half)[0], at.xi)
+    p, slope = (mp.fdot(s, dofs[4 : 4 + half]) for s in shapes)
+    slope /= at.z_xi
     V = given["rod_speed"] - at.w
     full = 1 - (void[0] if V > 0 else void[1])
-    eta = given["viscosity"] * mp.exp(given["pressure_viscosity"] * p)
+    eta, eta_cell = (
+        given["viscosity"] * mp.exp(given["pressure_viscosity"] * v) for v in (p, p_cell)
+    )
+    sigma = given["roughness"] if rough else mpf(1)
+    a, b = (sigma * effective(g / sigma) if rough else g for g in at.ends)
+    mean_2, mean_3 = 1 / (a * b), (a + b) / 2 / (a * b) ** 2
     if not rough:
-        q = V / 2 * full * at.h - at.h**3 / (12 * eta) * slope
+        carried = at.h * mean_2 / mean_3 / ((a + b) / 2)
+        q = V / 2 * full * carried - slope_cell / (12 * eta_cell * mean_3)
         drag, back = eta * V / at.h * full, at.h / 2 * slope
         zero = mpf(0)
         return Film(p, slope, q, drag - back, drag + back, zero, zero, at.h, eta, void)
-    sigma, c = given["roughness"], given["roughness_difference"]
+    c = given["roughness_difference"]
     H = at.h / sigma
     E = effective(H)
     h_T, h_e = sigma * mean_gap(H), sigma * E
-    q = V / 2 * full * (h_T + c * sigma * phi_s(E)) - phi_p(E) * h_e**3 / (12 * eta) * slope
+    carried = (h_T + c * sigma * phi_s(E)) * mean_2 / mean_3 / ((a + b) / 2)
+    q = V / 2 * full * carried - phi_p(E) * slope_cell / (12 * eta_cell * mean_3)
     p_a = given["asperity_stiffness"] * asperities(H)
     tau_a = given["boundary_friction"] * p_a * V / mp.hypot(V, given["boundary_speed"])
     drag = eta * V / h_e * (phi_f(E) + c * phi_fs(E)) * full
@@ -241,7 +261,7 @@ def fields_squeeze(
 
 
 def residual_upwind(X: Vector, dofs: Vector, _: Vector, parameters: Sequence[Number]) -> Vector:
-    """`tests.reference.upwind` with sigma Hp(h_m / sigma) for h_m, on the subcells."""
+    """`tests.reference.upwind` with sigma Hp(h_m / sigma) for h_m."""
     sigma, rod_radius, speed, viscosity, shear_modulus, strength, force_weight = parameters
     z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
     h = sigma * effective(((r1 + r2) / 2 - rod_radius) / sigma)
@@ -249,22 +269,8 @@ def residual_upwind(X: Vector, dofs: Vector, _: Vector, parameters: Sequence[Num
     widening = 5 * (r2 - r1) / h
     weight = 1 / (1 + widening**2) if speed * widening > 0 else mpf(1)
     delta = weight * peclet**2 / (9 + peclet**2)
-    moved = force_weight * strength * delta / 2 * _bubble(X, dofs, dofs[4:])
+    moved = force_weight * strength * delta / 2 * bubble_load(X, dofs, dofs[4:])
     return [mpf(0), -moved, mpf(0), moved] + [mpf(0)] * (len(dofs) - 4)
-
-
-def _bubble(X: Vector, dofs: Vector, pressures: Vector) -> Number:
-    """Integral of 2 pi r p_b n_r ds with a pressure that is linear on the subcells."""
-    z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
-    nodes, total = lobatto(len(pressures))[0], mpf(0)
-    for cell, (a, b) in enumerate(pairwise(nodes)):
-        for point, weight in zip(*gauss(2), strict=True):
-            xi = (a + b) / 2 + (b - a) / 2 * point
-            one, two = (1 - xi) / 2, (1 + xi) / 2
-            p = ((b - xi) * pressures[cell] + (xi - a) * pressures[cell + 1]) / (b - a)
-            p_b = p - one * pressures[0] - two * pressures[-1]
-            total -= 2 * PI * (one * r1 + two * r2) * p_b * weight * (b - a) / 2 * (z2 - z1) / 2
-    return total
 
 
 Residual = Callable[[Vector, Vector, Vector, Sequence[Number]], Vector]

@@ -35,7 +35,7 @@ RULES = {
     None: None,
     "p": film_rule(3),
     "p_minus, p_plus": facet_rule(3),
-    "p, v_out, v_in": rupture_rule(3),
+    "p, p_cell, v_out, v_in": rupture_rule(3),
     "p, v": content_rule(3),
 }
 """A rule for every kind of interpolation."""
