@@ -1,6 +1,6 @@
 """The O-ring on a rod that goes to and fro: film, friction and leakage in time, cycle by cycle."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import nan, pi
 from pathlib import Path
@@ -91,7 +91,7 @@ class Cycle(ORing):
 class CycleRow(Row):
     """A row of curve.csv: one cycle."""
 
-    files = ("loop_{}.csv", "film_{}.csv", "state_{}.csv")
+    files = ("loop_{}.csv", "film_{}.csv", "state_{}.csv", "section_{}.csv")
     cycle: float = column("", "number of the cycle", head="cycle", shown="g")
     leak_mm3: float = column("mm3", "oil past the air end, + = out", head="leak", shown=".4g")
     leak_sealed_mm3: float = column("mm3", "oil past the sealed end, + = to the air side")
@@ -152,11 +152,17 @@ def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) ->
 
 
 def cycle_tables(films: Any) -> list[dict[str, Array]]:
-    """The friction loop with all readings, the film over time and place, where the next starts."""
+    """The friction loop with all readings, the film over time and place, where the next starts,
+    and the outline of the section over time.
+    """
     names = asdict(films.readings[0])
     loop = {n: np.array([getattr(r, n) for r in films.readings], dtype=float) for n in names}
-    film = {n: np.concatenate([f[n] for f in films.films]) for n in films.films[0]}
-    return [loop, film, films.end]
+    return [loop, joined(films.films), films.end, joined(films.outlines)]
+
+
+def joined(tables: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Tables of the same columns in one."""
+    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
 
 
 class CycleCase(Case[Cycle, CycleRow]):
@@ -210,12 +216,13 @@ class CycleCase(Case[Cycle, CycleRow]):
 
         loops = {row.label(row.key): read_table(folder / row.file_names()[0]) for row in rows}
         draw_columns(folder / "rows.png", loops, ("place_mm", "friction_N", "flux_air_mm2_s"))
-        film, last = read_table(folder / rows[-1].file_names()[1]), [*loops.values()][-1]
+        names, last = rows[-1].file_names(), [*loops.values()][-1]
+        film, outline = (read_table(folder / names[k]) for k in (1, 3))
         with matplotlib.rc_context(STYLE):
             save(loop_figure(loops), folder / PICTURES[0])
             save(map_figure(film, last), folder / PICTURES[1])
             if parameters.animation:
-                write_animation(folder / ANIMATION, film, last)
+                write_animation(folder / ANIMATION, parameters, film, last, outline)
 
 
 CASE = CycleCase()

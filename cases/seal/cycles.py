@@ -36,16 +36,23 @@ from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.schur import StaleTangent
 from softehl.runtime.solve.solution import Point, Status
 
+OUTLINES = 48
+"""Outlines of the section that are kept of a cycle, at most."""
+
 BETWEEN_DRAFTS = 2.0
 """Seconds of work that are lost at most where a run is killed within a cycle."""
 
 
 @dataclass
 class Films:
-    """Readings of the cycle that is computed, what its film was, and where the next one starts."""
+    """Readings of the cycle that is computed, what its film was, and where the next one starts.
+
+    films: a table for every reading. outlines: the deformed outline, `OUTLINES` times or fewer.
+    """
 
     readings: list[Reading] = field(default_factory=list)
     films: list[dict[str, Array]] = field(default_factory=list)
+    outlines: list[dict[str, Array]] = field(default_factory=list)
     end: dict[str, Array] = field(default_factory=dict)
 
 
@@ -95,9 +102,10 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
 
 def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> None:
     period = march.motion.period
+    apart = period / OUTLINES
     before, done, last = march.begin(x), 0, None
     while (kept := observer.kept(float(done + 1))) is not None:
-        last, (loop, _, state) = kept
+        last, (loop, _, state, _) = kept
         past = readings(loop)
         leave_films(march, past)
         unpacked(march, state)
@@ -110,8 +118,8 @@ def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) ->
         observer.stage(name, title=name, where={})
         draft = observer.drafted(float(number))
         if draft is not None:
-            films.readings, film = taken_up(march, draft)
-            films.films = [film]
+            films.readings, tables = taken_up(march, draft)
+            films.films, films.outlines = [tables["film"]], [tables["outline"]]
         saved = [time.monotonic()]
 
         def told(
@@ -123,8 +131,11 @@ def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) ->
         ) -> None:
             films.readings.append(reading)
             films.films.append(_film(march, instant))
+            if not films.outlines or reading.t_s - films.outlines[-1]["t_s"][-1] >= apart:
+                films.outlines.append(_outline(march, instant))
             if time.monotonic() - saved[0] > BETWEEN_DRAFTS:
-                observer.draft(float(number), drafted(march, films.readings, films.films))
+                tables = {"film": films.films, "outline": films.outlines}
+                observer.draft(float(number), drafted(march, films.readings, tables))
                 saved[0] = time.monotonic()
             observer.step(
                 label="t",
@@ -145,6 +156,11 @@ def _film(march: March, instant: Instant) -> dict[str, Array]:
     p = march.system.pressures(instant.x)[:: march.system.parameters.pressure_order]
     t = np.full(len(z), instant.t)
     return {"t_s": t, "x_mm": z, "h_um": 1e3 * h, "p_MPa": p}
+
+
+def _outline(march: March, instant: Instant) -> dict[str, Array]:
+    z, r = march.system.deformed(instant.x)[march.system.mesh.boundary].T
+    return {"t_s": np.full(len(z), instant.t), "z_mm": z.copy(), "r_mm": r.copy()}
 
 
 def _outcome(p: ORing, status: Status, message: str) -> Outcome:

@@ -66,18 +66,21 @@ def leave_films(march: March, past: list[Reading]) -> None:
 
 
 def drafted(
-    march: March, past: Sequence[Reading], films: Sequence[Mapping[str, Array]]
+    march: March, past: Sequence[Reading], parts: Mapping[str, Sequence[Mapping[str, Array]]]
 ) -> dict[str, Array]:
-    """A cycle in the middle of it: its readings and films so far, the march and its tangent.
+    """A cycle in the middle of it: its readings so far, the march and its tangent.
 
-    films: tables of one length each, one for every reading.
+    parts: name -> tables of the same columns that are kept as one.
     """
     tangent, loop = march.corrector.tangent, [asdict(reading) for reading in past]
     assert tangent.state is not None
     assert tangent.accepted is not None
     tables = {
         "loop": {name: np.array([r[name] for r in loop], dtype=float) for name in loop[0]},
-        "film": {name: np.concatenate([film[name] for film in films]) for name in films[0]},
+        **{
+            part: {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+            for part, tables in parts.items()
+        },
         "march": packed(march),
         "tangent": {
             "state": tangent.state,
@@ -88,8 +91,10 @@ def drafted(
     return {f"{t}/{name}": column for t, table in tables.items() for name, column in table.items()}
 
 
-def taken_up(march: March, arrays: Mapping[str, Array]) -> tuple[list[Reading], dict[str, Array]]:
-    """Put a march where `drafted` took it; the readings and the film of the cycle so far."""
+def taken_up(
+    march: March, arrays: Mapping[str, Array]
+) -> tuple[list[Reading], Mapping[str, dict[str, Array]]]:
+    """Put a march where `drafted` took it; the readings and the tables of the cycle so far."""
     tables: dict[str, dict[str, Array]] = {}
     for name, column in arrays.items():
         table, _, own = name.partition("/")
@@ -101,4 +106,4 @@ def taken_up(march: March, arrays: Mapping[str, Array]) -> tuple[list[Reading], 
     march.condense(t, tangent["state"])
     march.corrector.tangent.accepted = tangent["accepted"]
     march.corrector.tangent.outdated = bool(outdated)
-    return past, tables["film"]
+    return past, tables

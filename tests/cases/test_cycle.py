@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from pydantic import ValidationError
 
@@ -17,7 +18,9 @@ import softehl
 from softehl.cases.cycle import Cycle
 from softehl.cases.seal import cycles
 from softehl.cases.seal.motion import Motion, RodFilm, Table, differences
+from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report.cycle import (
+    MovingSection,
     film_map,
     loop_figure,
     map_figure,
@@ -310,10 +313,31 @@ def test_the_loop_says_what_a_cycle_costs() -> None:
 
 def test_an_animation_moves(tmp_path: Path) -> None:
     film, loop = film_and_loop()
-    write_animation(tmp_path / "cycle.gif", film, loop)
+    p, angle = ORing(), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    outline = {
+        "t_s": np.repeat([0.1, 1.0], 40),
+        "z_mm": np.tile(1.7 * np.cos(angle), 2),
+        "r_mm": np.concatenate([26.6 + 1.5 * np.sin(angle), 26.6 + 1.4 * np.sin(angle)]),
+    }
+    write_animation(tmp_path / "cycle.gif", p, film, loop, outline)
     with Image.open(tmp_path / "cycle.gif") as image:
         assert getattr(image, "n_frames", 1) >= 12
     assert [path.name for path in tmp_path.iterdir()] == ["cycle.gif"]
+
+
+def test_the_section_and_the_rod_of_an_animation_move() -> None:
+    p, axes = ORing(), Figure().subplots()
+    outline = {
+        "t_s": np.repeat([0.0, 1.0], 4),
+        "z_mm": np.tile([-1.0, 1.0, 1.0, -1.0], 2),
+        "r_mm": np.array([25.0, 25.0, 28.0, 28.0, 25.1, 25.1, 28.0, 28.0]),
+    }
+    section = MovingSection.on(axes, p, outline)
+    ring, marks = section.show(0.9, 0.3)
+    np.testing.assert_allclose(ring.get_xy()[:4, 1], [25.1, 25.1, 28.0, 28.0])
+    first = np.array(marks.get_segments())[:, 0, 0]
+    _, marks = section.show(0.9, 0.8)
+    np.testing.assert_allclose(np.array(marks.get_segments())[:, 0, 0], first + 0.5)
 
 
 @pytest.mark.parametrize(
