@@ -20,13 +20,13 @@ from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mpi import petsc, world
+from softehl.runtime.solve.condensation import SchurBySolves
 from softehl.runtime.solve.linear import (
     Factorisation,
     SingularMatrix,
     SparseMatrix,
     checked_row_sums,
 )
-from softehl.runtime.solve.superlu import SchurBySolves
 
 _PAUSE = 5e-4  # seconds between looks for a task: who waits leaves the core to the others
 
