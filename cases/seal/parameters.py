@@ -244,8 +244,8 @@ class ORing(SectionKeys):
     cavitation: Literal["penalty", "mass-conserving"] | None = key(
         None,
         "model of cavitation",
-        bounds='"penalty" (25) or "mass-conserving", left out = the latter with roughness and '
-        "where a section has two lobes",
+        bounds='"penalty" (25) or "mass-conserving", left out = the latter with roughness, '
+        "with a cavitation_pressure and where a section has two lobes",
     )
     cavitation_pressure: float = key(
         0.0, "mass-conserving: pressure of the ruptured film", unit="MPa", ge=-0.1, le=0
@@ -340,8 +340,9 @@ class ORing(SectionKeys):
     @property
     def conserving(self) -> bool:
         """Whether the film conserves mass where it ruptures."""
-        conserving = self.rough or self.lobes > 1
-        return self.cavitation == "mass-conserving" or (self.cavitation is None and conserving)
+        if self.cavitation is None:
+            return self.rough or self.lobes > 1 or self.cavitation_pressure < 0.0
+        return self.cavitation == "mass-conserving"
 
     @property
     def surfaces(self) -> Surfaces:
@@ -429,8 +430,12 @@ class ORing(SectionKeys):
 
     @model_validator(mode="after")
     def _film_has_its_model(self) -> Self:
-        if self.rough and not self.conserving:
-            raise ValueError('cavitation = "penalty" knows no roughness; leave cavitation out')
+        for name, given in (
+            ("roughness", self.rough),
+            ("cavitation_pressure", self.cavitation_pressure < 0.0),
+        ):
+            if given and not self.conserving:
+                raise ValueError(f'cavitation = "penalty" knows no {name}; leave cavitation out')
         if self.conserving and self.reynolds == "dg":
             raise ValueError('reynolds = "dg" knows the penalty only; use "fe", or leave it out')
         return self

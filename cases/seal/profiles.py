@@ -80,7 +80,8 @@ class Slider(Parameters):
             raise ValueError('reynolds = "dg" knows the penalty only; use "fe", or leave it out')
         if not self.conserving and self._beyond_penalty:
             raise ValueError(
-                'cavitation = "penalty" knows no roughness, supply or pocket; leave cavitation out'
+                'cavitation = "penalty" knows no roughness, supply, pocket or cavitation_pressure; '
+                "leave cavitation out"
             )
         return self
 
@@ -93,7 +94,8 @@ class Slider(Parameters):
 
     @property
     def _beyond_penalty(self) -> bool:
-        return any(self.roughness) or self.supply is not None or self.profile == "pocket"
+        asked = any(self.roughness) or self.supply is not None or self.cavitation_pressure < 0.0
+        return asked or self.profile == "pocket"
 
     @property
     def pocket(self) -> tuple[float, float]:

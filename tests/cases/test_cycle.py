@@ -273,6 +273,11 @@ def test_slow_and_fast_cycles_are_periodic_by_the_third(frequency: float, tmp_pa
     table = cycle(tmp_path / "c", f"frequency={frequency}")
     assert table["mass_error"].max() < 1e-9
     assert table["change_percent"][-1] < 0.5
+    page = (Path(__file__).parents[2] / "docs" / "film-physics.md").read_text(encoding="utf-8")
+    (line,) = [x for x in page.splitlines() if x.startswith("| largest friction of a cycle")]
+    said = [float(v) for v in line.split("|")[3].split(",")]
+    expected = said[0] if frequency < 1.0 else said[2]
+    assert table["friction_out_N"][-1] == pytest.approx(expected, rel=0.01)
 
 
 def film_and_loop(times: int = 12, nodes: int = 9) -> tuple[dict[str, Array], dict[str, Array]]:

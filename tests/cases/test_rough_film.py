@@ -91,6 +91,11 @@ def test_little_roughness_is_the_smooth_film() -> None:
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
 
 
+def test_a_pressure_of_cavitation_asks_for_the_film_that_has_one() -> None:
+    assert not ORing().conserving
+    assert ORing(cavitation_pressure=-0.05).conserving
+
+
 def test_without_roughness_the_pages_are_the_smooth_ones() -> None:
     default = build_system(ORing(density=1))
     zero = build_system(ORing.model_validate({"density": 1, "roughness": 0}))
@@ -104,6 +109,7 @@ def test_without_roughness_the_pages_are_the_smooth_ones() -> None:
     ("keys", "words"),
     [
         ({"roughness": 0.2, "cavitation": "penalty"}, "leave cavitation out"),
+        ({"cavitation_pressure": -0.05, "cavitation": "penalty"}, "leave cavitation out"),
         ({"roughness": 0.2, "reynolds": "dg"}, '"fe"'),
         ({"roughness": [0.1, -0.2]}, "greater than or equal to 0"),
         ({"boundary_friction": -0.1}, "greater than or equal to 0"),
