@@ -33,6 +33,7 @@ _SIGNATURE = (
 )
 _ffi = cffi.FFI()
 _DOUBLES = _ffi.typeof("double[]")
+_ffi.cdef("const char *softehl_signature(void);")
 
 Function = Callable[[tuple[int, int, int], Sequence[Array], Array, "Array | None"], None]
 """counts (elements, points, modes), arrays that are read, values and tangent that are written; the
@@ -67,7 +68,9 @@ class Library:
 
     def function(self, kernel: str, task: str) -> Function:
         """The C function of a task of a kernel."""
-        function = getattr(self.loaded, f"softehl_{kernel}_{task}")
+        name = f"softehl_{kernel}_{task}"
+        _declare(name)
+        function = getattr(self.loaded, name)
 
         def call(
             counts: tuple[int, int, int],
@@ -148,7 +151,7 @@ def _opened(path: Path, directory: Path, remedy: str = "") -> Library:
     if not _whole(path):
         raise StaleKernelsError(f"{path} or the digest beside it is damaged: {remedy}")
     try:
-        _ffi.cdef(_declarations(directory), override=True)
+        manifest(directory)
         library = Library(directory, _ffi.dlopen(str(path)), path)
         current = library.current
     except (OSError, AttributeError, UnicodeError, cffi.CDefError) as error:
@@ -191,10 +194,7 @@ def _sources_signature(directory: Path) -> str:
     return digest.hexdigest()
 
 
-def _declarations(directory: Path) -> str:
-    functions = [
-        f"void softehl_{name}_{task}{_SIGNATURE}"
-        for name, entry in manifest(directory).items()
-        for task in entry["tasks"]
-    ]
-    return "\n".join([*functions, "const char *softehl_signature(void);"])
+@cache
+def _declare(name: str) -> None:
+    """Tell cffi of a C function; to tell it of all of them at once takes half a second."""
+    _ffi.cdef(f"void {name}{_SIGNATURE}")

@@ -26,7 +26,16 @@ ORDER = {
         *("pipeline", "models", "tools"),
     ),
     "runtime": (
-        *("arrays mpi names tuning", "library", "io", "calls", "kernels", "mesh", "fem", "solve"),
+        *(
+            "arrays mpi names tuning",
+            "cut library",
+            "io",
+            "calls",
+            "kernels",
+            "mesh",
+            "fem",
+            "solve",
+        ),
         *("share", "statement", "system", "equations output", "result", "watch engines"),
         *("follow load march", "study"),
     ),

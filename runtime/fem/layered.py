@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.cut import Cut, Parts
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.guards import Guard
 from softehl.runtime.fem.problem import Problem
@@ -50,15 +51,11 @@ class Layer:
         """Number of unknowns m + k."""
         return len(self.shared) + len(self.own)
 
-
-def _leading(K: csc_array[np.float64], size: int) -> csc_array[np.float64]:
-    """The first rows and columns of K; K itself where there are no others."""
-    if K.shape[0] == size:
-        return K
-    end = K.indptr[size]
-    kept = K.indices[:end] < size
-    ends = np.concatenate([[0], np.cumsum(kept)])[K.indptr[: size + 1]]
-    return csc_array((K.data[:end][kept], K.indices[:end][kept], ends), shape=(size, size))
+    @cached_property
+    def cut(self) -> Cut:
+        """Where the entries of the tangent go."""
+        pattern = self.assembler.pattern
+        return Cut.of(pattern.indptr, pattern.indices, len(self.shared), self.size)
 
 
 def _renumbered(block: ElementBlock, compact: Integers) -> ElementBlock:
@@ -130,11 +127,11 @@ class Layered:
         r = layer.assembler.residual(x[layer.numbers], self.problem.parameters)
         return np.asarray(r[: layer.size])
 
-    def layer_linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
-        """Residual (m + k,) and tangent (m + k, m + k) of the layer, shared unknowns first."""
+    def layer_linearise(self, x: Array) -> tuple[Array, Parts]:
+        """Residual (m + k,) of the layer, shared unknowns first, and its tangent."""
         layer = self.layer
         r, K = layer.assembler.linearise(x[layer.numbers], self.problem.parameters)
-        return r[: layer.size], _leading(K, layer.size)
+        return r[: layer.size], layer.cut.parts(K.data)
 
     def layer_limit(self, x: Array, dx: Array) -> float:
         """Largest fraction of the step that the guards of the layer admit."""

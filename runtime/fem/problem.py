@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -145,12 +146,17 @@ class Problem:
 
     def scaled(self, r: Array) -> Array:
         """Residual (n,) over the reference size of its field; `norm` is the 2-norm of it."""
-        result = np.zeros_like(r)
+        return r * self._weights
+
+    @cached_property
+    def _weights(self) -> Array:
+        """One over the reference size of each residual, (n,)."""
+        weights = np.zeros(self.layout.total)
         for name in self.layout.names:
             if name not in self.scales:
                 raise ProblemError(f"field {name!r} has no scale: give one, it is needed here")
-            result[self.layout.part(name)] = r[self.layout.part(name)] / self.scales[name]
-        return result
+            weights[self.layout.part(name)] = 1.0 / np.asarray(self.scales[name])
+        return weights
 
     def measure(self, x: Array, K: csc_array[np.float64] | None) -> float:
         """Dimensionless size of the residual at x, (n,), inf where it is not finite.

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy import linalg as dense
-from scipy.sparse import csc_array
+from scipy.linalg import lapack
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.cut import Parts
 from softehl.runtime.solve.linear import SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import NonlinearProblem
 
@@ -49,8 +49,8 @@ class LayeredProblem(NonlinearProblem, Protocol):
         """L(x), (m + k,), shared unknowns first."""
         ...
 
-    def layer_linearise(self, x: Array) -> tuple[Array, SparseMatrix]:
-        """L(x), (m + k,), and its tangent, (m + k, m + k), csc."""
+    def layer_linearise(self, x: Array) -> tuple[Array, Parts]:
+        """L(x), (m + k,), and its tangent, cut after the shared unknowns."""
         ...
 
     def scaled(self, r: Array) -> Array:
@@ -85,7 +85,7 @@ class CondensedSystem:
         """Size of the residual at the outer iterate."""
         return residual_size(self.problem, self.at.r)
 
-    def linearise(self, y: Array) -> tuple[Array, SparseMatrix]:
+    def linearise(self, y: Array) -> tuple[Array, Parts]:
         """Residual (m + k,) and the layer's part of the tangent."""
         r, L = self.problem.layer_linearise(y)
         shared = self.problem.shared
@@ -100,21 +100,12 @@ class CondensedSystem:
         full[self.problem.own] = r[m:]
         return residual_size(self.problem, full)
 
-    def step(self, r: Array, L: SparseMatrix) -> Array:
+    def step(self, r: Array, L: Parts) -> Array:
         """Newton step (n,): the own unknowns by a banded solve, the shared by a dense one."""
-        m = len(self.problem.shared)
-        parts = Parts.of(L, m)
-        eliminated = solve_banded(parts.own, np.column_stack([parts.shared[m:], r[m:]]))
-        through = np.asarray(parts.right @ eliminated)[:m]
-        A = self.schur + parts.shared[:m] - through[:, :m]
-        b = r[:m] - through[:, m]
-        try:
-            a = dense.lu_solve(dense.lu_factor(A, check_finite=False), b, check_finite=False)
-        except (ValueError, np.linalg.LinAlgError) as error:
-            raise SingularMatrix(f"the condensed system: {error}") from error
+        shared, own = _solved(self.schur, L, r)
         step = np.zeros_like(self.at.x)
-        step[self.problem.shared] = -a
-        step[self.problem.own] = eliminated[:, :m] @ a - eliminated[:, m]
+        step[self.problem.shared] = -shared
+        step[self.problem.own] = -own
         if not np.isfinite(step).all():
             raise SingularMatrix("the condensed system has no finite solution")
         return step
@@ -123,58 +114,35 @@ class CondensedSystem:
         return self.problem.layer_limit(x, dx)
 
 
-@dataclass(frozen=True, eq=False)
-class Entries:
-    """Entries of a matrix (size, size): rows, columns and values, none twice."""
+def _solved(schur: Array, L: Parts, r: Array) -> tuple[Array, Array]:
+    """Shared (m,) and own unknowns (k,) of the layer's tangent with S (m, m) added, for r (m + k,).
 
-    size: int
-    rows: Integers
-    columns: Integers
-    values: Array
-
-    @classmethod
-    def of(cls, A: SparseMatrix) -> Entries:
-        """Those of a sparse matrix."""
-        entries = A.tocoo()
-        rows, columns = (part.astype(np.int64) for part in entries.coords)
-        return cls(A.shape[0], rows, columns, entries.data)
-
-
-@dataclass(frozen=True, eq=False)
-class Parts:
-    """A layer's tangent, cut between its shared and its own unknowns.
-
-    shared: (m + k, m) its first columns, dense.  right: (m + k, k) the others.  own: (k, k).
+    Raises SingularMatrix.
     """
-
-    shared: Array
-    right: SparseMatrix
-    own: Entries
-
-    @classmethod
-    def of(cls, L: SparseMatrix, m: int) -> Parts:
-        """Cut L (m + k, m + k), csc without entries that are given twice."""
-        size, first = L.shape[0], L.indptr[m]
-        columns = np.repeat(np.arange(size), np.diff(L.indptr))
-        shared = np.zeros((size, m))
-        shared[L.indices[:first], columns[:first]] = L.data[:first]
-        rows, data = L.indices[first:], L.data[first:]
-        right = csc_array((data, rows, L.indptr[m:] - first), shape=(size, size - m))
-        inner = (rows >= m) & (data != 0.0)  # elements couple more than their equations do
-        chosen = rows[inner].astype(np.int64) - m, columns[first:][inner] - m
-        return cls(shared, right, Entries(size - m, *chosen, data[inner]))
+    m = L.cut.m
+    eliminated = eliminated_own(L, np.column_stack([L.shared[m:], r[m:]]))
+    through = np.asarray(L.right @ eliminated)
+    A, b = schur + L.shared[:m] - through[:, :m], r[:m] - through[:, m]
+    _, _, shared, info = lapack.dgesv(A, b, overwrite_a=True, overwrite_b=True)
+    if info:
+        raise SingularMatrix("the condensed system has no LU factors")
+    return shared, eliminated[:, m] - eliminated[:, :m] @ shared
 
 
-def solve_banded(A: Entries, b: Array) -> Array:
-    """A^-1 b, (k, j), by LU of the band that holds A (k, k); raises SingularMatrix."""
-    offset = A.rows - A.columns
-    lower, upper = int(offset.max(initial=0)), int(-offset.min(initial=0))
-    band = np.zeros((lower + upper + 1, A.size))
-    band[upper + offset, A.columns] = A.values
-    try:
-        return np.asarray(dense.solve_banded((lower, upper), band, b, check_finite=False))
-    except np.linalg.LinAlgError as error:
-        raise SingularMatrix(f"the layer's own unknowns: {error}") from error
+def eliminated_own(L: Parts, b: Array) -> Array:
+    """A^-1 b, (k, j), of the matrix A of the own unknowns, whose band is overwritten.
+
+    Raises SingularMatrix.
+    """
+    cut = L.cut
+    if not cut.k:
+        return b
+    _, _, x, info = lapack.dgbsv(
+        cut.lower, cut.upper, L.own, b, overwrite_ab=True, overwrite_b=True
+    )
+    if info:
+        raise SingularMatrix("the layer's own unknowns are not determined")
+    return np.asarray(x)
 
 
 def residual_size(problem: NonlinearProblem, r: Array) -> float:

@@ -14,8 +14,9 @@ import pytest
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.cut import Cut, Parts
 from softehl.runtime.solve import pardiso
-from softehl.runtime.solve.condensed import Entries, Parts, solve_banded
+from softehl.runtime.solve.condensed import eliminated_own
 from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.linear import Condenser, SingularMatrix
 from softehl.runtime.solve.modified_newton import ModifiedNewton
@@ -103,8 +104,8 @@ class Chain:
     def layer_residual(self, x: Array) -> Array:
         return np.asarray(self._layer(x)[0] - self._sources()[1])
 
-    def layer_linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
-        return self.layer_residual(x), csc_array(self._layer(x)[1])
+    def layer_linearise(self, x: Array) -> tuple[Array, Parts]:
+        return self.layer_residual(x), Parts.of(csc_array(self._layer(x)[1]), M)
 
     def scaled(self, r: Array) -> Array:
         return r
@@ -238,11 +239,11 @@ def test_a_start_that_is_not_finite_is_named() -> None:
 def test_banded_solve_against_a_dense_one(rng: np.random.Generator) -> None:
     A = np.diag(rng.normal(size=8)) + np.diag(rng.normal(size=7), 1) + np.diag(np.ones(6), -2)
     b = rng.normal(size=(8, 3))
-    assert solve_banded(Entries.of(csc_array(A)), b) == pytest.approx(
+    assert eliminated_own(Parts.of(csc_array(A), 0), b) == pytest.approx(
         np.linalg.solve(A, b), rel=1e-9
     )
     with pytest.raises(SingularMatrix):
-        solve_banded(Entries.of(csc_array(np.zeros((3, 3)))), np.ones((3, 1)))
+        eliminated_own(Parts.of(csc_array(np.zeros((3, 3))), 0), np.ones((3, 1)))
 
 
 # --- the corrector -----------------------------------------------------------------------------
@@ -401,8 +402,18 @@ def test_a_tangent_cut_between_shared_and_own_unknowns() -> None:
     rng = np.random.default_rng(3)
     A = np.where(rng.random((9, 9)) < 0.5, rng.random((9, 9)), 0.0)
     parts = Parts.of(csc_array(A), 4)
-    own = np.zeros((5, 5))
-    own[parts.own.rows, parts.own.columns] = parts.own.values
+    cut = parts.cut
+    rows, columns = np.indices((5, 5))
+    own = parts.own[np.clip(cut.lower + cut.upper + rows - columns, 0, None), columns]
     assert (parts.shared == A[:, :4]).all()
-    assert (parts.right.toarray() == A[:, 4:]).all()
+    assert (parts.right.toarray() == A[:4, 4:]).all()
     assert (own == A[4:, 4:]).all()
+
+
+def test_a_cut_leaves_out_what_is_prescribed() -> None:
+    rng = np.random.default_rng(4)
+    A = csc_array(np.where(rng.random((9, 9)) < 0.7, rng.random((9, 9)), 0.0))
+    some, all_of_it = Cut.of(A.indptr, A.indices, 4, 7).parts(A.data), Parts.of(A[:7, :7], 4)
+    assert (some.shared == all_of_it.shared).all()
+    assert (some.right.toarray() == all_of_it.right.toarray()).all()
+    assert (some.own == all_of_it.own).all()
