@@ -41,7 +41,7 @@ def profiles_figure(p: ORing, results: Results) -> Figure:
             pressure.plot(profile.x_mm, profile.p_MPa, **line)
             film.plot(profile.x_mm, profile.h_um, label=label, **line)
         pressure.set_title(style.STROKES[stroke])
-        film.legend(title="$|U|$ [mm/s]", loc="upper center", ncols=2)
+        film.legend(title="|U| [mm/s]", loc="upper center", ncols=2)
         film.set_xlabel(style.POSITION)
     axes[0, 0].set_ylabel(style.PRESSURE)
     axes[1, 0].set_ylabel(style.FILM)

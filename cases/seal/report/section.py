@@ -92,10 +92,10 @@ def section_figure(p: ORing, views: Sequence[View]) -> Figure:
     for axes, view in zip(panels, views, strict=True):
         shown = draw_view(axes, p, view, scale)
         speed = f"{view.row.rod_speed_mm_s:+g}".replace("-", "\N{MINUS SIGN}")
-        film = f"$U$ = {speed} mm/s, $h^{{*}}$ = {view.row.h_star_um:.3g} µm"
+        film = f"U = {speed} mm/s, h* = {view.row.h_star_um:.3g} µm"
         axes.set_title(f"{style.STROKES[view.row.stroke]}, {film}")
-        axes.set_xlabel("$z$ [mm]")
-    panels[0].set_ylabel("$r$ [mm]")
+        axes.set_xlabel("z [mm]")
+    panels[0].set_ylabel("r [mm]")
     style.set_margins(figure, left=left, right=bar, bottom=0.48, top=0.82, between=0.05)
     _, low, right, high = panels[-1].get_position(original=True).extents
     width = figure.get_size_inches()[0]
