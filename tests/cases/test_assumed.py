@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from softehl.__main__ import main
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.shipped import SHIPPED
 
@@ -56,19 +53,6 @@ def test_what_is_given_is_not_assumed(given: str, gone: str) -> None:
 def test_another_section_has_its_proportions() -> None:
     assert "the usual proportions of section x_ring" in assumed("section=x_ring")
     assert "proportions" not in str(assumed("section=x_ring", "lobe_radius=0.9"))
-
-
-def test_a_run_says_it_below_its_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    case = tmp_path / "case.toml"
-    case.write_text('case = "oring"\nring = "AS568-210"\nrod = 19\n', encoding="utf-8")
-    fast = ["density=1", "speeds=800", "stroke=out", "error_estimate=false"]
-    command = ["run", str(case), "--out", str(tmp_path / "a"), *(f"--set={text}" for text in fast)]
-    assert main(command) == 0
-    (line,) = (x for x in capsys.readouterr().out.splitlines() if x.startswith("assumed: "))
-    assert "65.9 mPa s" in line
-    assert "rod of" not in line
-    assert main([*command, "--overwrite", "--quiet"]) == 0
-    assert capsys.readouterr().out == ""
 
 
 def test_a_slider_assumes_nothing() -> None:

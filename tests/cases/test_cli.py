@@ -346,6 +346,16 @@ def test_a_run_writes_its_files(here: Path, invoke: Invoke) -> None:
     assert err[0] == "contact, p_s = 1 MPa, stroke both"
 
 
+def test_a_run_says_what_it_assumed(here: Path, invoke: Invoke) -> None:
+    (here / "case.toml").write_text('case = "oring"\nring = "AS568-210"\nrod = 19\n')
+    code, out, _ = invoke("run", "case.toml", *FAST)
+    (line,) = (text for text in out if text.startswith("assumed: "))
+    assert code == 0
+    assert "65.9 mPa s" in line
+    assert "a rod of" not in line
+    assert invoke("run", "case.toml", *FAST, "--quiet", "--overwrite")[1] == []
+
+
 def test_run_json(here: Path, invoke: Invoke) -> None:
     assert invoke("run", "oring", *FAST, "--set", "density=4", "--out", "a")[0] == 0
     content = run_json(here / "a")

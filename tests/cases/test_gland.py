@@ -131,7 +131,8 @@ def test_glands_of_the_random_sample(number: int) -> None:
         assert state.verdict != OK or 0.95 <= state.inlet_ratio <= 1.02
 
 
-def test_a_film_thinner_than_the_way_of_the_rod_is_resolved_where_it_is() -> None:
+@pytest.mark.parametrize("estimate", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_film_thinner_than_the_way_of_the_rod_is_resolved_where_it_is(estimate: bool) -> None:
     """2 mm/s: h* was 0.0361 um, with an inlet of 1.8 segments 10 um beside the fine ones.
 
     Density 4 of that mesh gave 0.0402.
@@ -143,11 +144,12 @@ def test_a_film_thinner_than_the_way_of_the_rod_is_resolved_where_it_is() -> Non
         housing_diameter=12.6222,
         speeds=(2.0,),
         stroke="out",
+        error_estimate=estimate,
     )
     state = run(p, Silent()).states[0]
     assert state.verdict == OK
     assert state.h_star_um == pytest.approx(0.0403, rel=5e-3)
-    assert abs(state.h_star_error_percent) < 1.0
+    assert not estimate or abs(state.h_star_error_percent) < 1.0
     assert state.inlet_segments > 8.0
 
 
