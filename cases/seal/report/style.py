@@ -50,7 +50,8 @@ def subject(p: ORing) -> str:
         f"rod {p.rod_diameter:g} mm, housing {p.housing_diameter:g} mm\n"
         f"rubber μ = {p.shear_modulus:g} MPa, κ = {p.bulk_modulus:g} MPa; "
         f"pₛ = {p.sealed_pressure:g} MPa\n"
-        f"oil η₀ = {p.viscosity * 1e9:g} mPa s, \N{GREEK SMALL LETTER ALPHA} = {p.pressure_viscosity:g} /MPa"
+        f"oil η₀ = {p.viscosity * 1e9:g} mPa s, "
+        f"\N{GREEK SMALL LETTER ALPHA} = {p.pressure_viscosity:g} /MPa"
     )
 
 
