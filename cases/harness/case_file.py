@@ -51,10 +51,21 @@ def read_case(
     typed = [(text, "--set") for text in assignments]
     typed += [(f"{key}={text}", f"--{key}") for key, text in options.items()]
     for text, origin in typed:
-        key, values[key] = read_assignment(text, origin)
-        origins[key] = origin
+        key, value = read_assignment(text, origin)
+        origins[_put(values, key, value)] = origin
     checked = validated(case.parameters, values, origins)
     return Run(case, checked, given=frozenset(values))
+
+
+def _put(values: dict[str, Any], key: str, value: object) -> str:
+    """Set a key, or with dots a key of a table in it, as TOML has it; the first of them."""
+    *tables, last = key.split(".")
+    for name in tables:
+        inner = values.get(name)
+        values[name] = dict(inner) if isinstance(inner, dict) else {}
+        values = values[name]
+    values[last] = value
+    return key.partition(".")[0]
 
 
 def find_case(given: str, shipped: Shipped) -> tuple[AnyCase, dict[str, Any]]:

@@ -17,7 +17,7 @@ from softehl.cases.seal.loads import ContactLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
 from softehl.cases.seal.pressure_newton import PressureNewton
-from softehl.cases.seal.system import AIR_WALL, BORE, ROD, SEALED_WALL, SOLID
+from softehl.cases.seal.system import AIR_WALL, BORE, ROD, SEALED_WALL
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
@@ -219,7 +219,9 @@ def along(system: SealSystem, newton: Newton) -> Corrector | None:
     p = system.parameters
     if p.solver != "auto" or p.rubs:
         return None
-    return PressureNewton(newton, SOLID, load_kernel("follower_pressure"), p.bulk_modulus)
+    return PressureNewton(
+        newton, system.solids, load_kernel("follower_pressure"), system.bulk_moduli
+    )
 
 
 def contact_stage(

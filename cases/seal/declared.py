@@ -51,12 +51,12 @@ class Field:
 class Block:
     """Elements of one kernel.
 
-    kernel: its name; {solid} stands for the case's solid. elements: a set of
-    `SealSection.elements`. fields: whose unknowns its dof map holds, in this order. group: which
-    values its parameters are taken from. layer: whether it belongs to the film in the modified
-    Newton iteration, which then treats it exactly. needed: whether a case has it. rule: its
-    quadrature for a case and an order of the pressure, None for the kernel's own. constant: the
-    tangent depends on parameters alone.
+    kernel: its name; {solid} stands for the solid of its region, "" where it is the case's.
+    elements: a set of `SealSection.elements`. fields: whose unknowns its dof map holds, in this
+    order. group: which values its parameters are taken from. layer: whether it belongs to the film
+    in the modified Newton iteration, which then treats it exactly. needed: whether a case has it.
+    rule: its quadrature for a case and an order of the pressure, None for the kernel's own.
+    constant: the tangent depends on parameters alone.
     """
 
     name: str
@@ -68,10 +68,11 @@ class Block:
     needed: Callable[[ORing], bool] = lambda _: True
     rule: Callable[[ORing, int], Rule] | None = None
     constant: bool = False
+    region: str = ""
 
     def kernel_of(self, p: ORing) -> str:
         """Name of the kernel in a case."""
-        return self.kernel.format(solid=p.solid_kernel)
+        return self.kernel.format(solid=p.rubber(self.region).solid_kernel(p.solid))
 
 
 @dataclass(frozen=True, eq=False)

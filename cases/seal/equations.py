@@ -17,7 +17,6 @@ from softehl.cases.seal.section import SealSection, seal_section
 from softehl.cases.seal.system import (
     AIR_WALL,
     AXIAL,
-    BLOCKS,
     BORE,
     DISPLACEMENT,
     FIELDS,
@@ -29,6 +28,7 @@ from softehl.cases.seal.system import (
     VOID,
     WALLS,
     Values,
+    blocks_of,
     contact_values,
     faded_values,
     film_values,
@@ -72,11 +72,11 @@ class SealSystem:
         p: ORing,
         section: SealSection,
         fields: tuple[Field, ...] = FIELDS,
-        blocks: tuple[Block, ...] = BLOCKS,
+        blocks: tuple[Block, ...] | None = None,
     ) -> SealSystem:
         """The system of a case on a section."""
         numbering = Numbering.of(fields, p, section)
-        present = tuple(b for b in blocks if b.needed(p))
+        present = tuple(b for b in blocks or blocks_of(p) if b.needed(p))
         constants = _contact_constants(p, section, present)
         elements = [numbering.element_block(b, p, constants.get(b.name)) for b in present]
         cells = section.coordinates("cells"), numbering.rows(DISPLACEMENT, "cells")
@@ -120,6 +120,25 @@ class SealSystem:
     def mesh(self) -> SectionMesh:
         """The undeformed mesh."""
         return self.section.mesh
+
+    @property
+    def solids(self) -> tuple[str, ...]:
+        """Names of the blocks of the solid; their elements in order are those of the mesh."""
+        return tuple(block.name for block in self.blocks if block.group == "solid")
+
+    @property
+    def bulk_moduli(self) -> Array:
+        """Bulk modulus (elements,) of each element, MPa."""
+        blocks = [block for block in self.blocks if block.group == "solid"]
+        return np.concatenate(
+            [
+                np.full(
+                    len(self.section.elements[b.elements]),
+                    self.parameters.rubber(b.region).bulk_modulus,
+                )
+                for b in blocks
+            ]
+        )
 
     @property
     def rod_radius(self) -> float:
@@ -407,7 +426,8 @@ def _contact_constants(
     obstacles, found = obstacles_of(p), {}
     for block in (b for b in blocks if b.group == "contact"):
         chain = section.chains[block.elements]
-        values = contact_data(obstacles[block.name], section.mesh.points, *chain, p.shear_modulus)
+        stiffness = section.node_moduli(p)[chain[0]]
+        values = contact_data(obstacles[block.name], section.mesh.points, *chain, stiffness)
         known = dict(zip(("n_z", "n_r", "c", "area", "rho"), values.T, strict=True))
         names, none = load_kernel(block.kernel_of(p)).data, np.zeros(len(values))
         found[block.name] = np.stack([known.get(name, none) for name in names], axis=1)

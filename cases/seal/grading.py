@@ -124,14 +124,14 @@ def inlet_length(p: ORing, rise: float) -> float:
 
     Between rough surfaces at least that over which h = K l^(3/2) / E rises by sigma.
     """
-    flow, E = p.viscosity * min(p.speeds), 3.0 * p.shear_modulus
+    flow, E = p.viscosity * min(p.speeds), 3.0 * p.surface_modulus
     asperities = (p.surfaces.sigma * E / rise**0.5) ** (2.0 / 3.0)
     return float(max((flow * E**2 / rise**1.5) ** 0.4, asperities))
 
 
 def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
     """About half of h* (mm) at |U|, K l^(3/2) / E with the l of the head of this page."""
-    flow, E = p.viscosity * speed, 3.0 * p.shear_modulus
+    flow, E = p.viscosity * speed, 3.0 * p.surface_modulus
     return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
 
 

@@ -18,6 +18,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.postprocess import run_around
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.outline_mesh import outline_mesh
+from softehl.runtime.mesh.parted_mesh import parted_mesh
 from softehl.runtime.mesh.sections import LAYERS, SHORT, Disc, SectionMesh, disc_mesh
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 
@@ -238,7 +239,8 @@ class OutlineLayout:
 
     def mesh(self, density: int | Fraction) -> SectionMesh:
         """See `Layout`."""
-        return outline_mesh(self.shape, self.film, self.spacing, self.long, density)
+        mesh = parted_mesh if self.shape.chord else outline_mesh
+        return mesh(self.shape, self.film, self.spacing, self.long, density)
 
     def pressed(self, mesh: SectionMesh) -> int:
         """See `Layout`: from the node nearest to where the housing ends the pressure."""

@@ -8,15 +8,17 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from softehl.cases.harness.parameters import key
-from softehl.cases.seal import materials
 from softehl.cases.seal.catalogue import Ring
 from softehl.cases.seal.fitting import fitted
 from softehl.cases.seal.oils import with_oil
-from softehl.cases.seal.rubber import require_stable, with_rubber
+from softehl.cases.seal.regions import MATERIALS, Region, with_regions
+from softehl.cases.seal.rubber import with_rubber
+from softehl.cases.seal.rubber_keys import RubberKeys
 from softehl.cases.seal.sections.keys import SectionKeys, lobes, with_outline
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness, Surfaces
 from softehl.cases.seal.tolerances import read_tolerances
 from softehl.runtime.mesh.outline import Shape
+from softehl.runtime.mesh.parted_mesh import CAP
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
@@ -28,13 +30,7 @@ _LOWEST_ESTIMATED = 3
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 
 
-Terms = Annotated[
-    tuple[Annotated[float, Field(strict=True, allow_inf_nan=False)], ...],
-    Field(min_length=1, max_length=3, strict=False),
-]
-
-
-class ORing(SectionKeys):
+class ORing(SectionKeys, RubberKeys):
     """Everything that defines one run of the O-ring case, or of a seal of another section.
 
     Raises pydantic.ValidationError also for a geometry in which the seal is not squeezed.
@@ -176,40 +172,6 @@ class ORing(SectionKeys):
     )
     rod_diameter: float = key(50.0, "rod diameter D_rod", unit="mm", gt=0)
     housing_diameter: float = key(56.30, "inner diameter of the housing D_housing", unit="mm", gt=0)
-    material: materials.Name = key("mooney-rivlin", "rubber")
-    mu_1: float | None = key(3.04, "Mooney-Rivlin parameter mu_1 of (3)", unit="MPa", gt=0, le=1000)
-    mu_2: float | None = key(0.62, "Mooney-Rivlin parameter mu_2 of (3)", unit="MPa", ge=0, le=1000)
-    mu: float | None = key(
-        None, "modulus mu of neo-hooke, arruda-boyce and gent", unit="MPa", gt=0, le=1000
-    )
-    c_10: float | None = key(None, "Yeoh coefficient of I1bar - 3", unit="MPa", gt=0, le=1000)
-    c_20: float | None = key(None, "Yeoh coefficient of (I1bar - 3)^2", unit="MPa", ge=-1e3, le=1e3)
-    c_30: float | None = key(None, "Yeoh coefficient of (I1bar - 3)^3", unit="MPa", ge=-1e3, le=1e3)
-    ogden_mu: Terms | None = key(
-        None, "Ogden moduli mu_p", unit="MPa", bounds="a number or a list of up to 3"
-    )
-    ogden_alpha: Terms | None = key(
-        None, "Ogden exponents alpha_p", bounds="a number or a list of up to 3, none 0"
-    )
-    lambda_m: float | None = key(
-        None, "Arruda-Boyce stretch at which the chains lock", gt=1, le=1000
-    )
-    J_m: float | None = key(None, "Gent limit of I1bar - 3", gt=0, le=1e6)
-    shore_A: float | None = key(
-        None,
-        "hardness Shore A, for mu by Gent's rule; +- 5 Shore are about +- 25 % of it",
-        bounds="20 to 90",
-        ge=20,
-        le=90,
-    )
-    fit: str | None = key(
-        None,
-        "tests of the rubber, for the parameters of its material",
-        bounds="a CSV file with the columns test, stretch, stress_MPa",
-        file=True,
-    )
-    ogden_terms: int = key(3, "terms of an Ogden fit", bounds="1, 2 or 3", ge=1, le=3)
-    bulk_modulus: float = key(500.0, "bulk modulus kappa of (6)", unit="MPa", gt=0, le=1e5)
     viscosity: float = key(
         6.59e-8,
         "viscosity eta_0 at zero pressure of (13)",
@@ -265,6 +227,8 @@ class ORing(SectionKeys):
     )
     boundary_friction: float = key(0.1, "friction coefficient of touching asperities", ge=0, le=2)
 
+    materials: dict[str, Region] = key({}, "materials of regions of the section", bounds=MATERIALS)
+
     groove_width: float = key(3.74, "axial width of the groove", unit="mm", gt=0)
     groove_centre: float = key(
         0.0,
@@ -292,7 +256,7 @@ class ORing(SectionKeys):
     @classmethod
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
         """Diameters and width from ring, rod, squeeze and gland; rubber and oil.  ValueError."""
-        return with_oil(with_rubber(fitted(with_outline(dict(given)))))
+        return with_oil(with_rubber(with_regions(fitted(with_outline(dict(given))))))
 
     @property
     def free_section(self) -> Shape:
@@ -347,7 +311,7 @@ class ORing(SectionKeys):
     @property
     def surfaces(self) -> Surfaces:
         """Roughness, asperities and their friction; rubber on rigid asperities is as E* = 4 G."""
-        stiffness = self.asperity_stiffness or 4.0 * self.shear_modulus
+        stiffness = self.asperity_stiffness or 4.0 * self.surface_modulus
         return Surfaces.of(self.roughness, stiffness, self.boundary_friction)
 
     @property
@@ -356,25 +320,13 @@ class ORing(SectionKeys):
         return self.extrusion_gap > 0.0
 
     @property
-    def shear_modulus(self) -> float:
-        """Shear modulus in the initial configuration, mu of (3) [MPa]."""
-        return materials.shear_modulus(materials.MATERIALS[self.material], self._rubber)
+    def surface_modulus(self) -> float:
+        """Shear modulus of what the film is on [MPa]."""
+        return self.rubber(CAP if CAP in self.materials else "").shear_modulus
 
-    @property
-    def rubber_values(self) -> dict[str, float]:
-        """Parameters of the solid's kernel."""
-        own = materials.MATERIALS[self.material].kernel_values(self._rubber)
-        return {**own, "kappa": self.bulk_modulus}
-
-    @property
-    def solid_kernel(self) -> str:
-        """Name of the solid's kernel: element, and energy where it is not the paper's."""
-        energy = materials.MATERIALS[self.material].energy
-        return f"solid_{self.solid}" + ("" if energy == "mooney_rivlin" else f"_{energy}")
-
-    @property
-    def _rubber(self) -> dict[str, Any]:
-        return {key: getattr(self, key) for key in materials.KEYS}
+    def rubber(self, region: str) -> RubberKeys:
+        """What a region of the section is made of; "" where it has no material of its own."""
+        return self.materials[region] if region else self
 
     @field_validator("density", mode="before")
     @classmethod
@@ -392,14 +344,14 @@ class ORing(SectionKeys):
         return speeds
 
     @model_validator(mode="after")
-    def _rubber_is_sound(self) -> Self:
-        energy = materials.MATERIALS[self.material].energy
-        if self.solid != "taylor_mean" and energy != "mooney_rivlin":
-            raise ValueError(
-                f'material = "{self.material}" and solid = "{self.solid}": other elements than '
-                '"taylor_mean" have "mooney-rivlin" and "neo-hooke" alone; leave solid out'
-            )
-        require_stable(self.material, self._rubber)
+    def _rubber_has_an_element(self) -> Self:
+        rubbers: tuple[RubberKeys, ...] = (self, *self.materials.values())
+        for rubber in rubbers:
+            if self.solid != "taylor_mean" and rubber.energy != "mooney_rivlin":
+                raise ValueError(
+                    f'material = "{rubber.material}" and solid = "{self.solid}": other elements '
+                    'than "taylor_mean" have "mooney-rivlin" and "neo-hooke" alone; leave solid out'
+                )
         return self
 
     @model_validator(mode="after")
@@ -489,8 +441,16 @@ class ORing(SectionKeys):
     def _section_is_one(self) -> Self:
         self.sized(self.section_diameter)
         if self.round:
+            if self.materials:
+                raise ValueError(
+                    'materials and cap_thickness: not for section = "round"; leave them out'
+                )
             return self
         _ = self.free_section
+        has = ", ".join(self.regions) or "no regions; cap_thickness makes one"
+        for name in self.materials:
+            if name not in self.regions:
+                raise ValueError(f"materials.{name}: the section has {has}")
         for name, given in (
             ("arc_start and arc_end", self.arc_start is not None),
             ("extrusion_gap", self.opens),

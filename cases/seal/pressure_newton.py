@@ -18,14 +18,14 @@ class PressureNewton:
 
     A predictor of continuation spoils volume ratios like any interpolation: with the pressures of
     the last solution, steps are as long as those of a compressible solid. `pressures`, (Q,), None
-    until the first solve, changes with every solution; the rest are settings: solid, follower and
+    until the first solve, changes with every solution; the rest are settings: solids, follower and
     stiffness as of `LaggedPressure.of`, starts the iterations of the first solve.
     """
 
     newton: Newton
-    solid: str
+    solids: tuple[str, ...]
     follower: ElementKernel
-    stiffness: float
+    stiffness: Array
     starts: int = 40
     pressures: Array | None = None
 
@@ -34,9 +34,9 @@ class PressureNewton:
         newton, pressures = self.newton, self.pressures
         if pressures is None:
             newton = replace(newton, max_iterations=self.starts)
-            pressures = element_pressures(problem, self.solid, x0)
-        lagged = LaggedPressure.of(problem, self.solid, self.follower, pressures, self.stiffness)
+            pressures = element_pressures(problem, self.solids, x0)
+        lagged = LaggedPressure.of(problem, self.solids, self.follower, pressures, self.stiffness)
         solution = newton.solve(lagged, x0)
         if solution.converged:
-            self.pressures = element_pressures(problem, self.solid, solution.x)
+            self.pressures = element_pressures(problem, self.solids, solution.x)
         return solution

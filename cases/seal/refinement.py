@@ -18,7 +18,6 @@ from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
-from softehl.cases.seal.system import SOLID
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.kernels import load_kernel
@@ -140,14 +139,14 @@ def carried_contact(
     out. The start is nan, which Newton's method rejects, where the state cannot be carried over.
     """
     carry, p = _carrier(old, new), new.parameters
-    pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), SOLID, x)
+    pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), old.solids, x)
     y = _unknowns(old, new, carry, x)
     problem = LaggedPressure.of(
         contact_problem(new, settings, p.sealed_pressure).since(y),
-        SOLID,
+        new.solids,
         load_kernel("follower_pressure"),
         carry.elements(pressures),
-        p.bulk_modulus,
+        new.bulk_moduli,
     )
     stage = contact_stage(new, problem, method=f"newton, {carry.words}", name=name)
     return stage, y

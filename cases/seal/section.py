@@ -18,6 +18,9 @@ from softehl.cases.seal.parameters import ORing
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.sections import SectionMesh
 
+BODY = "body"
+"""The elements without a material of their own: all of them, or what is left."""
+
 
 @dataclass(frozen=True, eq=False)
 class SealSection:
@@ -25,11 +28,13 @@ class SealSection:
 
     layout: of the mesh. placed: whether its arc was placed by the contact; then every
     boundary node may touch the walls of the groove, else (the paper's scheme) those off the arc.
+    own: regions with materials of their own, whose elements come first, in this order.
     """
 
     layout: Layout
     mesh: SectionMesh
     placed: bool = False
+    own: tuple[str, ...] = ()
 
     @cached_property
     def elements(self) -> Mapping[str, Integers]:
@@ -41,6 +46,7 @@ class SealSection:
         mesh, arc = self.mesh, self.mesh.arc_nodes
         return {
             "cells": mesh.quads,
+            **self._solids(),
             "arc": mesh.arc_segments,
             "facets": np.stack([arc[:-2], arc[1:-1], arc[2:]], axis=1),
             "sealed_side": self._sealed_side(),
@@ -97,6 +103,24 @@ class SealSection:
         nodes = self.elements[elements]
         return np.ascontiguousarray(self.mesh.points[nodes].reshape(len(nodes), -1))
 
+    def node_moduli(self, p: ORing) -> Array:
+        """Shear modulus (nodes,) of the stiffest material at a node, MPa."""
+        found = np.full(len(self.mesh.points), p.shear_modulus)
+        for name in self.own:
+            nodes = self.elements[name]
+            found[nodes] = np.maximum(found[nodes], p.rubber(name).shear_modulus)
+        return found
+
+    def _solids(self) -> dict[str, Integers]:
+        """Elements of each region with a material of its own, and BODY, the others behind them."""
+        mesh, done = self.mesh, 0
+        found = {}
+        for name in self.own:
+            cells = mesh.regions[name]
+            assert np.array_equal(cells, np.arange(done, done + len(cells)))
+            found[name], done = mesh.quads[cells], done + len(cells)
+        return {**found, BODY: mesh.quads[done:]}
+
     def _sealed_side(self) -> Integers:
         """Segments from the crown to the sealed end of the arc."""
         return self.mesh.outer_segments[self.layout.pressed(self.mesh) :]
@@ -110,4 +134,5 @@ def seal_section(
     layout: of the mesh, with equal segments if left out. density: instead of the case's.
     """
     layout = layout or uniform_layout(p)
-    return SealSection(layout, layout.mesh(density or p.density), placed=p.given_arc is None)
+    mesh, own = layout.mesh(density or p.density), tuple(p.materials)
+    return SealSection(layout, mesh, placed=p.given_arc is None, own=own)

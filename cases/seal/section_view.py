@@ -9,7 +9,6 @@ import numpy as np
 
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.state import Section
-from softehl.cases.seal.system import SOLID
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.postprocess import nodal_average, von_mises
@@ -24,7 +23,8 @@ def section_view(system: SealSystem, problem: Problem, x: Array, rod_pressure: A
     principal stretches in their middle.
     """
     mesh = system.mesh
-    fields = problem.fields(SOLID, x)
+    found = [problem.fields(solid, x) for solid in system.solids]
+    fields = {name: np.concatenate([f[name] for f in found]) for name in found[0]}
     stresses = {name: fields[f"sigma_{name}"] for name in ("zz", "rr", "tt", "zr")}
     kept = {name: value for name, value in fields.items() if name not in ("z", "r")}
     on_rod = np.zeros(len(mesh.points))

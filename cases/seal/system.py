@@ -8,6 +8,7 @@ and nobody else knows how fields are called and where their unknowns stand.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from math import copysign
 from typing import TypeAlias
 
@@ -15,7 +16,7 @@ from softehl.cases.seal import scales
 from softehl.cases.seal.declared import Block, Field, Place
 from softehl.cases.seal.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.section import SealSection
+from softehl.cases.seal.section import BODY, SealSection
 from softehl.cases.seal.surfaces import void_values
 from softehl.runtime.fem.contact import Obstacle, inner_cylinder, outer_cylinder, plane
 from softehl.runtime.fem.rules import (
@@ -92,7 +93,7 @@ FIELDS = (
 )
 
 BLOCKS = (
-    Block(SOLID, "{solid}", "cells", (DISPLACEMENT,), "solid"),
+    Block(SOLID, "{solid}", BODY, (DISPLACEMENT,), "solid"),
     Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
     Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
     Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
@@ -149,6 +150,13 @@ BLOCKS = (
 )
 
 
+def blocks_of(p: ORing) -> tuple[Block, ...]:
+    """The blocks of a case, first the solids of its section in the order of their elements."""
+    solid, *others = BLOCKS
+    own = [replace(solid, name=f"{SOLID} {r}", elements=r, region=r) for r in p.materials]
+    return (*own, solid, *(block for block in others if block.needed(p)))
+
+
 def obstacles_of(p: ORing) -> dict[str, Obstacle]:
     """The obstacles by the names of their blocks."""
     half = 0.5 * p.groove_width
@@ -164,7 +172,7 @@ def obstacles_of(p: ORing) -> dict[str, Obstacle]:
 def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | None:
     """What a block of the unloaded contact problem may ask for; None where it is switched off."""
     if block.group == "solid":
-        return p.rubber_values
+        return p.rubber(block.region).rubber_values
     if block.group == "load":
         return {"pressure": 0.0}
     if block.group == "contact":
@@ -214,7 +222,7 @@ def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
         "cavitation_penalty": p.cavitation_penalty,
         "force_weight": film.weight * share,
         "shear_weight": film.shear,
-        "shear_modulus": p.shear_modulus,
+        "shear_modulus": p.surface_modulus,
         "upwinding": p.upwinding * copysign(1.0, film.rod_speed),
         "rate": film.rate,
         **p.surfaces.values(),
@@ -228,5 +236,5 @@ _FILM = ("film", "squeeze")
 
 def contact_kernels(p: ORing) -> tuple[str, ...]:
     """Names of the kernels that the contact problem of a case depends on, each once."""
-    kernels = [b.kernel_of(p) for b in BLOCKS if b.group not in _FILM and b.needed(p)]
+    kernels = [b.kernel_of(p) for b in blocks_of(p) if b.group not in _FILM]
     return tuple(dict.fromkeys(kernels))

@@ -64,14 +64,14 @@ def tributary_areas(points: Array, segments: Integers, nodes: Integers) -> Array
 
 
 def contact_data(
-    obstacle: Obstacle, points: Array, nodes: Integers, segments: Integers, stiffness: float
+    obstacle: Obstacle, points: Array, nodes: Integers, segments: Integers, stiffness: Array | float
 ) -> Array:
     """Constants (n, 5) of the contact elements of nodes: normal, place, area, augmentation rho.
 
     points: (V, 2) reference (z, r). nodes, segments: (n,) and (m, 2), see `tributary_areas`.
-    stiffness: MPa, about the shear modulus; rho is stiffness over the width of the node, which is
-    of the order of the stiffness of the material under it: much softer and much stiffer values let
-    single nodes flip for ever.
+    stiffness: MPa, one or (n,), about the shear modulus; rho is stiffness over the width of the
+    node, which is of the order of the stiffness of the material under it: much softer and much
+    stiffer values let single nodes flip for ever.
     """
     areas = tributary_areas(points, segments, nodes)
     width = areas / (2.0 * np.pi * points[nodes, 1])

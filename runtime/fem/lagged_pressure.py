@@ -10,6 +10,7 @@ tangent.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,9 +25,12 @@ _UNIT = np.ones(1)
 _MEAN_STRESS = ("sigma_zz", "sigma_rr", "sigma_tt")
 
 
-def element_pressures(problem: Problem, solid: str, x: Array) -> Array:
-    """Mean stress (Q,) of the elements of the block `solid`, positive in tension."""
-    fields = problem.fields(solid, x)
+def element_pressures(problem: Problem, solids: Sequence[str], x: Array) -> Array:
+    """Mean stress (Q,) of the elements of the blocks `solids`, in order, positive in tension."""
+    return np.concatenate([_pressures(problem.fields(solid, x)) for solid in solids])
+
+
+def _pressures(fields: Mapping[str, Array]) -> Array:
     return np.asarray(sum(fields[name] for name in _MEAN_STRESS).mean(axis=1) / 3.0)  # type: ignore[union-attr]
 
 
@@ -34,35 +38,45 @@ def element_pressures(problem: Problem, solid: str, x: Array) -> Array:
 class LaggedPressure:
     """A problem with lagged element pressures; satisfies the solvers' EvolvingProblem.
 
-    solid: name of the block of 4-node elements. pressures: (Q,) p_e, tension positive. stiffness:
-    bulk modulus. surface: a follower pressure on each edge of each element, whose virtual work at
-    unit pressure is the variation of the element's volume. volumes: (Q,) in the reference state.
+    solids: names of the blocks of 4-node elements. pressures: (Q,) p_e, in their order, tension
+    positive. stiffness: (Q,) bulk moduli, or one for all. surface: a follower pressure on each edge
+    of each element, whose virtual work at unit pressure is the variation of the element's volume.
+    volumes: (Q,) in the reference state.
     """
 
     problem: Problem
-    solid: str
+    solids: tuple[str, ...]
     pressures: Array
-    stiffness: float
+    stiffness: Array | float
     surface: ElementBlock
     volumes: Array
     places: Integers
 
     @classmethod
     def of(
-        cls, problem: Problem, solid: str, follower: ElementKernel, pressures: Array, kappa: float
+        cls,
+        problem: Problem,
+        solids: tuple[str, ...],
+        follower: ElementKernel,
+        pressures: Array,
+        kappa: Array | float,
     ) -> LaggedPressure:
         """The problem with these pressures; `follower` is the kernel of a pressure on an edge."""
-        block = problem.assembler.block(solid)
-        number = problem.assembler.blocks.index(block)
-        scatter = problem.assembler.pattern.scatter[number].reshape(-1, 8, 8)
+        blocks = [problem.assembler.block(solid) for solid in solids]
+        numbers = [problem.assembler.blocks.index(block) for block in blocks]
+        scatter = np.concatenate(
+            [problem.assembler.pattern.scatter[number].reshape(-1, 8, 8) for number in numbers]
+        )
+        coordinates = np.concatenate([block.coordinates for block in blocks])
+        dofs = np.concatenate([block.dofs for block in blocks])
         surface = ElementBlock(
             "surface",
             follower,
-            block.coordinates[:, _EDGES].reshape(-1, 4),
-            block.dofs[:, _EDGES].reshape(-1, 4),
+            coordinates[:, _EDGES].reshape(-1, 4),
+            dofs[:, _EDGES].reshape(-1, 4),
         )
         places = scatter[:, _EDGES[:, :, None], _EDGES[:, None, :]]
-        return cls(problem, solid, pressures, kappa, surface, _volumes(block), places)
+        return cls(problem, solids, pressures, kappa, surface, _volumes(coordinates), places)
 
     def residual(self, x: Array) -> Array:
         """See `Problem`."""
@@ -86,7 +100,7 @@ class LaggedPressure:
 
     def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
         """R(x), (n,), and the tangent with p_e in its geometric part, (n, n)."""
-        excess = self.pressures - element_pressures(self.problem, self.solid, x)
+        excess = self.pressures - element_pressures(self.problem, self.solids, x)
         _, second = self.surface.tangent(x, _UNIT)
         weighted = np.repeat(excess, len(_EDGES))[:, None, None] * second
         nnz = self.problem.assembler.pattern.nnz
@@ -98,13 +112,13 @@ class LaggedPressure:
         first = self.surface.residual(before, _UNIT)
         change = (first * (x - before)[self.surface.dofs]).sum(axis=1)
         ratio = change.reshape(-1, len(_EDGES)).sum(axis=1) / self.volumes
-        pressures = element_pressures(self.problem, self.solid, before) + self.stiffness * ratio
+        pressures = element_pressures(self.problem, self.solids, before) + self.stiffness * ratio
         return replace(self, pressures=pressures)
 
 
-def _volumes(block: ElementBlock) -> Array:
-    """Volumes (Q,) of the rings of 4-node elements, 2 pi R times the area, mm^3."""
-    corners = block.coordinates.reshape(-1, 4, 2)
+def _volumes(coordinates: Array) -> Array:
+    """Volumes (Q,) of the rings of 4-node elements (Q, 8), 2 pi R times the area, mm^3."""
+    corners = coordinates.reshape(-1, 4, 2)
     d1, d2 = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     area = 0.5 * (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
     return np.asarray(2.0 * np.pi * corners[:, :, 1].mean(axis=1) * area)

@@ -6,6 +6,8 @@ its neighbours in the mesh, not from what happens to be near.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.sparse import csr_array
@@ -22,28 +24,62 @@ def carry_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
     """Nodal values (V', k) on the new mesh from those, (V, k), on the old.
 
     By a cubic spline through the nodes of the cell that holds a point and of two rings around it:
-    exact at the old nodes and for quadratic fields.
+    exact at the old nodes and for quadratic fields. Where both have the same regions none sees what
+    is in another one: slopes jump between materials.
     """
-    cell, _ = located(old.points, old.quads, new.points)
-    near, known = _patches(old)
+    if len(old.regions) < 2 or set(old.regions) != set(new.regions):
+        return _carried(old, new.points, values)
     result = np.empty((len(new.points), values.shape[1]))
+    for name in old.regions:
+        part, used = _region(old, name)
+        nodes = np.unique(new.quads[new.regions[name]])
+        result[nodes] = _carried(part, new.points[nodes], values[used])
+    return result
+
+
+def _region(mesh: SectionMesh, name: str) -> tuple[SectionMesh, Integers]:
+    """The cells of a region alone, and which nodes are theirs; its boundary is of no use."""
+    cells = mesh.quads[mesh.regions[name]]
+    used = np.unique(cells)
+    part = replace(mesh, points=mesh.points[used], quads=np.searchsorted(used, cells), regions={})
+    return part, used
+
+
+def _carried(old: SectionMesh, at: Array, values: Array) -> Array:
+    """Values (n, k) at points (n, 2); see `carry_nodes`."""
+    cell, _ = located(old.points, old.quads, at)
+    near, known = _patches(old)
+    result = np.empty((len(at), values.shape[1]))
     for some in np.array_split(np.arange(len(cell)), len(cell) // _AT_ONCE + 1):
         nodes = near[cell[some]]
-        result[some] = _spline(
-            old.points[nodes], values[nodes], known[cell[some]], new.points[some]
-        )
+        result[some] = _spline(old.points[nodes], values[nodes], known[cell[some]], at[some])
     return result
 
 
 def carry_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
-    """Element values (Q',) on the new mesh from those, (Q,), on the old, through means at nodes."""
+    """Element values (Q',) on the new mesh from those, (Q,), on the old, through means at nodes.
+
+    Region by region where both have the same.
+    """
+    at = new.points[new.quads].mean(axis=1)
+    if len(old.regions) < 2 or set(old.regions) != set(new.regions):
+        return _averaged(old, at, values)
+    result = np.empty(len(at))
+    for name, cells in old.regions.items():
+        there = new.regions[name]
+        result[there] = _averaged(_region(old, name)[0], at[there], values[cells])
+    return result
+
+
+def _averaged(old: SectionMesh, middles: Array, values: Array) -> Array:
+    """Values (n,) at points (n, 2); see `carry_elements`."""
     x = old.points[old.quads]
     a, b = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
     area = np.repeat(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), 4)
     at, count = old.quads.ravel(), len(old.points)
     total = np.bincount(at, area * np.repeat(values, 4), count)
     nodal = total / np.maximum(np.bincount(at, area, count), 1e-300)
-    cell, parent = located(old.points, old.quads, new.points[new.quads].mean(axis=1))
+    cell, parent = located(old.points, old.quads, middles)
     inside = np.clip(parent, -1.0, 1.0)
     return np.asarray((shapes(inside) * nodal[old.quads[cell]]).sum(axis=1))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import hypot, pi, radians, tau
 
 import numpy as np
@@ -22,7 +23,15 @@ from softehl.runtime.mesh.outline_checks import (
     require_no_crossing,
     require_no_spikes,
 )
-from softehl.runtime.mesh.pieces import Arc, Line, OutlineError, Piece, Point, rounded
+from softehl.runtime.mesh.pieces import (
+    Arc,
+    Line,
+    OutlineError,
+    Piece,
+    Point,
+    meetings,
+    rounded,
+)
 
 __all__ = ["Arc", "Line", "Outline", "OutlineError", "Piece", "Point", "Shape", "rounded"]
 
@@ -150,6 +159,26 @@ class Outline:
         about = self._moment(lambda z, r: z**3 / 3.0 + z * r**2)
         return about - self.area * float(away @ away)
 
+    def part(self, begin: float, end: float) -> list[Piece]:
+        """The pieces between two places, counterclockwise, in order."""
+        begin, found = begin % self.length, list[Piece]()
+        end = begin + (end - begin) % self.length
+        ends = [*self.starts[:-1], *(self.starts + self.length)]
+        for number, (a, b) in enumerate(pairwise(ends)):
+            first, last = max(begin - a, 0.0), min(end, b) - a
+            if last - first > CLOSED * self.size:
+                found.append(self.pieces[number % len(self.pieces)].part(first, last))
+        return found
+
+    def level(self, r: float) -> Array:
+        """s (n,) at which the outline is at a radius, in the order of z there; none twice."""
+        a, _, c, _ = self.box
+        within = CLOSED * self.size
+        line = Line((a - self.size, r), (c + self.size, r))
+        found = np.sort([p[0] for piece in self.pieces for p in meetings(line, piece, within)])
+        z = found[np.diff(found, prepend=-np.inf) > 4.0 * within]
+        return self.place(np.stack([z, np.full(len(z), r)], axis=1))
+
     def moved(self, scale: float = 1.0, shift: Point = (0.0, 0.0)) -> Outline:
         """The outline scaled about the origin by a positive factor, then shifted."""
         return Outline([piece.moved(scale, shift) for piece in self.pieces])
@@ -188,12 +217,29 @@ class Shape:
 
     film: (s0, s1), from the sealed to the air side, counterclockwise. pressure: (s, s0), from the
     housing round to the start of the film, counterclockwise. All modulo the length of the outline.
+    chord: places between which, counterclockwise and with the film, a straight cut parts it.
     """
 
     outline: Outline
     film: tuple[float, float]
     pressure: tuple[float, float]
     name: str = "section"
+    chord: tuple[float, float] | None = None
+
+    @cached_property
+    def parts(self) -> tuple[Outline, Outline]:
+        """The outlines of what is on the film's side of the chord and of what is behind it.
+
+        s = 0 of the first is where it begins on the outline, of the second where the chord does:
+        both begin at the same point.
+        """
+        assert self.chord is not None
+        begin, end = self.chord
+        near, far = self.outline.part(begin, end), self.outline.part(end, begin)
+        return (
+            Outline([*near, Line(near[-1].end, near[0].start)]),
+            Outline([Line(near[0].start, near[-1].end), *far]),
+        )
 
     @classmethod
     def facing(cls, outline: Outline, crown: Point, name: str, steepest: float = 75.0) -> Shape:

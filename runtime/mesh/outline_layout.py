@@ -53,14 +53,23 @@ class BoundaryLayout:
 
     @classmethod
     def of(
-        cls, outline: Outline, film: tuple[float, float], spacing: Spacing | None, long: int
+        cls,
+        outline: Outline,
+        film: tuple[float, float],
+        spacing: Spacing | None,
+        long: int,
+        least: float = 0.0,
     ) -> BoundaryLayout:
-        """With `long` segments at density 1 between the places of the film, None = equal ones."""
+        """With `long` segments at density 1 between the places of the film, None = equal ones.
+
+        least: length at density 1, mm, below which no corner makes the others.
+        """
         length, first = outline.length, film[0]
         last = first + (film[1] - first) % length
         reach = ball_radii(outline, 1.0)
         s = np.linspace(last, first + length, 4001)
-        size = _sizes(outline, s, reach, _film_sizes(last - first, spacing, long))
+        wide, ends = np.maximum(reach, least / _SEGMENT), _film_sizes(last - first, spacing, long)
+        size = _sizes(outline, s, wide, ends)
         index = cumulative_trapezoid(1.0 / size, s, initial=0)
         corners = np.sort(first + (outline.corners(_PINNED) - first) % length)
         apart = 0.2 * length / AROUND

@@ -7,6 +7,7 @@ of density d and 2 d are of one family. Every node of the boundary lies exactly 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -20,9 +21,6 @@ from softehl.runtime.mesh.spacing import Spacing
 from softehl.runtime.mesh.subdivide import subdivided
 from softehl.runtime.mesh.triangles import triangulate
 
-GROWTH = 8.0
-"""Ratio of the thickness of the innermost to the outermost layer."""
-
 WORST = 0.3
 """Least Jacobian at a corner, relative to the area, that is looked for with thinner strips."""
 
@@ -31,33 +29,50 @@ _TRIES = 6  # at a strip that does not fold, each half as thick
 _COARSEST_TRIANGLES = Fraction(2, 3)  # density of the triangles: finer meshes divide theirs
 
 
+@dataclass(frozen=True)
+class Strip:
+    """The layers along an outline, and its nodes off the film.
+
+    growth: ratio of the thickness of the innermost to the outermost layer. thick: of the strip, in
+    the usual thickness. least: size of the segments at a corner, mm, at density 1.
+    """
+
+    growth: float = 8.0
+    thick: float = 1.0
+    least: float = 0.0
+
+
+FILM_STRIP = Strip()
+"""For the surface that carries a film."""
+
+
 def outline_mesh(
     shape: Shape,
     film: tuple[float, float],
     spacing: Spacing | None,
     long: int,
     density: int | Fraction,
-    growth: float = GROWTH,
+    strip: Strip = FILM_STRIP,
 ) -> SectionMesh:
     """The mesh of a section, with `long` d segments between the places of the film.
 
     film: (s0, s1) on the outline, mm, counterclockwise. spacing: of the nodes there, None = equal.
-    density: a multiple of 1/3, at least 2/3, that makes `long` d whole. growth: of the layers.
+    density: a multiple of 1/3, at least 2/3, that makes `long` d whole. strip: of layers.
     Raises MeshError for others, and where no mesh of sound elements is found.
     """
-    layout = BoundaryLayout.of(shape.outline, film, spacing, long)
+    layout = BoundaryLayout.of(shape.outline, film, spacing, long, strip.least)
     _require_density(density, long)
     coarse = Fraction(density) / _divisions(Fraction(density))
     best, found, mesh = 0.0, 1.0, None
     for halvings in range(_TRIES):  # the coarsest of its family decides how thick the strip is
-        tried = _mesh(layout, coarse, 0.5**halvings, growth)
+        tried = _mesh(layout, coarse, strip.thick * 0.5**halvings, strip.growth)
         share = _worst(tried)
         if share > best:
-            best, found, mesh = share, 0.5**halvings, tried
+            best, found, mesh = share, strip.thick * 0.5**halvings, tried
         if share >= WORST:
             break
     if coarse != density and best >= _LEAST:
-        mesh = _mesh(layout, Fraction(density), found, growth)
+        mesh = _mesh(layout, Fraction(density), found, strip.growth)
     if mesh and _worst(mesh) >= _LEAST:
         return mesh
     raise MeshError(

@@ -57,6 +57,10 @@ class Line:
         """The same piece from its end to its start."""
         return Line(self.end, self.start)
 
+    def part(self, begin: float, end: float) -> Line:
+        """The piece between two lengths behind its start."""
+        return Line(*_ends(self, begin, end))
+
     def moved(self, scale: float, shift: Point) -> Line:
         """The piece scaled about the origin, then shifted."""
         return Line(_moved(self.start, scale, shift), _moved(self.end, scale, shift))
@@ -133,6 +137,10 @@ class Arc:
         """The same piece from its end to its start."""
         return Arc(self.end, self.start, self.centre, not self.ccw)
 
+    def part(self, begin: float, end: float) -> Arc:
+        """The piece between two lengths behind its start."""
+        return Arc(*_ends(self, begin, end), self.centre, self.ccw)
+
     def moved(self, scale: float, shift: Point) -> Arc:
         """The piece scaled about the origin, then shifted."""
         start, end, centre = (
@@ -154,6 +162,12 @@ class Arc:
 
 
 Piece: TypeAlias = Line | Arc
+
+
+def _ends(piece: Piece, begin: float, end: float) -> tuple[Point, Point]:
+    """The points at two lengths behind the start of a piece; its own ends exactly."""
+    (a, b), (c, d) = piece.at(np.array([begin, end])).tolist()
+    return piece.start if begin <= 0.0 else (a, b), piece.end if end >= piece.length else (c, d)
 
 
 def bulge_arc(start: Point, end: Point, bulge: float) -> Piece:

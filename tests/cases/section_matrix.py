@@ -78,6 +78,7 @@ def _once(rng: np.random.Generator, section: str) -> ORing:
         "viscosity": float(f"{10.0 ** rng.uniform(-8.3, -6.3):.3g}"),
         "groove_width": 10.0 * height,
         "speeds": SPEEDS,
+        "error_estimate": False,
     }
     width = ORing(**given).axial_width
     return ORing(**{**given, "groove_width": round(rng.uniform(1.03, 1.5) * width, 3)})

@@ -36,7 +36,9 @@ def state(system: SealSystem, rng: np.random.Generator) -> Array:
 
 
 def lagged(problem: Problem, pressures: Array) -> LaggedPressure:
-    return LaggedPressure.of(problem, "solid", load_kernel("follower_pressure"), pressures, KAPPA)
+    return LaggedPressure.of(
+        problem, ("solid",), load_kernel("follower_pressure"), pressures, KAPPA
+    )
 
 
 def volumes(system: SealSystem, x: Array) -> Array:
@@ -50,7 +52,7 @@ def volumes(system: SealSystem, x: Array) -> Array:
 def test_with_the_true_pressures_the_tangent_is_the_problem_s(
     problem: Problem, state: Array
 ) -> None:
-    own = lagged(problem, element_pressures(problem, "solid", state))
+    own = lagged(problem, element_pressures(problem, ("solid",), state))
     r, K = own.linearise(state)
     r0, K0 = problem.linearise(state)
     assert np.array_equal(r, r0)
@@ -62,7 +64,7 @@ def test_an_excess_pressure_adds_the_second_derivative_of_the_volume(
     system: SealSystem, problem: Problem, state: Array, rng: np.random.Generator
 ) -> None:
     excess = rng.normal(size=len(system.mesh.quads))
-    pressures = element_pressures(problem, "solid", state)
+    pressures = element_pressures(problem, ("solid",), state)
     dx = np.zeros_like(state)
     moved = system.displacements(dx)
     moved[:] = rng.normal(size=moved.shape)
@@ -84,6 +86,6 @@ def test_pressures_follow_the_linearised_volume(
     moved[:] = 1e-7 * rng.normal(size=moved.shape)
     change = KAPPA * (volumes(system, state + dx) - volumes(system, state)) / start.volumes
     pressures = start.after(state, state + dx).pressures
-    before = element_pressures(problem, "solid", state)
+    before = element_pressures(problem, ("solid",), state)
     assert pressures - before == pytest.approx(change, rel=1e-4, abs=1e-8)
     assert np.abs(change).max() > 1e-5  # there was something to see

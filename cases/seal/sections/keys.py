@@ -8,6 +8,7 @@ that another section is its page and a line of the registry.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -20,6 +21,7 @@ from softehl.cases.seal.given import number, put
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.sections.files import read_mesh, read_outline
 from softehl.runtime.mesh.outline import Shape
+from softehl.runtime.mesh.parted_mesh import CAP
 
 Name = Literal["round", "rectangular", "x_ring", "d_ring", "trapezoid", "u_cup"]
 
@@ -38,6 +40,7 @@ NAMES = {
 
 _RENAMED = {"width": "section_width"}  # what a page calls a dimension -> its key
 _STATIONS = 2000
+_STEEP = 0.5  # sine of the angle between the sides and the edge of a cap, at least
 _BETWEEN = 0.01  # of the height: two lobes have a groove at least so deep between them
 
 
@@ -64,7 +67,19 @@ def _declared() -> dict[str, Any]:
         bounds="a .dxf, .csv or mesh file (.msh, .vtu, ...), see docs/sections.md",
         file=True,
     )
-    return {"section": (Name, section), "outline": (str | None, outline), **keys}
+    cap = key(
+        None,
+        "thickness of a cap of its own material (materials.cap, PTFE) on the side of the rod",
+        unit="mm",
+        bounds="left out = none; it holds the whole film",
+        gt=0,
+    )
+    return {
+        "section": (Name, section),
+        "outline": (str | None, outline),
+        "cap_thickness": (float | None, cap),
+        **keys,
+    }
 
 
 def _key(uses: list[tuple[str, str, float]]) -> Any:
@@ -80,6 +95,7 @@ if TYPE_CHECKING:
     class _Keys(Parameters):
         section: Name = ROUND
         outline: str | None = None
+        cap_thickness: float | None = None
 
 else:
     _Keys = create_model("_Keys", __base__=Parameters, **_declared())
@@ -98,8 +114,17 @@ class SectionKeys(_Keys):
         """What the seal is called."""
         return NAMES[self.section] if self.outline is None else f"ring of {Path(self.outline).name}"
 
+    @property
+    def regions(self) -> tuple[str, ...]:
+        """Names of the regions that may have a material of their own."""
+        return () if self.cap_thickness is None else (CAP,)
+
     def free(self, height: float, inner_diameter: float) -> Shape:
         """The free section where it is, mm.  ValueError where there is none."""
+        shape = self._whole(height, inner_diameter)
+        return shape if self.cap_thickness is None else capped(shape, self.cap_thickness)
+
+    def _whole(self, height: float, inner_diameter: float) -> Shape:
         sizes = self.sized(height)
         if self.outline is None:
             return shape_of(self.section, sizes, inner_diameter)
@@ -164,6 +189,28 @@ def _shape(section: str, sizes: tuple[tuple[str, float], ...], inner_diameter: f
         name = ".".join(str(part) for part in first["loc"])
         words = first["msg"].removeprefix("Value error, ")
         raise ValueError(f'section = "{section}": {name} {words}'.replace("  ", " ")) from None
+
+
+def capped(shape: Shape, thickness: float) -> Shape:
+    """The shape with a cut at this height above its lowest point.  ValueError where none can be."""
+    outline, given = shape.outline, f"cap_thickness = {thickness:g} mm"
+    _, low, _, high = outline.box
+    if thickness >= high - low:
+        raise ValueError(f"{given}: it must be less than the height, {high - low:g} mm")
+    at = outline.level(low + thickness)
+    if len(at) != 2:
+        raise ValueError(
+            f"{given}: the section is in {len(at) // 2} parts there; a cap is cut off straight"
+        )
+    begin, end = float(at[0]), float(at[1])
+    inside = (np.array(shape.film) - begin) % outline.length
+    if not inside[0] < inside[1] < (end - begin) % outline.length:
+        least = float(outline.at(np.array(shape.film))[:, 1].max()) - low
+        raise ValueError(f"{given}: it must hold the film, which needs more than {least:.4g} mm")
+    turn = np.abs(np.sin(outline.heading(at)))
+    if turn.min() < _STEEP:
+        raise ValueError(f"{given}: the sides are too flat there; make it thicker or thinner")
+    return replace(shape, chord=(begin, end))
 
 
 def lobes(shape: Shape) -> int:

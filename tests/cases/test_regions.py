@@ -1,0 +1,163 @@
+"""Sections of several materials: keys, the same material twice, layers in closed form."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softehl.cases.harness.case_file import read_case
+from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.equations import SealSystem, build_system
+from softehl.cases.seal.grading import inlet_length
+from softehl.cases.seal.loads import ContactLoads
+from softehl.cases.seal.method import run
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.regions import PRESETS
+from softehl.cases.seal.results import contact_pressure
+from softehl.cases.seal.state import Silent
+from softehl.cases.shipped import SHIPPED
+from softehl.runtime.arrays import Array
+
+CAPPED: dict[str, Any] = {
+    **{"section": "rectangular", "corner_radius": 0.4, "cap_thickness": 0.6},
+    **{"housing_diameter": 56.4, "groove_width": 4.3, "density": 1},
+}
+SAME: dict[str, Any] = {"materials": {"cap": {"mu_1": 3.04, "mu_2": 0.62}}}
+GENT: dict[str, Any] = {"material": "gent", "mu": 3.0, "J_m": 30.0}
+
+
+def test_a_cap_is_of_ptfe() -> None:
+    p = ORing(**CAPPED)
+    assert p.materials["cap"].shear_modulus == PRESETS["ptfe"]["mu"]
+    assert p.materials["cap"].bulk_modulus == PRESETS["ptfe"]["bulk_modulus"]
+    assert p.surface_modulus == 171.0
+    assert p.shear_modulus == pytest.approx(3.66)
+    E, nu = 500.0, 0.46
+    assert PRESETS["ptfe"]["mu"] == pytest.approx(E / (2.0 + 2.0 * nu), rel=2e-3)
+    assert PRESETS["ptfe"]["bulk_modulus"] == pytest.approx(E / (3.0 - 6.0 * nu), rel=2e-3)
+    assert inlet_length(p, 1.0) > inlet_length(ORing(), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "modulus"),
+    [
+        (["materials.cap=ptfe"], 171.0),
+        (["materials.cap.mu=200 MPa"], 200.0),
+        (["materials.cap.shore_A=90"], 6.947993),
+        (['materials={cap={material="gent", mu=3, J_m=30}}'], 3.0),
+        (["materials.cap.material=gent", "materials.cap.mu=3", "materials.cap.J_m=30"], 3.0),
+    ],
+)
+def test_what_one_types_for_a_cap(given: list[str], modulus: float) -> None:
+    words = ["section=rectangular", "groove_width=4.3", "cap_thickness=0.6", *given]
+    p = read_case("oring", SHIPPED, words).parameters
+    assert isinstance(p, ORing)
+    assert p.surface_modulus == pytest.approx(modulus)
+    assert ORing(**p.model_dump()) == p
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        (["cap_thickness=0.2"], r"cap_thickness = 0.2 mm: it must hold the film, .* 0.2965 mm"),
+        (["cap_thickness=5"], "less than the height, 3.53 mm"),
+        (["materials.cap=teflon"], "materials.cap.material: .* 'gent'; or ptfe"),
+        (["materials.cap.mu=-3"], "materials.cap.mu: input should be greater than 0"),
+        (["materials.cap.nu=0.3"], "materials.cap.nu: extra inputs"),
+        (["materials.lip=ptfe"], "materials.lip: the section has cap"),
+        (["materials.cap=3"], "materials.cap = 3: allowed is a table"),
+        (["materials.cap.fit=a.csv"], "materials.cap: fit is for the whole section"),
+        (["solid=q4", 'materials.cap={material="gent", mu=3, J_m=30}'], 'material = "gent"'),
+        (["section=x_ring", "cap_thickness=0.1"], "the section is in 2 parts there"),
+    ],
+)
+def test_a_cap_that_is_none(given: list[str], reason: str) -> None:
+    words = ["section=rectangular", "groove_width=4.3", "corner_radius=0.4", "cap_thickness=0.6"]
+    if given[0].startswith("section"):
+        words = words[1:2]
+    with pytest.raises(BadInput, match=reason) as error:
+        read_case("oring", SHIPPED, [*words, *given])
+    assert "\n" not in str(error.value)
+
+
+def test_regions_need_a_section_that_has_them() -> None:
+    bare: dict[str, Any] = {"section": "rectangular", "materials": {"cap": "ptfe"}}
+    with pytest.raises(ValueError, match="no regions; cap_thickness makes one"):
+        ORing(**bare)
+    with pytest.raises(ValueError, match='not for section = "round"'):
+        ORing(cap_thickness=0.5)
+
+
+def _state(system: SealSystem, size: float) -> Array:
+    rng = np.random.default_rng(1)
+    return np.asarray(size * rng.normal(size=system.layout.total))
+
+
+def test_two_regions_of_one_material_are_one_region_bitwise() -> None:
+    two = build_system(ORing(**CAPPED, **SAME))
+    p = two.parameters.model_copy(update={"materials": {}})
+    one = SealSystem.of(p, replace(two.section, own=()))
+    assert (two.solids, one.solids) == (("solid cap", "solid"), ("solid",))
+    x = _state(two, 2e-3)
+    loads = ContactLoads(1.0, {}, 0.0)
+    (r, K), (s, L) = (q.contact_problem(loads).linearise(x) for q in (two, one))
+    assert np.array_equal(r, s)
+    assert np.array_equal(K.data, L.data)
+    other: dict[str, Any] = {"materials": {"cap": {"mu_1": 3.05, "mu_2": 0.62}}}
+    t, _ = build_system(ORing(**CAPPED, **other)).contact_problem(loads).linearise(x)
+    assert not np.array_equal(r, t)
+
+
+def test_the_tangent_of_different_materials() -> None:
+    gent: dict[str, Any] = {"materials": {"cap": GENT}}
+    system = build_system(ORing(**CAPPED, **gent))
+    assert [b.kernel_of(system.parameters) for b in system.blocks[:2]] == [
+        "solid_taylor_mean_gent",
+        "solid_taylor_mean",
+    ]
+    assembler, given = system.problem.assembler, system.problem.parameters
+    solids = {name: given[name] for name in system.solids}
+    x, dx, step = _state(system, 1e-4), _state(system, 1.0)[::-1].copy(), 1e-7
+    change = assembler.residual(x + step * dx, solids) - assembler.residual(x - step * dx, solids)
+    _, K = assembler.linearise(x, solids)
+    exact = np.asarray(K @ dx)
+    assert change / (2.0 * step) == pytest.approx(exact, abs=1e-6 * np.abs(exact).max())
+
+
+def _contact(**changes: Any) -> tuple[SealSystem, Array]:
+    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+    found = route.contact(ORing(**changes))
+    assert not isinstance(found, StageFailed)
+    return found
+
+
+@pytest.mark.slow
+def test_two_layers_between_frictionless_plates() -> None:
+    """Bonded, they have one stretch: p = m (lambda^-2 - lambda^2), m the mean of both by height."""
+    stretch, cap, mu = 0.9, 1.0, 12.0
+    gap = stretch * 3.53 + 0.01  # the rod is held 10 um off
+    system, x = _contact(
+        **{"section": "rectangular", "section_width": 9.0, "corner_radius": 0.1},
+        **{"inner_diameter": 1000.0, "rod_diameter": 1000.0, "groove_width": 12.0},
+        housing_diameter=1000.0 + 2.0 * gap,
+        bulk_modulus=2e4,
+        sealed_pressure=0.0,
+        cap_thickness=cap,
+        materials={"cap": {"material": "neo-hooke", "mu": mu, "bulk_modulus": 2e4}},
+    )
+    z, _ = system.arc_film(x)
+    found = contact_pressure(system, 0.0, x)[int(np.argmin(np.abs(z)))]
+    mean = (cap * mu + (3.53 - cap) * 3.66) / 3.53
+    assert found == pytest.approx(mean * (stretch**-2 - stretch**2), rel=5e-3)
+
+
+@pytest.mark.slow
+def test_a_stiffer_cap_has_a_film() -> None:
+    soft: dict[str, Any] = {"materials": {"cap": {"material": "neo-hooke", "mu": 10.0}}}
+    given = {**CAPPED, **soft, "density": 2, "stroke": "out", "speeds": (800.0, 200.0)}
+    found = run(ORing(**given, error_estimate=False), Silent())
+    assert [s.verdict for s in found.states] == [OK] * 2
