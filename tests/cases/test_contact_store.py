@@ -134,7 +134,7 @@ def test_every_parameter_either_matters_or_does_not() -> None:
     assert contact_key(case(rod=50.5)) == contact_key(case(rod_diameter=50.5))
     assert contact_key(case(rod=50.5)) != contact_key(case())
     sections = {name: section for section in SECTIONS for name in dimensions(section)}
-    known = {*CHANGED, *RUBBERS, *sections, "section", "outline"}
+    known = {*CHANGED, *RUBBERS, *sections, "section", "outline", "cap_thickness", "materials"}
     assert known == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
     key = contact_key(case())
     assert contact_key(case(**OTHER)) == contact_key(case(**ROUGH)) == key
@@ -147,6 +147,11 @@ def test_every_parameter_either_matters_or_does_not() -> None:
         given = getattr(SECTIONS[section](), dimensions(section)[name])
         sized = {name: (1.01 if name == "nose_radius" else 0.99) * given}
         shapes.append(contact_key(case(section=section, **free, **sized)))
+    capped = {"section": "rectangular", "cap_thickness": 0.8, **free}
+    shapes += [
+        contact_key(case(**capped)),
+        contact_key(case(**capped, materials={"cap": {"mu": 10.0}})),
+    ]
     assert len(set(shapes)) == len(shapes)
     rubbers = [contact_key(case(**given)) for cases in RUBBERS.values() for given in cases]
     assert len({key, *keys, *rubbers}) == 1 + len(CHANGED) + len(rubbers)
