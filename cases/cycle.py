@@ -178,6 +178,15 @@ class CycleCase(Case[Cycle, CycleRow]):
         """See :class:`Case`."""
         return assumed(parameters, given)
 
+    def warnings(self, parameters: Cycle) -> list[str]:
+        """See :class:`Case`."""
+        if parameters.rough:
+            return []
+        return [
+            "between smooth surfaces a reversal squeezes the film to nanometres; give a roughness "
+            "(rms of the seal in um, 0.2 to 0.4 is usual)"
+        ]
+
     def requested(self, parameters: Cycle) -> list[float]:
         """See :class:`Case`."""
         return [float(n + 1) for n in range(parameters.cycles)]

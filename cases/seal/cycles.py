@@ -89,14 +89,14 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
     if begun is None or not isinstance(newton.linear, Condenser):
         words = f"no steady film at U = {speed:g} mm/s to begin with; use a finer mesh (density)"
         return _outcome(p, Status.MAX_ITERATIONS, words)
-    corrector = FastFilm.of(path.system, newton.linear, contact[1]).corrector
+    corrector = FastFilm.of(path.system, newton.linear, contact[1]).eager
     steps = TimeSteps(tolerance=parameters.time_tolerance, order=parameters.time_order)
     returned = parameters.supply == "returned"
     march = March(path.system, motion, begun[0], corrector, steps, returned)
     try:
         _cycles(march, begun[1], parameters.cycles, observer, log)
     except StuckError as error:
-        return _outcome(p, Status.MAX_ITERATIONS, f"{error}; try a smaller time_tolerance")
+        return _outcome(p, Status.MAX_ITERATIONS, str(error))
     return _outcome(p, Status.CONVERGED, "all cycles")
 
 

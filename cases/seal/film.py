@@ -34,6 +34,7 @@ METHOD = "modified Newton on the Schur complement of the section"
 _NEAR = 0.3  # residual at which the section is in equilibrium well enough to be condensed
 _LOOSE = 1e-3  # between contact and film, whose states are not results
 _FIRM = 1e-6  # of the state from which speeds fall: a section is condensed there that is at rest
+_STALE = 0.1  # a condensation costs about three iterations, and many films follow each other
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
 _SHEAR_STEPS = StepRule(1.0, 0.005, target_iterations=8)
 _FROM_SPEED_TO_SPEED = StepRule(1e3, 1e3)
@@ -215,8 +216,13 @@ class FastFilm:
 
     def rising(self, stage: Stage) -> Stage:
         """The stage of rising speed of a rough film, to the full tolerance, with its own steps."""
-        rising = self._stage(stage, self.corrector, stage.steps)
+        rising = self._stage(stage, self.eager, stage.steps)
         return replace(rising, predictor="parabola")
+
+    @property
+    def eager(self) -> SchurCorrector:
+        """The corrector of rough films and of films in time, which condenses sooner."""
+        return replace(self.corrector, stale=_STALE)
 
     def _stage(self, stage: Stage, corrector: SchurCorrector, steps: StepRule) -> Stage:
         guards = (self.system.film_guard(),)

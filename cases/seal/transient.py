@@ -147,7 +147,8 @@ class March:
         if not solution.converged or error > 4.0:
             self.dt = dt * (0.25 if not solution.converged else 0.5)
             if self.dt < self.steps.smallest * self.motion.period:
-                raise StuckError(f"no step from t = {now:.6g} s on, U = {film.rod_speed:.4g} mm/s")
+                where = f"no step from t = {now:.6g} s on, U = {film.rod_speed:.4g} mm/s"
+                raise StuckError(f"{where}: {self._advice()}")
             return
         instant = self._instant(problem, solution.x, dt)
         reading = self._reading(problem, film, instant, solution.iterations)
@@ -158,6 +159,16 @@ class March:
         power = 1.0 / 3.0 if len(self.behind) > 2 else 0.5
         self.dt = dt * float(np.clip(0.8 * max(error, 1e-4) ** -power, 0.3, 1.8))
         on_step(instant, reading)
+
+    def _advice(self) -> str:
+        """What may help where a step was not found."""
+        least = 1e3 * float(self.system.arc_film(self.behind[0].x)[1].min())
+        if not self.system.parameters.rough:
+            return (
+                f"the film is {least:.2g} um thin there, where real surfaces touch; give a "
+                "roughness (0.2 to 0.4 um is usual), or time_order = 1"
+            )
+        return "try time_order = 1, a smaller time_tolerance or a finer mesh (density)"
 
     @property
     def _fastest(self) -> float:
