@@ -5,7 +5,7 @@ The shapes, orders and units of every array are those of `codegen/abi.py`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -114,7 +114,7 @@ class Call:
         """Raises ArgumentError for a task, shape, kind or value that does not fit."""
         if task not in kernel.tasks:
             raise ArgumentError(f"{kernel.name} offers {', '.join(kernel.tasks)}, not {task}")
-        self.kernel = kernel
+        self.kernel, self.task = kernel, task
         self.function = kernel.library.function(kernel.name, task)
         self.rule = self._rule(given.rule)
         self.modes = self._modes()
@@ -135,6 +135,11 @@ class Call:
         """Call the C function; `values` and `tangent` are written in place."""
         self.function((self.n, len(self.rule.weights), self.modes), self.read, values, tangent)
         return values
+
+    def again(self) -> Callable[[Array, Array, Array | None], None]:
+        """The call with other unknowns (n, ndof), float64 and contiguous: they are not checked."""
+        counts = self.n, len(self.rule.weights), self.modes
+        return self.kernel.library.again(self.kernel.name, self.task, counts, self.read)
 
     def _along(self, task: str, width: int) -> int:
         """Values of `direction` for an element: of its coordinates, data, parameters and dofs."""

@@ -46,6 +46,10 @@ class Kernel(Family):
     Calls also take, by name, what the family needs: data, point_data, parameters, rule.
     """
 
+    def call(self, task: str, coordinates: Array, dofs: Array, **given: Any) -> Call:
+        """A checked call of a task, which may be made again with other unknowns."""
+        return Call(self, task, coordinates, dofs, Given(**given))
+
     def energy(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Potential of each element, (n,)."""
         call = Call(self, "energy", coordinates, dofs, Given(**given))

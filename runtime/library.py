@@ -68,9 +68,7 @@ class Library:
 
     def function(self, kernel: str, task: str) -> Function:
         """The C function of a task of a kernel."""
-        name = f"softehl_{kernel}_{task}"
-        _declare(name)
-        function = getattr(self.loaded, name)
+        function = self._plain(kernel, task)
 
         def call(
             counts: tuple[int, int, int],
@@ -87,11 +85,32 @@ class Library:
 
         return call
 
+    def again(
+        self, kernel: str, task: str, counts: tuple[int, int, int], read: Sequence[Array]
+    ) -> Callable[[Array, Array, Array | None], None]:
+        """A task whose arrays stay where they are but for the unknowns, the second that it reads:
+        a function of these, of the values and of the tangent that it writes.
+        """
+        function = self._plain(kernel, task)
+        before, *after = (_pointer(array) for k, array in enumerate(read) if k != 1)
+
+        def call(dofs: Array, values: Array, tangent: Array | None) -> None:
+            written = _ffi.NULL if tangent is None else _pointer(tangent)
+            function(*counts, before, _pointer(dofs), *after, _pointer(values), written)
+
+        return call
+
     @property
     def current(self) -> bool:
         """Whether it was built from the sources that its folder holds now."""
         built_from: bytes = _ffi.string(self.loaded.softehl_signature())
         return built_from.decode() == _sources_signature(self.directory)
+
+    def _plain(self, kernel: str, task: str) -> Any:
+        """As it is: for pointers."""
+        name = f"softehl_{kernel}_{task}"
+        _declare(name)
+        return getattr(self.loaded, name)
 
     def close(self) -> None:
         """Unload it."""

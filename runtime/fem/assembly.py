@@ -6,9 +6,9 @@ is then a gather, a kernel call and an `add.at` for each piece of a block of lik
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -16,7 +16,10 @@ from scipy.sparse import csc_array
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.checks import not_finite, require_sound_elements
 from softehl.runtime.fem.pattern import Pattern, Structure
-from softehl.runtime.kernels import Rule
+from softehl.runtime.kernels import Kernel, Rule
+
+Again: TypeAlias = Callable[[Array, Array, Array | None], None]
+"""A task of a kernel: of its unknowns, and of the values and the tangent that it writes."""
 
 _PIECE = 1 << 18  # entries of the tangents that are evaluated before they are added up
 _SETS = 4  # sets of prescribed unknowns that are remembered
@@ -92,7 +95,8 @@ class ElementBlock:
     alone, so that it is evaluated once for each set of them. point_data: (n, points, k) values at
     the quadrature points, such as the history of the steps before, or None.
     check_orientation: elements that are inside out are refused; False for a page whose nodes have
-    another order than VTK's.
+    another order than VTK's. calls: the latest call of each task and the parameters it was made
+    with; it saves time only.
     """
 
     name: str
@@ -104,14 +108,41 @@ class ElementBlock:
     constant: bool = False
     point_data: Array | None = None
     check_orientation: bool = True
+    calls: dict[str, tuple[Array, Again]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def residual(self, x: Array, parameters: Array) -> Array:
         """Element residuals (n, ndof) at the global vector x."""
-        return self.kernel.residual(self.coordinates, x[self.dofs], **self._given(parameters))
+        again, dofs = self._again("residual", parameters), self._gathered(x)
+        if again is None:
+            return self.kernel.residual(self.coordinates, dofs, **self._given(parameters))
+        again(dofs, values := np.empty(dofs.shape), None)
+        return values
 
     def tangent(self, x: Array, parameters: Array) -> tuple[Array, Array]:
         """Element residuals (n, ndof) and tangents (n, ndof, ndof) at the global vector x."""
-        return self.kernel.tangent(self.coordinates, x[self.dofs], **self._given(parameters))
+        again, dofs = self._again("tangent", parameters), self._gathered(x)
+        if again is None:
+            return self.kernel.tangent(self.coordinates, dofs, **self._given(parameters))
+        values, tangents = np.empty(dofs.shape), np.empty((*dofs.shape, dofs.shape[1]))
+        again(dofs, values, tangents)
+        return values, tangents
+
+    def _gathered(self, x: Array) -> Array:
+        """Unknowns (n, ndof) of the elements at the global vector x."""
+        return np.ascontiguousarray(x[self.dofs], dtype=np.float64)
+
+    def _again(self, task: str, parameters: Array) -> Again | None:
+        """The task with other unknowns than at its last call; None if more than they differ."""
+        if not isinstance(self.kernel, Kernel) or self.point_data is not None:
+            return None
+        known = self.calls.get(task)
+        if known is None or known[0] is not parameters:
+            at_rest = np.zeros(self.dofs.shape)
+            call = self.kernel.call(task, self.coordinates, at_rest, **self._given(parameters))
+            known = self.calls[task] = parameters, call.again()
+        return known[1]
 
     def pieces(self, scatter: Integers) -> Iterator[tuple[ElementBlock, Integers]]:
         """Parts of the block whose tangents fit into a core's cache, with theirs of `scatter`."""
