@@ -12,6 +12,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from scipy.sparse import csc_array
+
 from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.contact import held_moment, held_place
 from softehl.cases.seal.contacts import contact_edges
@@ -23,6 +26,7 @@ from softehl.cases.seal.path import PathSettings, Stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.schur import SchurCorrector
@@ -56,19 +60,20 @@ def film_offsets(
     groove: its place depends on the way.
     """
     p, edges = system.parameters, contact_edges(system, x)
-    if _stays(p) or not edges:
+    if stays(p) or not edges:
         return (settings.offset,)
-    h = film_thickness(p, [edges[0 if stroke == "out" else -1]], _start_speed(system, settings))
+    h = film_thickness(p, [edges[0 if stroke == "out" else -1]], start_speed(system, settings))
     return tuple(films * h for films in FILMS_OFF)
 
 
-def _start_speed(system: SealSystem, settings: PathSettings) -> float:
+def start_speed(system: SealSystem, settings: PathSettings) -> float:
+    """|U| (mm/s) at which shear stress begins to act, and from which it falls."""
     p = system.parameters
-    least = settings.start_speed if _stays(p) else settings.placed_start_speed
+    least = settings.start_speed if stays(p) else settings.placed_start_speed
     return max(least, *p.speeds)
 
 
-def _stays(p: ORing) -> bool:
+def stays(p: ORing) -> bool:
     """Whether the rod stays where the contact stage holds it."""
     return p.given_arc is not None or p.rubs
 
@@ -91,7 +96,7 @@ def film_on(system: SealSystem, stroke: Stroke, x: Array, speed: float) -> FilmL
 
 def first_film(system: SealSystem, settings: PathSettings, stroke: Stroke, x: Array) -> FilmLoads:
     """The film at its highest speed, under the rod forces of the contact state x."""
-    film = film_on(system, stroke, x, _start_speed(system, settings))
+    film = film_on(system, stroke, x, start_speed(system, settings))
     shear = 1.0 if system.parameters.shear_traction else 0.0
     return replace(film, shear=shear, rod_offset=settings.offset)
 
@@ -184,6 +189,25 @@ class FastFilm:
     def weight(self, stage: Stage) -> Stage:
         """The stage from contact to film, to a loose tolerance: its states are not results."""
         return self._stage(stage, self.corrector.with_tolerance(_LOOSE), _WEIGHT_STEPS)
+
+    def thinning(
+        self, stage: Stage, hold: csc_array[np.float64], x: Array, rate: Callable[[float], float]
+    ) -> Stage:
+        """The stage held near x (n,) by a linear term (n, n), times a rate by the parameter."""
+        held = self._stage(stage, self.corrector.with_tolerance(_LOOSE), stage.steps)
+
+        def problem_at(parameter: float) -> Layered:
+            layered = held.problem_at(parameter)
+            assert isinstance(layered, Layered)
+            parts = layered.problem, layered.layer, layered.guards
+            return Relaxed(*parts, hold=hold, state=x, rate=rate(parameter))
+
+        return replace(held, problem_at=problem_at)
+
+    def slowing(self, stage: Stage) -> Stage:
+        """The stage of falling speed before shear acts, to a loose tolerance."""
+        loose = self._stage(stage, self.corrector.with_tolerance(_LOOSE), _SPEED_STEPS)
+        return replace(loose, name="to the first speed")
 
     def shear(self, stage: Stage) -> Stage:
         """The stage in which the shear stress begins to act, to a smaller tolerance."""

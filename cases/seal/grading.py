@@ -129,6 +129,12 @@ def inlet_length(p: ORing, rise: float) -> float:
     return float(max((flow * E**2 / rise**1.5) ** 0.4, asperities))
 
 
+def inlet_time(p: ORing, edge: Edge, speed: float) -> float:
+    """Time (s) in which a rod passes the inlet at an edge at |U|."""
+    at_speed = p.model_copy(update={"speeds": (speed,)})
+    return inlet_length(at_speed, edge.rise) / speed
+
+
 def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
     """About half of h* (mm) at |U|, K l^(3/2) / E with the l of the head of this page."""
     flow, E = p.viscosity * speed, 3.0 * p.surface_modulus
@@ -154,8 +160,8 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, p: ORing) -> flo
     reach = max(REACH, FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds)))
     steep = np.degrees(np.arctan2(np.diff(h), np.diff(z))) >= STEEPEST
     for i in range(first, len(s) - 1):
-        if steep[i]:
-            return float(s[i])
+        if steep[i]:  # on a coarse mesh next to the contact, which the arc has to contain
+            return float(s[max(i, first + 1)])
         if h[i + 1] >= reach:
             return float(np.interp(reach, h[i : i + 2], s[i : i + 2]))
     return float(s[-1])

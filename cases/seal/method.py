@@ -32,6 +32,7 @@ from softehl.cases.seal.film import (
     release_stage,
     shear_stage,
     speed_stage,
+    start_speed,
     weight_stage,
 )
 from softehl.cases.seal.loads import FilmLoads, Stroke
@@ -51,6 +52,7 @@ from softehl.cases.seal.results import (
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmState, Observer, Outcome
+from softehl.cases.seal.thinning import thinned_film, thinning_stage
 from softehl.cases.seal.verdict import ANY_RATIO, INLET_RATIO, Verdict, fewest_inlet_segments
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
@@ -128,6 +130,24 @@ class FilmPath:
         end = self.driver.follow_all(stages, x)
         return end if isinstance(end, StageFailed) else None
 
+    def thinned(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All films of a stroke, the first by squeezing out what is in contact at x; see `fast`."""
+        system, settings, p = self.system, self.settings, self.system.parameters
+        linear = self.driver.newton.linear
+        assert isinstance(linear, Condenser)
+        fast = FastFilm.of(system, linear, x)
+        stage, y = thinning_stage(fast, film, x)
+        first = start_speed(system, settings)
+        slower = speed_stage(system, settings, film, (first,), lambda *_: None)
+        stages = [stage, fast.slowing(slower)]
+        film = replace(film, speed=first)
+        if p.shear_traction:
+            film = replace(film, shear=1.0)
+            stages.append(fast.shear(shear_stage(system, settings, film)))
+        stages.append(fast.speed(speed_stage(system, settings, film, p.speeds, on_speed)))
+        end = self.driver.follow_all(stages, y)
+        return end if isinstance(end, StageFailed) else None
+
     def carried(
         self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
     ) -> StageFailed | None:
@@ -151,6 +171,13 @@ class FilmPath:
 
         Other starts are tried where one does not lead to a film.
         """
+        thick = thinned_film(self.system, self.settings, stroke, x) if self.quick else None
+        if thick:
+            failed = self.thinned(thick, x, on_speed)
+            if failed is None:
+                return None
+            if "falling speed" in failed.stage.name:
+                return first_film(self.system, self.settings, stroke, x), x
         first: BuiltFilm | None = None
         for film, y in self.starts(stroke, x):
             first = first or (film, y)

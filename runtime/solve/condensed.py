@@ -93,6 +93,12 @@ class CondensedSystem:
         r[: len(shared)] += self.g + self.schur @ (y - self.at.x)[shared]
         return r, L
 
+    def residual(self, y: Array) -> Array:
+        """Residual (m + k,)."""
+        r, shared = self.problem.layer_residual(y).copy(), self.problem.shared
+        r[: len(shared)] += self.g + self.schur @ (y - self.at.x)[shared]
+        return r
+
     def norm(self, r: Array) -> float:
         """Size of r as a part of a full residual."""
         full, m = np.zeros_like(self.at.x), len(self.problem.shared)

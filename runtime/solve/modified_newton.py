@@ -25,6 +25,9 @@ from softehl.runtime.solve.condensed import (
 from softehl.runtime.solve.linear import Condensed, SingularMatrix
 from softehl.runtime.solve.solution import Solution, Status
 
+_CUTS = (1.0, 0.3, 0.1, 0.03)  # of a step, one after the other
+_MUCH = 1.5  # times the residual before
+
 
 @dataclass(frozen=True)
 class ModifiedNewton:
@@ -97,15 +100,24 @@ class ModifiedNewton:
     ) -> Array | None:
         """The next iterate, None if the inner iteration fails."""
         g, reduced = condensed.reduce(at.body)
-        y = self._inner(CondensedSystem(problem, condensed.schur, g, at), at.x, target)
+        inner = CondensedSystem(problem, condensed.schur, g, at)
+        y = self._inner(inner, at.x, target)
+        if y is None:
+            y = self._inner(inner, at.x, target, cautious=True)
         if y is None:
             return None
         dx = -condensed.extend(reduced, (at.x - y)[problem.shared])
         dx[problem.own] = (y - at.x)[problem.own]
         return np.asarray(at.x + dx)
 
-    def _inner(self, inner: CondensedSystem, x: Array, target: float) -> Array | None:
-        """x with the shared and own unknowns that solve the small system, or nearly do."""
+    def _inner(
+        self, inner: CondensedSystem, x: Array, target: float, *, cautious: bool = False
+    ) -> Array | None:
+        """x with the shared and own unknowns that solve the small system, or nearly do.
+
+        cautious: whether its steps are shortened where they make the residual larger, which
+        hinders as often as it helps.
+        """
         best, least, before = x, math.inf, math.inf
         for _ in range(self.max_inner):
             r, L = inner.linearise(x)
@@ -119,10 +131,28 @@ class ModifiedNewton:
                 step = inner.step(r, L)
             except SingularMatrix:
                 return None
-            x, before = x + inner.limit(x, step) * step, norm
+            fraction = inner.limit(x, step)
+            x = _along(inner, x, fraction * step, norm) if cautious else x + fraction * step
+            before = norm
         # an active set may cycle where the outer iterate is still rough: it need not be exact there
         enough = max(target, self.stagnation * self.tolerance, 0.1 * inner.start)
         return best if least <= enough else None
+
+
+def _along(inner: CondensedSystem, x: Array, step: Array, norm: float) -> Array:
+    """The next inner iterate (n,); nearer where the step makes the residual much larger.
+
+    A kink of the layer may lie within a step, as where it begins to cavitate.
+    """
+    found, least = x, math.inf
+    for cut in _CUTS:
+        y = x + cut * step
+        size = inner.norm(inner.residual(y))
+        if size < least:
+            found, least = y, size
+        if least <= _MUCH * norm:
+            break
+    return found
 
 
 def _solution(x: Array, status: Status, norms: list[float], message: str = "") -> Solution:

@@ -1,6 +1,7 @@
 """The O-ring solved: convergence, flux, both strokes, p_s = 0, labelled collapse, named failure."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -186,13 +187,17 @@ def test_low_sealed_pressure_works_in_both_strokes(p_s: float) -> None:
 
 
 def test_a_collapsed_film_is_labelled_and_the_end_of_its_path_named() -> None:
-    """Density 1 at 3 MPa: collapsed at once, and the path turns back at 672 mm/s."""
+    """Density 1 at 3 MPa: collapsed at once, and the path turns back at about 670 mm/s."""
     speeds = (1600.0, 400.0, 50.0)
     parameters = oring(density=1, sealed_pressure=3.0, stroke="in", speeds=speeds)
     outcome = run(parameters, Recorder())
     assert [(s.rod_speed_mm_s, s.verdict) for s in outcome.states] == [(-1600.0, COLLAPSED)]
     assert outcome.status is Status.STEP_TOO_SMALL
-    assert "stroke in: falling speed -50 was not reached, only -672" in outcome.message
+    found = re.search(
+        r"stroke in: falling speed -50 was not reached, only -([\d.]+)", outcome.message
+    )
+    assert found is not None
+    assert 665.0 < float(found[1]) < 675.0
     assert "finer mesh" in outcome.message
 
 

@@ -1,0 +1,121 @@
+"""From contact to a film: what contact holds the rod off is a film, which is squeezed out.
+
+The gap and the pressure of contact are those of a film that begins to be squeezed. One implicit
+step of the length tau from there,
+
+    dq/dx + (h - h_contact) / tau = 0,
+
+is contact for tau -> 0 and the steady film for tau -> infinity: a path whose nearest known state is
+contact itself, at any distance of the rod. The section bears the same load all the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp, inf, log, pi
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+
+from softehl.cases.seal.contacts import Edge, contact_edges
+from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.film import FastFilm, film_on, start_speed, stays
+from softehl.cases.seal.grading import film_thickness, inlet_time
+from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.system import DISPLACEMENT
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.rules import content_rule, pressure_nodes
+from softehl.runtime.solve.steps import StepRule
+
+THINNED = 4.0
+"""A film is sought at a speed at which it is about so many times thinner than contact holds the rod
+off: shear, which is left out until then, and heights in corners matter at much higher ones."""
+
+_SHORT, _LONG = 1e-3, 1e4  # tau over the time in which the rod passes the inlet
+_STEPS = StepRule(3.0, 0.05, 6.0, target_iterations=8)  # of log tau
+
+
+def thinned_film(
+    system: SealSystem, settings: PathSettings, stroke: Stroke, x: Array
+) -> FilmLoads | None:
+    """The first film of a stroke from the contact state x, without shear; None where the rod has
+    to stay where contact holds it, or where nothing touches it.
+    """
+    p, edge = system.parameters, _inlet(system, stroke, x)
+    if stays(p) or edge is None:
+        return None
+    slow = 1.75 * film_thickness(p, [edge], 1.0)
+    fast = (settings.offset / (THINNED * slow)) ** (1.0 / 0.6)
+    film = film_on(system, stroke, x, max(fast, start_speed(system, settings)))
+    return replace(film, rod_offset=settings.offset)
+
+
+def thinning_stage(fast: FastFilm, film: FilmLoads, x: Array) -> tuple[Stage, Array]:
+    """Second stage, by squeezing: to a film without shear at film.speed; and its start (n,).
+
+    x: the contact state. The path parameter is log tau.
+    """
+    system = fast.system
+    edge = _inlet(system, film.stroke, x)
+    assert edge is not None
+    unit = inlet_time(system.parameters, edge, film.speed)
+    hold = gap_masses(system, x)
+    stage = Stage(
+        name="contact to film",
+        problem_at=lambda _: system.film_problem(film),
+        start=log(_SHORT),
+        stop=log(_LONG),
+        steps=_STEPS,
+        sealed_pressure=film.sealed_pressure,
+        stroke=film.stroke,
+        shown=exp,
+    )
+    stage = fast.thinning(stage, hold, x, lambda t: -exp(-t) / unit)
+    return stage, pressed_film(system, x, film.sealed_pressure)
+
+
+def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
+    """The contact state x (n,) with a film that has the pressures of the contact."""
+    y, section, nodes = x.copy(), system.section, system.mesh.arc_nodes
+    z, r = system.deformed(x)[nodes].T
+    dz = np.diff(z)
+    width = 0.5 * (np.append(dz, 0.0) + np.append(0.0, dz))
+    force = np.maximum(-system.rod_multipliers(x), 0.0) * system.rod_areas
+    low, sealed = section.lowest, np.zeros(len(nodes))
+    sealed[:low] = p_s
+    if 0 < low < len(dz):
+        sealed[low] = p_s * dz[low - 1] / (dz[low - 1] + dz[low])
+    pressures = force / (2.0 * pi * r * width) + sealed
+    rows = system.pressure_dofs()
+    y[rows] = np.stack([pressures[:-1], pressures[1:]], axis=1) @ _shapes(rows.shape[1] - 1).T
+    return y
+
+
+def gap_masses(system: SealSystem, x: Array) -> csc_array[np.float64]:
+    """Rates (n, n) of what the film holds by the radial displacements of the arc, mm.
+
+    Rows are the pressures'; what a film holds is lumped where these stand.
+    """
+    rows, n = system.pressure_dofs(), system.layout.total
+    segments, order = system.mesh.arc_segments, rows.shape[1] - 1
+    z = system.deformed(x)[:, 0]
+    half = 0.5 * (z[segments[:, 1]] - z[segments[:, 0]])
+    radii = system.layout.part(DISPLACEMENT).start + 2 * segments + 1
+    masses = half[:, None, None] * (content_rule(order).weights[:, None] * _shapes(order))
+    at = np.broadcast_arrays(rows[:, :, None], radii[:, None, :])
+    places = tuple(part.ravel() for part in at)
+    return csc_array(coo_array((masses.ravel(), places), shape=(n, n)))
+
+
+def _shapes(order: int) -> Array:
+    """Of both nodes of a segment, (order + 1, 2), where its pressures stand."""
+    xi = pressure_nodes(order)
+    return np.stack([0.5 * (1.0 - xi), 0.5 * (1.0 + xi)], axis=1)
+
+
+def _inlet(system: SealSystem, stroke: Stroke, x: Array) -> Edge | None:
+    """The edge of the contact x where a stroke draws its film in."""
+    edges = contact_edges(system, x)
+    found = edges[0 if stroke == "out" else -1] if edges else None
+    return found if found and 0.0 < found.rise < inf else None

@@ -1,0 +1,62 @@
+"""A layered problem that a linear term of its layer holds near a state; a path lets it go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.cut import Parts
+from softehl.runtime.fem.layered import Layered
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxed(Layered):
+    """R(x) + rate C (x - state); satisfies `LayeredProblem`.
+
+    hold: C, (n, n): what unknowns that the layer shares do to its equations. state: (n,). Rows of
+    prescribed unknowns are left as they are.
+    """
+
+    hold: csc_array[np.float64] = field(kw_only=True)
+    state: Array = field(kw_only=True)
+    rate: float = field(kw_only=True)
+
+    def residual(self, x: Array) -> Array:
+        """See `LayeredProblem`."""
+        return np.asarray(super().residual(x) + self._free @ (x - self.state))
+
+    def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
+        """See `LayeredProblem`."""
+        r, K = super().linearise(x)
+        return r + self._free @ (x - self.state), csc_array(K + self._free)
+
+    def layer_residual(self, x: Array) -> Array:
+        """See `LayeredProblem`."""
+        return np.asarray(super().layer_residual(x) + self._small @ self._away(x))
+
+    def layer_linearise(self, x: Array) -> tuple[Array, Parts]:
+        """See `LayeredProblem`."""
+        r, parts = super().layer_linearise(x)
+        return r + self._small @ self._away(x), replace(parts, shared=parts.shared + self._small)
+
+    def _away(self, x: Array) -> Array:
+        return np.asarray((x - self.state)[self.shared])
+
+    @cached_property
+    def _free(self) -> csc_array[np.float64]:
+        """The term (n, n) without rows of prescribed unknowns."""
+        C = self.hold.copy()
+        free = np.ones(C.shape[0])
+        free[self.problem.fixed] = 0.0
+        C.data *= self.rate * free[C.indices]
+        return C
+
+    @cached_property
+    def _small(self) -> Array:
+        """The term (m + k, m) of the layer."""
+        numbers = self.layer.numbers[: self.layer.size]
+        return self._free.tocsr()[numbers].tocsc()[:, self.shared].toarray()

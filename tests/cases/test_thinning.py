@@ -1,0 +1,122 @@
+"""From contact to a film by squeezing out what contact holds the rod off."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import log
+
+import numpy as np
+import pytest
+
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.film import FastFilm
+from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.method import FilmPath
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.state import Silent
+from softehl.cases.seal.system import DISPLACEMENT
+from softehl.cases.seal.thinning import gap_masses, thinned_film, thinning_stage
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.relaxed import Relaxed
+from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.solution import Point
+
+SETTINGS = PathSettings()
+
+
+@cache
+def contact() -> tuple[SealSystem, Array]:
+    """AS568-210 under 3 MPa on a coarse mesh."""
+    p = ORing(ring="AS568-210", rod=19.0, sealed_pressure=3.0, density=1, speeds=(400.0,), mu_1=1.5)
+    found = ContactRoute(SETTINGS, PathDriver(Silent()).follow).contact(p)
+    assert not isinstance(found, StageFailed)
+    return found
+
+
+def thin(loads: FilmLoads) -> tuple[FastFilm, FilmLoads]:
+    system, x = contact()
+    linear = PathDriver(Silent()).newton.linear
+    assert isinstance(linear, Condenser)
+    return FastFilm.of(system, linear, x), loads
+
+
+def loads() -> FilmLoads:
+    system, x = contact()
+    film = thinned_film(system, SETTINGS, "out", x)
+    assert film is not None
+    return film
+
+
+def relaxed(tau: float) -> tuple[Relaxed, Array]:
+    """The problem of a time over that of the inlet, and the start of the path."""
+    fast, film = thin(loads())
+    stage, start = thinning_stage(fast, film, contact()[1])
+    problem = stage.problem_at(log(tau))
+    assert isinstance(problem, Relaxed)
+    return problem, problem.admissible(start)
+
+
+def test_pressures_of_contact_bear_the_section() -> None:
+    """What is left of its equilibrium is a per cent of what it is without them."""
+    system, x = contact()
+    problem, start = relaxed(1e-3)
+    part = system.layout.part(DISPLACEMENT)
+    left, without = (np.linalg.norm(problem.scaled(problem.residual(y))[part]) for y in (start, x))
+    assert left < 0.02 * without
+
+
+def test_where_pressures_are_left_out_nothing_bears_it() -> None:
+    """Half of them leave half of the load: the test above can fail."""
+    system, x = contact()
+    problem, start = relaxed(1e-3)
+    part = system.layout.part(DISPLACEMENT)
+    half = 0.5 * (start + x)
+    left, without = (np.linalg.norm(problem.scaled(problem.residual(y))[part]) for y in (half, x))
+    assert left == pytest.approx(0.5 * without, rel=0.05)
+
+
+def test_masses_add_up_to_what_a_wider_gap_holds() -> None:
+    """A gap that is 1 um wider everywhere holds 1 um times the length of the film more."""
+    system, x = contact()
+    wider = np.zeros_like(x)
+    wider[system.layout.part(DISPLACEMENT).start + 2 * system.mesh.arc_nodes + 1] = 1e-3
+    z, _ = system.arc_film(x)
+    assert (gap_masses(system, x) @ wider).sum() == pytest.approx(1e-3 * (z[-1] - z[0]), rel=1e-12)
+
+
+def test_tangents_are_those_of_the_residuals() -> None:
+    """Of the whole problem and of its layer, by central differences; both agree in the layer."""
+    problem, start = relaxed(0.1)
+    start[problem.own] += 0.1  # away from where the film begins to cavitate
+    m, dx = len(problem.shared), np.zeros_like(start)
+    dx[problem.shared] = 1e-7 * np.random.default_rng(3).standard_normal(m)
+    dx[problem.problem.fixed] = 0.0
+    change = 0.5 * (problem.residual(start + dx) - problem.residual(start - dx))
+    _, K = problem.linearise(start)
+    assert np.linalg.norm(K @ dx - change) < 1e-5 * np.linalg.norm(change)
+    small = 0.5 * (problem.layer_residual(start + dx) - problem.layer_residual(start - dx))
+    _, L = problem.layer_linearise(start)
+    assert np.linalg.norm(L.shared @ dx[problem.shared] - small) < 1e-5 * np.linalg.norm(small)
+    assert small[m:] == pytest.approx(change[problem.own], rel=1e-9, abs=1e-12)
+
+
+def test_the_first_film_is_that_of_the_fading_contact() -> None:
+    """By squeezing and by Newton's method with fading contact: one film at 400 mm/s."""
+    system, x = contact()
+    path, found = FilmPath(system, SETTINGS, PathDriver(Silent())), []
+
+    def keep(film: FilmLoads, point: Point) -> None:
+        if film.speed == 400.0:
+            found.append(system.arc_film(point.solution.x)[1].min())
+
+    assert path.thinned(loads(), x, keep) is None
+    built = path.build(*next(path.starts("out", x)))
+    assert path.slower(built, (400.0,), keep) is None
+    assert found[0] == pytest.approx(found[1], rel=1e-7)
+
+
+def test_a_rod_that_nothing_touches_has_no_such_film() -> None:
+    system, _ = contact()
+    assert thinned_film(system, SETTINGS, "out", system.at_rest()) is None
