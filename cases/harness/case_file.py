@@ -83,19 +83,26 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not key or not equals:
         raise BadInput(f"{origin} {shortened(text)}: allowed is KEY=VALUE, as in length=4")
-    try:
-        table = tomllib.loads(f"value = {value}")
-    except (ValueError, RecursionError):
-        table = {}
-    if list(table) == ["value"]:
-        return key, table["value"]
     plain = (_BARE_WORD, _PHRASE, _FILE)
+    if (read := _toml_value(value)) is not None:
+        return key, read
     if is_quantity(value) or any(form.fullmatch(value) for form in plain):
         return key, value
+    if "," in value and (read := _toml_value(f"[{value}]")) is not None:  # 400, 100
+        return key, read
     raise BadInput(
         f"{origin} {key}: {shortened(value)!r} is not a TOML value; "
         f'allowed are a number, true or false, a word, "text" or a list as in [400, 100]'
     )
+
+
+def _toml_value(text: str) -> Any:
+    """A value in TOML, None where it is none."""
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return None
+    return table["value"] if list(table) == ["value"] else None
 
 
 def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
@@ -137,9 +144,10 @@ def require_known(kind: type[Parameters], keys: Iterable[str], origins: Mapping[
     known = list(kind.model_fields)
     for key in keys:
         if key not in kind.model_fields:
+            near = meant(key, known)
+            allowed = "what `softehl keys` lists" if near else ", ".join(known)
             raise BadInput(
-                f"{origins[key]}: unknown key {shortened(key)!r}{meant(key, known)}; "
-                f"allowed: {', '.join(known)}"
+                f"{origins[key]}: unknown key {shortened(key)!r}{near}; allowed: {allowed}"
             )
 
 

@@ -14,13 +14,14 @@ from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.state import FilmState, Silent
 from softehl.cases.seal.variation import NUMBERS, PRESSURE_KEY
+from softehl.runtime.names import meant
 
 
 def design_case(p: ORing, target: str, key: str) -> int:
     """Print the way to the target; exit code 0, or 3 where it is not reached.  Raises BadInput."""
     if key not in (*NUMBERS, PRESSURE_KEY) or not isinstance(getattr(p, key), float):
         known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
-        raise BadInput(f"--by {key}: allowed: {', '.join(known)}")
+        raise BadInput(f"--by {key}{meant(key, known)}: allowed: {', '.join(known)}")
     if len(p.speeds) > 1 or p.stroke == "both":
         p = p.model_copy(update={"speeds": p.speeds[:1], "stroke": _one(p.stroke)})
     p = p.model_copy(update={"sensitivity": True, "error_estimate": False})

@@ -133,6 +133,8 @@ def test_a_seal_that_cannot_be_mounted(changes: dict[str, Any], reason: str) -> 
         ("a=in", "in"),
         ('a="in"', "in"),
         ("a=[400, 100]", [400, 100]),
+        ("a=400, 100", [400, 100]),
+        ("a=400,", [400]),
         ("a=rod_diameter 0.05 mm", "rod_diameter 0.05 mm"),
         ("a=viscosity 10 %", "viscosity 10 %"),
         ("a=x=1", None),
