@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
+from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import contact_key
 from softehl.cases.seal.contacts import contact_edges, contacts, groups
@@ -22,7 +23,7 @@ from softehl.cases.seal.results import contact_peaks, contact_pressure, film_par
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
 from softehl.cases.seal.verdict import ContactNumbers, FilmNumbers, Verdict
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 
 GROOVE: dict[str, Any] = {"housing_diameter": 56.4, "groove_width": 4.3}
 X_RING: dict[str, Any] = {"section": "x_ring", "lobe_radius": 0.9, "fillet_radius": 0.6, **GROOVE}
@@ -149,6 +150,13 @@ def test_every_contact_is_judged_against_its_own_pressure() -> None:
     assert Verdict(3.8).after(_numbers(0.27, 0.27)).word == OK
 
 
+def _plain(section: str) -> dict[str, Any]:
+    """A gland for a section of usual dimensions."""
+    own = {"lobe_radius": None, "fillet_radius": None} if section != "x_ring" else {}
+    wide = {"groove_width": 6.0} if section == "u_cup" else {}
+    return {"section": section, **own, **wide}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("stretch", "pressure"), [(0.85, 2.421), (0.90, 1.554)])
 def test_a_frictionless_rectangle_in_plane_strain(stretch: float, pressure: float) -> None:
@@ -168,6 +176,60 @@ def test_a_frictionless_rectangle_in_plane_strain(stretch: float, pressure: floa
     z, _ = system.arc_film(x)
     found = contact_pressure(system, 0.0, x)[int(np.argmin(np.abs(z)))]
     assert found == pytest.approx(pressure, rel=5e-3)
+
+
+def _by_node(nodes: Integers, values: Array, size: int) -> Array:
+    found = np.full(size, np.nan)
+    found[nodes] = values
+    return found
+
+
+def mirrored(system: SealSystem, x: Array) -> tuple[SealSystem, Array]:
+    """The system on the mirror image of its mesh, and the state x as it is seen there."""
+    mesh, flip = system.mesh, np.array([-1.0, 1.0])
+    order = np.concatenate(
+        [np.arange(mesh.arc, -1, -1), np.arange(len(mesh.boundary) - 1, mesh.arc, -1)]
+    )
+    places = mesh.places[order]
+    places[mesh.arc + 1 :] -= mesh.length
+    image = replace(
+        mesh,
+        points=mesh.points * flip,
+        quads=mesh.quads[:, ::-1],
+        boundary=mesh.boundary[order],
+        places=-places,
+    )
+    new = SealSystem.of(system.parameters, replace(system.section, mesh=image))
+    y, size = new.at_rest(), len(mesh.points)
+    new.displacements(y)[:] = system.displacements(x) * flip
+    walls = {"sealed_wall": "air_wall", "air_wall": "sealed_wall"}
+    on = {"rod": "arc_nodes", "housing": "outer_nodes", **dict.fromkeys(walls, "wall_nodes")}
+    for name, chain in on.items():
+        values = x[system.layout.part(walls.get(name, name))]
+        known = _by_node(system.section.chains[chain][0], values, size)
+        y[new.layout.part(name)] = known[new.section.chains[chain][0]]
+    for name in ("rotation", "axial"):
+        y[new.layout.part(name)] = -x[system.layout.part(name)]
+    return new, y
+
+
+@pytest.mark.parametrize("section", [name for name in SECTIONS if name != "round"])
+def test_without_pressure_the_mirror_image_of_a_state_is_one(section: str) -> None:
+    """Exact, whatever the mesh: the triangles inside are not symmetric, and need not be."""
+    system = build_system(
+        ORing(**{**X_RING, **_plain(section), "density": 1, "sealed_pressure": 0.0})
+    )
+    x = ContactRoute(PathSettings(), PathDriver(Silent()).follow)._loaded(system)
+    assert not isinstance(x, StageFailed)
+    norms = []
+    for one, state in ((system, x), mirrored(system, x)):
+        problem = contact_problem(one, PathSettings(), 0.0)
+        norms.append(problem.norm(problem.residual(state)))
+    assert max(norms) < 1e-9
+    image, y = mirrored(system, x)
+    y[image.layout.part("displacement")] = x[system.layout.part("displacement")]
+    problem = contact_problem(image, PathSettings(), 0.0)
+    assert problem.norm(problem.residual(y)) > 1.0
 
 
 @pytest.mark.slow
