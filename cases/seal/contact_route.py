@@ -80,7 +80,7 @@ class ContactRoute:
 
     def contact(self, p: ORing) -> State | StageFailed:
         """The system of a case, uniform or graded, and its unknowns in contact under p_s."""
-        graded = p.mesh == "graded" or p.given_arc is None
+        graded = p.mesh != "file" and (p.mesh == "graded" or p.given_arc is None)
         return self._graded(p) if graded else self._uniform(p)
 
     def _uniform(self, p: ORing) -> State | StageFailed:
@@ -284,7 +284,7 @@ class ContactRoute:
             state = self.carried(
                 *state, build_system(finer(coarse.parameters), coarse.section.layout)
             )
-            if not isinstance(state, StageFailed) and coarse.parameters.mesh == "uniform":
+            if not isinstance(state, StageFailed) and coarse.parameters.mesh != "graded":
                 self.contacts.keep(*state)
         return state
 

@@ -87,7 +87,7 @@ def placed_layout(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGME
         system.mesh, system.pressing(ROD, x), system.pressing(BORE, x), p.sealed_pressure
     )
     layout = uniform_layout(p).between(seen, ends)
-    if p.mesh == "uniform" or not edges:
+    if p.mesh != "graded" or not edges:
         return layout
     length, steepest = ends[1] - ends[0], max(edge.rise for edge in edges)
     spots = []

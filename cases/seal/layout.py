@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.sections.files import finer as divided
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.postprocess import run_around
 from softehl.runtime.mesh.outline import Shape
@@ -276,6 +277,32 @@ class OutlineLayout:
         return replace(self, spacing=spacing, long=long)
 
 
+@dataclass(frozen=True)
+class FileLayout(OutlineLayout):
+    """The mesh of a file as it is, every element divided by the density; its film is where it is.
+
+    base: the mesh of density 1.
+    """
+
+    base: SectionMesh | None = None
+
+    @classmethod
+    def of(cls, p: ORing) -> FileLayout:
+        """Of a case whose mesh is one of a file."""
+        shape, base = p.free_section, p.file_mesh
+        return cls(shape, shape.film, None, base.arc, base=base)
+
+    def mesh(self, density: int | Fraction) -> SectionMesh:
+        """See `Layout`."""
+        assert self.base is not None
+        return divided(self.base, int(density))
+
+    def between(self, old: Layout, ends: tuple[float, float]) -> FileLayout:
+        """See `Layout`: with what it knows of the ends of the pressure."""
+        assert isinstance(old, FileLayout)
+        return replace(self, dams=old.dams)
+
+
 def _closest(angles: Array, angle: float) -> int:
     """Index of that of several angles which is closest to another one, degrees."""
     return int(np.argmin(np.abs((angles - angle + 180.0) % 360.0 - 180.0)))
@@ -321,6 +348,8 @@ def dam(excess: Array, index: int, p_s: float) -> int | None:
 
 def uniform_layout(p: ORing) -> Layout:
     """The section of a case with equal segments on its arc, the given one or a wide guide."""
+    if p.mesh == "file":
+        return FileLayout.of(p)
     if not p.round:
         return OutlineLayout(p.free_section, p.free_section.film, None, p.lobes * LONG_PLACED)
     radius = 0.5 * p.section_diameter

@@ -307,7 +307,7 @@ class SealRun:
         reference = float(contact_pressure(self.system, p.sealed_pressure, self.x).max())
         references = contact_peaks(self.system, p.sealed_pressure, self.x)
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
-        ratios = INLET_RATIO if p.mesh == "graded" else ANY_RATIO
+        ratios = ANY_RATIO if p.mesh == "uniform" else INLET_RATIO
         known = _known(*self.coarser, stroke, self.system) if self.coarser else None
         coarser = known.thicknesses if known else {}
         verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)

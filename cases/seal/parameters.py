@@ -3,8 +3,10 @@
 Units are mm, MPa, N, s.
 """
 
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from softehl.cases.harness.parameters import key
@@ -14,11 +16,19 @@ from softehl.cases.seal.oils import with_oil
 from softehl.cases.seal.regions import MATERIALS, Region, with_regions
 from softehl.cases.seal.rubber import with_rubber
 from softehl.cases.seal.rubber_keys import RubberKeys
-from softehl.cases.seal.sections.keys import SectionKeys, lobes, with_outline
+from softehl.cases.seal.sections.keys import (
+    SectionKeys,
+    is_mesh,
+    lobes,
+    mesh_of_file,
+    surface_of,
+    with_outline,
+)
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness, Surfaces
 from softehl.cases.seal.tolerances import read_tolerances
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.parted_mesh import CAP
+from softehl.runtime.mesh.sections import SectionMesh
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
@@ -44,8 +54,11 @@ class ORing(SectionKeys, RubberKeys):
     density: Literal[1, 2, 4, 8, 16] = key(
         2, "mesh density d: 27 d segments on the lubricated arc", bounds="1, 2, 4, 8 or 16"
     )
-    mesh: Literal["graded", "uniform"] = key(
-        "graded", "segments of the arc", bounds='"graded" (fine at the contact edges) or "uniform"'
+    mesh: Literal["graded", "uniform", "file"] = key(
+        "graded",
+        "segments of the arc",
+        bounds='"graded" (fine at the contact edges), "uniform" or "file" (those of the mesh file '
+        "that outline names, each divided by density)",
     )
     pressure_order: int = key(
         4, "order m_p of the film pressure on a segment", bounds="1 to 64", ge=1, le=64
@@ -322,7 +335,33 @@ class ORing(SectionKeys, RubberKeys):
     @property
     def surface_modulus(self) -> float:
         """Shear modulus of what the film is on [MPa]."""
-        return self.rubber(CAP if CAP in self.materials else "").shear_modulus
+        under = surface_of(self._file) if self.mesh == "file" else CAP
+        return self.rubber(under if under in self.materials else "").shear_modulus
+
+    @property
+    def regions(self) -> tuple[str, ...]:
+        """Names of the regions that may have a material of their own."""
+        if self.mesh == "file":
+            return tuple(self.file_mesh.regions)
+        return () if self.cap_thickness is None else (CAP,)
+
+    @property
+    def has_body(self) -> bool:
+        """Whether a part of the section has no material of its own."""
+        if self.mesh != "file" or not self.materials:
+            return True
+        mesh = self.file_mesh
+        own = set[int]().union(*(mesh.regions[name].tolist() for name in self.materials))
+        return len(own) < len(mesh.quads)
+
+    @property
+    def file_mesh(self) -> SectionMesh:
+        """The mesh of the file that outline names, where it is."""
+        return mesh_of_file(self._file, self.inner_diameter)
+
+    @property
+    def _file(self) -> Path:
+        return Path(self.outline or "")
 
     def rubber(self, region: str) -> RubberKeys:
         """What a region of the section is made of; "" where it has no material of its own."""
@@ -342,6 +381,24 @@ class ORing(SectionKeys, RubberKeys):
         if len(set(speeds)) < len(speeds):
             raise ValueError("a speed is given twice")
         return speeds
+
+    @model_validator(mode="after")
+    def _mesh_is_there(self) -> Self:
+        if self.mesh != "file":
+            return self
+        if not is_mesh(self.outline):
+            raise ValueError(
+                'mesh = "file" takes the mesh of a file: give outline = "seal.msh" too, or leave '
+                "mesh out"
+            )
+        if self.cap_thickness is not None:
+            raise ValueError("cap_thickness: the mesh of a file has its own regions; leave it out")
+        regions = self.file_mesh.regions
+        cells = [n for name in self.materials for n in regions.get(name, np.empty(0)).tolist()]
+        if len(cells) > len(set(cells)):
+            names = " and ".join(self.materials)
+            raise ValueError(f"materials: {names} have elements in common; an element has one")
+        return self
 
     @model_validator(mode="after")
     def _rubber_has_an_element(self) -> Self:

@@ -7,7 +7,7 @@ crown and the sealed side. Sealed pressure acts from the sealed end of the arc r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -119,7 +119,7 @@ class SealSection:
             cells = mesh.regions[name]
             assert np.array_equal(cells, np.arange(done, done + len(cells)))
             found[name], done = mesh.quads[cells], done + len(cells)
-        return {**found, BODY: mesh.quads[done:]}
+        return {**found, BODY: mesh.quads[done:]} if done < len(mesh.quads) else found
 
     def _sealed_side(self) -> Integers:
         """Segments from the crown to the sealed end of the arc."""
@@ -135,4 +135,15 @@ def seal_section(
     """
     layout = layout or uniform_layout(p)
     mesh, own = layout.mesh(density or p.density), tuple(p.materials)
-    return SealSection(layout, mesh, placed=p.given_arc is None, own=own)
+    return SealSection(layout, _ordered(mesh, own), placed=p.given_arc is None, own=own)
+
+
+def _ordered(mesh: SectionMesh, own: tuple[str, ...]) -> SectionMesh:
+    """The mesh with the elements of these regions first, in this order."""
+    if not own:
+        return mesh
+    first = np.concatenate([mesh.regions[name] for name in own])
+    order = np.concatenate([first, np.setdiff1d(np.arange(len(mesh.quads)), first)])
+    number = np.argsort(order)
+    regions = {name: number[cells] for name, cells in mesh.regions.items()}
+    return replace(mesh, quads=mesh.quads[order], regions=regions)

@@ -154,7 +154,8 @@ def blocks_of(p: ORing) -> tuple[Block, ...]:
     """The blocks of a case, first the solids of its section in the order of their elements."""
     solid, *others = BLOCKS
     own = [replace(solid, name=f"{SOLID} {r}", elements=r, region=r) for r in p.materials]
-    return (*own, solid, *(block for block in others if block.needed(p)))
+    body = (solid,) if p.has_body else ()
+    return (*own, *body, *(block for block in others if block.needed(p)))
 
 
 def obstacles_of(p: ORing) -> dict[str, Obstacle]:

@@ -12,9 +12,15 @@ import numpy as np
 import pytest
 from ezdxf.filemanagement import new
 
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.equations import build_system
+from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.sections.files import finer, outline_of, read_mesh, read_outline
+from softehl.cases.seal.state import FilmState, Silent
 from softehl.cases.shipped import solve_cases
 from softehl.runtime.mesh.outline import Arc, Outline, Shape
 from softehl.runtime.mesh.outline_mesh import outline_mesh
@@ -291,3 +297,62 @@ def test_an_o_ring_from_a_drawing_has_the_film_of_the_built_in_one(tmp_path: Pat
     for a, b in zip(drawn.rows, built_in.rows, strict=True):
         assert a.h_star_um == pytest.approx(b.h_star_um, rel=2e-3)
         assert a.verdict == b.verdict
+
+
+def saved_as_it_is(p: ORing, path: Path) -> tuple[ORing, FilmState]:
+    """A case with the mesh that a graded run came to as its file, and what that run found."""
+    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+    found = route.contact(p)
+    assert not isinstance(found, StageFailed)
+    section = found[0].section
+    mesh, pressed = section.mesh, section.elements["sealed_side"]
+    cells = [(name, mesh.quads[mesh.regions[name]]) for name in p.materials]
+    cells.append(("rubber", section.elements["body"]))
+    named = [("quad", q) for _, q in cells] + [("line", mesh.arc_segments), ("line", pressed)]
+    tags = [np.full(len(c), k + 1) for k, (_, c) in enumerate(named)]
+    names = [*(name for name, _ in cells), "film", "pressure"]
+    dims = [2] * len(cells) + [1, 1]
+    numbers = range(1, len(names) + 1)
+    groups = {n: np.array([k, d]) for n, k, d in zip(names, numbers, dims, strict=True)}
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    points = np.pad(mesh.points, ((0, 0), (0, 1)))
+    kept = meshio.Mesh(points, named, cell_data=data, field_data=groups)
+    meshio.write(path, kept, file_format="gmsh22", binary=False)
+    (state,) = run(p, Silent()).states
+    changes = {"section": "round", "corner_radius": None, "cap_thickness": None, "density": 1}
+    own = {"outline": str(path), "mesh": "file", "inner_diameter": 2.0 * mesh.points[:, 1].min()}
+    given = {**p.model_dump(), **changes, **own}
+    del given["section_diameter"]
+    return ORing(**given), state
+
+
+ONE_FILM: dict[str, Any] = {"speeds": (800.0,), "stroke": "out", "error_estimate": False}
+
+
+def test_a_mesh_file_as_it_is_has_the_film_of_that_mesh(tmp_path: Path) -> None:
+    p, expected = saved_as_it_is(ORing(density=1, **ONE_FILM), tmp_path / "ring.msh")
+    (found,) = run(p, Silent()).states
+    assert found.h_star_um == pytest.approx(expected.h_star_um, rel=1e-4)
+    assert found.verdict == expected.verdict == OK
+    finer = ORing(**{**p.model_dump(), "density": 2})
+    assert len(build_system(finer).mesh.quads) == 4 * len(build_system(p).mesh.quads)
+
+
+def test_a_mesh_as_it_is_needs_a_file(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r'give outline = "seal\.msh" too'):
+        ORing(mesh="file")
+    mesh, shape = meshed()
+    path = save(mesh, shape, tmp_path / "seal.msh")
+    given: dict[str, Any] = {"outline": str(path), "mesh": "file", "groove_width": 5.0}
+    p = ORing(**given)
+    assert p.regions == ("rubber",)
+    system = build_system(ORing(**{**p.model_dump(), "density": 1}))
+    assert np.array_equal(system.mesh.quads, read_mesh(path, p.inner_diameter)[1].quads)
+    own: dict[str, Any] = {"materials": {"rubber": {"material": "neo-hooke", "mu": 9.0}}}
+    hard = ORing(**given, **own)
+    assert hard.surface_modulus == 9.0
+    assert build_system(hard).solids == ("solid rubber",)
+    with pytest.raises(ValueError, match=r"materials\.cap: the section has rubber"):
+        ORing(**{**given, "materials": {"cap": "ptfe"}})
+    with pytest.raises(ValueError, match="has its own regions; leave it out"):
+        ORing(**given, cap_thickness=1.0)

@@ -21,7 +21,7 @@ from softehl.cases.seal.given import number, put
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.sections.files import read_mesh, read_outline
 from softehl.runtime.mesh.outline import Shape
-from softehl.runtime.mesh.parted_mesh import CAP
+from softehl.runtime.mesh.sections import SectionMesh
 
 Name = Literal["round", "rectangular", "x_ring", "d_ring", "trapezoid", "u_cup"]
 
@@ -114,11 +114,6 @@ class SectionKeys(_Keys):
         """What the seal is called."""
         return NAMES[self.section] if self.outline is None else f"ring of {Path(self.outline).name}"
 
-    @property
-    def regions(self) -> tuple[str, ...]:
-        """Names of the regions that may have a material of their own."""
-        return () if self.cap_thickness is None else (CAP,)
-
     def free(self, height: float, inner_diameter: float) -> Shape:
         """The free section where it is, mm.  ValueError where there is none."""
         shape = self._whole(height, inner_diameter)
@@ -164,10 +159,36 @@ def shape_of_file(path: Path, inner_diameter: float | None = None) -> Shape:
 
 
 @lru_cache(maxsize=32)
-def _shape_of_file(path: Path, _changed: int, inner_diameter: float | None) -> Shape:
-    if path.suffix.lower() in (".dxf", ".csv"):
+def _shape_of_file(path: Path, changed: int, inner_diameter: float | None) -> Shape:
+    if not is_mesh(str(path)):
         return read_outline(path, inner_diameter)
-    return read_mesh(path, inner_diameter)[0]
+    return _mesh_of_file(path, changed, inner_diameter)[0]
+
+
+@lru_cache(maxsize=32)
+def _mesh_of_file(
+    path: Path, _changed: int, inner_diameter: float | None
+) -> tuple[Shape, SectionMesh]:
+    return read_mesh(path, inner_diameter)
+
+
+def is_mesh(outline: str | None) -> bool:
+    """Whether an outline is that of a mesh file."""
+    return outline is not None and Path(outline).suffix.lower() not in (".dxf", ".csv")
+
+
+def mesh_of_file(path: Path, inner_diameter: float) -> SectionMesh:
+    """The mesh of a file, its lowest point at half the diameter.  ValueError, one line."""
+    return _mesh_of_file(path, path.stat().st_mtime_ns, inner_diameter)[1]
+
+
+def surface_of(path: Path) -> str:
+    """The region of a mesh file that the lowest point of its film is on, "" if of none."""
+    mesh = _mesh_of_file(path, path.stat().st_mtime_ns, None)[1]
+    nodes = mesh.arc_nodes
+    lowest = nodes[int(np.argmin(mesh.points[nodes, 1]))]
+    found = [name for name, cells in mesh.regions.items() if (mesh.quads[cells] == lowest).any()]
+    return found[0] if found else ""
 
 
 def with_outline(values: dict[str, Any]) -> dict[str, Any]:
