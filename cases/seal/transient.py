@@ -24,6 +24,9 @@ from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.schur import SchurCorrector
 
+_TOUCHING = 0.05
+"""Film thickness (um) below which any surfaces touch."""
+
 
 @dataclass(frozen=True, eq=False)
 class Instant:
@@ -163,12 +166,12 @@ class March:
     def _advice(self) -> str:
         """What may help where a step was not found."""
         least = 1e3 * float(self.system.arc_film(self.behind[0].x)[1].min())
-        if not self.system.parameters.rough:
+        if not self.system.parameters.rough and least < _TOUCHING:
             return (
                 f"the film is {least:.2g} um thin there, where real surfaces touch; give a "
                 "roughness (0.2 to 0.4 um is usual), or time_order = 1"
             )
-        return "try time_order = 1, a smaller time_tolerance or a finer mesh (density)"
+        return "try time_order = 1, a smaller time_tolerance, roughness or a finer mesh (density)"
 
     @property
     def _fastest(self) -> float:

@@ -353,6 +353,7 @@ def test_the_section_and_the_rod_of_an_animation_move() -> None:
         ({"motion": [[0, 1], [0, 5]]}, "rising from 0"),
         ({"cavitation": "penalty"}, "leave cavitation out"),
         ({"frequency": 0}, "greater than 0"),
+        ({"housing_friction": 0.2}, "leave housing_friction out"),
     ],
 )
 def test_what_does_not_fit_is_said(keys: dict[str, Any], words: str) -> None:
