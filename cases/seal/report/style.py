@@ -18,6 +18,7 @@ STYLE: Any = {
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlesize": "medium",
+    "axes.titley": 1.0,  # else every drawing looks for room three times
     "figure.dpi": 160,
     "font.size": 9,
     "grid.alpha": 0.35,
