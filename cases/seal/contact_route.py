@@ -33,11 +33,13 @@ from softehl.cases.seal.grading import (
     slowest_film,
 )
 from softehl.cases.seal.layout import Layout
+from softehl.cases.seal.nearing import nearing_stage, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import carried_contact, finer
 from softehl.cases.seal.results import unsealed
 from softehl.runtime.arrays import Array
+from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.newton import Newton
 
 State: TypeAlias = tuple[SealSystem, Array]
@@ -201,13 +203,19 @@ class ContactRoute:
                 break
             system, x = found
             offset = slowest_film(system, x)
-            stage = approach_stage(system, self.settings, offset)
-            near = self.follow(self._quicker(system, stage), x)
+            near = self.follow(self._nearing(system, offset, x), x)
             if isinstance(near, StageFailed):
                 break
-            layout = placed_layout(system, near, p)
+            layout = placed_layout(system, without_rounding(system, near), p)
             found = self._on(layout, p, found, PASSES + SEALS + number)
         return found
+
+    def _nearing(self, system: SealSystem, offset: float, x: Array) -> Stage:
+        """The rod comes to an offset, mm, from the contact state x (n,)."""
+        linear = self.newton.linear
+        if system.parameters.solver == "auto" and isinstance(linear, Condenser):
+            return nearing_stage(system, self.settings, offset, x, linear)
+        return self._quicker(system, approach_stage(system, self.settings, offset))
 
     def _short(self, system: SealSystem, x: Array) -> bool:
         """Whether the edges of the contact x move by inlets when the rod comes nearer."""

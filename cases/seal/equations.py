@@ -347,6 +347,13 @@ class SealSystem:
         names = [block.name for block in self.blocks if block.layer]
         return Layer.of(self.problem.assembler, names, shared, inner)
 
+    def contact_layer(self, x: Array) -> Layer:
+        """The contact with the rod as the layer, near the state x: see `film_layer`."""
+        start, nodes = self.layout.part(DISPLACEMENT).start, self.mesh.arc_nodes
+        others = self.layout.dofs(ROTATION), self.layout.dofs(ROD), self._walls_of_arc(x)
+        shared = np.concatenate([start + 2 * nodes, start + 2 * nodes + 1, *others])
+        return Layer.of(self.problem.assembler, [ROD, "sealed_arc"], shared, np.empty(0, np.int64))
+
     def with_pressure(self, name: str, order: int) -> SealSystem:
         """The system with another pressure of this order on the same film thickness, last of all
         fields; its blocks are called after it.

@@ -36,6 +36,7 @@ from softehl.cases.seal.film import (
     weight_stage,
 )
 from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.nearing import nearing_stage, without_rounding
 from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
 from softehl.cases.seal.overlap import overlap
 from softehl.cases.seal.parameters import ORing
@@ -104,10 +105,15 @@ class FilmPath:
         for offset in film_offsets(system, settings, stroke, x):
             y: Followed = x
             if offset != settings.offset:
-                stage = approach_stage(system, settings, offset)
-                stage = replace(stage, corrector=along(system, self.driver.newton))
+                linear = self.driver.newton.linear
+                if self.quick and isinstance(linear, Condenser):
+                    stage = nearing_stage(system, settings, offset, x, linear)
+                else:
+                    stage = approach_stage(system, settings, offset)
+                    stage = replace(stage, corrector=along(system, self.driver.newton))
                 y = self.driver.follow(stage, x)
             if not isinstance(y, StageFailed):
+                y = without_rounding(system, y)
                 yield first_film(system, replace(settings, offset=offset), stroke, y), y
 
     @property

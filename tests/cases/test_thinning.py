@@ -1,4 +1,4 @@
-"""From contact to a film by squeezing out what contact holds the rod off."""
+"""From contact to a film: what contact holds the rod off is squeezed out; the rod comes near."""
 
 from __future__ import annotations
 
@@ -8,17 +8,20 @@ from math import log
 import numpy as np
 import pytest
 
+from softehl.cases.seal.contact import approach_stage
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film import FastFilm
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.method import FilmPath
+from softehl.cases.seal.nearing import nearing_stage, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.state import Silent
 from softehl.cases.seal.system import DISPLACEMENT
 from softehl.cases.seal.thinning import gap_masses, thinned_film, thinning_stage
 from softehl.runtime.arrays import Array
+from softehl.runtime.fem.propped import Propped
 from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.solution import Point
@@ -120,3 +123,35 @@ def test_the_first_film_is_that_of_the_fading_contact() -> None:
 def test_a_rod_that_nothing_touches_has_no_such_film() -> None:
     system, _ = contact()
     assert thinned_film(system, SETTINGS, "out", system.at_rest()) is None
+
+
+def test_a_rod_that_comes_near_finds_the_contact_that_newton_finds() -> None:
+    """With the contact of the arc as the layer, and by Newton's method: one state."""
+    system, x = contact()
+    driver = PathDriver(Silent())
+    linear = driver.newton.linear
+    assert isinstance(linear, Condenser)
+    near = driver.follow(nearing_stage(system, SETTINGS, 0.004, x, linear), x)
+    same = driver.follow(approach_stage(system, SETTINGS, 0.004), x)
+    assert not isinstance(near, StageFailed)
+    assert not isinstance(same, StageFailed)
+    assert np.abs(near - x).max() > 1e-3
+    pressure, wanted = system.rod_multipliers(near), system.rod_multipliers(same)
+    assert np.abs(pressure - wanted).max() < 1e-4 * np.abs(wanted).max()
+    touching = system.rod_multipliers(without_rounding(system, near)) < 0.0
+    assert (touching == (wanted < 0.0)).all()
+
+
+def test_props_of_a_body_change_no_residual_and_leave_their_layer() -> None:
+    """The body's tangent and the layer's add up to that of the problem."""
+    system, x = contact()
+    linear = PathDriver(Silent()).newton.linear
+    assert isinstance(linear, Condenser)
+    problem = nearing_stage(system, SETTINGS, 0.004, x, linear).problem_at(log(0.008))
+    assert isinstance(problem, Propped)
+    dx = np.zeros_like(x)
+    dx[problem.shared] = 1e-6 * np.random.default_rng(5).standard_normal(len(problem.shared))
+    _, K = problem.linearise(x)
+    _, L = problem.layer_linearise(x)
+    both = np.asarray(problem.body(x) @ dx)[problem.shared] + L.shared @ dx[problem.shared]
+    assert both == pytest.approx(np.asarray(K @ dx)[problem.shared], rel=1e-9, abs=1e-12)

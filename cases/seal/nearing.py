@@ -1,0 +1,57 @@
+"""The rod comes from where contact holds it to where a film is, by a modified Newton method.
+
+Its edges move over many nodes on the way, which touch or part one after the other: with each of
+them Newton's method factorises the section anew, and often ends between two of them. With the
+contact of the arc as the layer these changes concern a small matrix only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from softehl.cases.seal.contact import approach_stage
+from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.system import ROD
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.propped import Propped
+from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.schur import SchurCorrector
+from softehl.runtime.solve.steps import StepRule
+
+_NEAR = 0.3
+_TOLERANCE = 1e-6  # by which gaps are right to hundredths of a micrometre
+_TOUCHES = 1e-9  # of the largest pressure: what is less is rounding
+_STEPS = StepRule(0.5, 0.02, 5.0, target_iterations=8)  # of the logarithm of the offset
+
+
+def nearing_stage(
+    system: SealSystem, settings: PathSettings, offset: float, x: Array, linear: Condenser
+) -> Stage:
+    """`approach_stage` from the contact state x (n,) to an offset, mm."""
+    stage, layer = approach_stage(system, settings, offset), system.contact_layer(x)
+    corrector = SchurCorrector(linear, near=_NEAR, finish=Newton(max_iterations=1, linear=linear))
+    lacking = np.asarray(system.layout.dofs(ROD))
+
+    def problem_at(t: float) -> Propped:
+        problem = stage.problem_at(t)
+        assert isinstance(problem, Problem)
+        return Propped(problem, layer, lacking=lacking)
+
+    corrector = corrector.with_tolerance(_TOLERANCE)
+    return replace(stage, problem_at=problem_at, steps=_STEPS, corrector=corrector)
+
+
+def without_rounding(system: SealSystem, x: Array) -> Array:
+    """The contact state x (n,) with pressures of exactly zero where nothing touches the rod.
+
+    Edges of the contact are where they begin, and modified iterations leave traces of them.
+    """
+    y = x.copy()
+    pressures = system.rod_multipliers(y)
+    pressures[pressures > -_TOUCHES * np.abs(pressures).max()] = 0.0
+    return y
