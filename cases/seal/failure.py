@@ -71,7 +71,7 @@ def _corner(p: ORing) -> str:
 
 def _film_advice(failed: StageFailed) -> str:
     name = failed.stage.name.split(": ")[-1]
-    return _FILM if name in ("contact to film", "to the first speed", "shear") else failed.advice
+    return _FILM if name in ("contact to film", "shear") else failed.advice
 
 
 def _ring(p: ORing) -> str:

@@ -204,11 +204,6 @@ class FastFilm:
 
         return replace(held, problem_at=problem_at)
 
-    def slowing(self, stage: Stage) -> Stage:
-        """The stage of falling speed before shear acts, to a loose tolerance."""
-        loose = self._stage(stage, self.corrector.with_tolerance(_LOOSE), _SPEED_STEPS)
-        return replace(loose, name="to the first speed")
-
     def shear(self, stage: Stage) -> Stage:
         """The stage in which the shear stress begins to act, to a smaller tolerance."""
         return self._stage(stage, self.corrector.with_tolerance(_FIRM), _SHEAR_STEPS)

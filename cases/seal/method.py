@@ -32,7 +32,6 @@ from softehl.cases.seal.film import (
     release_stage,
     shear_stage,
     speed_stage,
-    start_speed,
     weight_stage,
 )
 from softehl.cases.seal.loads import FilmLoads, Stroke
@@ -143,10 +142,7 @@ class FilmPath:
         assert isinstance(linear, Condenser)
         fast = FastFilm.of(system, linear, x)
         stage, y = thinning_stage(fast, film, x)
-        first = start_speed(system, settings)
-        slower = speed_stage(system, settings, film, (first,), lambda *_: None)
-        stages = [stage, fast.slowing(slower)]
-        film = replace(film, speed=first)
+        stages = [stage]
         if p.shear_traction:
             film = replace(film, shear=1.0)
             stages.append(fast.shear(shear_stage(system, settings, film)))

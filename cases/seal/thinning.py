@@ -28,11 +28,10 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.rules import content_rule, pressure_nodes
 from softehl.runtime.solve.steps import StepRule
 
-THINNED = 4.0
-"""A film is sought at a speed at which it is about so many times thinner than contact holds the rod
-off: shear, which is left out until then, and heights in corners matter at much higher ones."""
+_SHORT, _LONG = 0.02, 1e4
+"""tau over the time in which the rod passes the inlet. The pressure of contact squeezes a film that
+is k times as thick as the steady one k^3 times as fast: the first tau is shorter by as much."""
 
-_SHORT, _LONG = 1e-3, 1e4  # tau over the time in which the rod passes the inlet
 _STEPS = StepRule(3.0, 0.05, 6.0, target_iterations=8)  # of log tau
 
 
@@ -42,12 +41,9 @@ def thinned_film(
     """The first film of a stroke from the contact state x, without shear; None where the rod has
     to stay where contact holds it, or where nothing touches it.
     """
-    p, edge = system.parameters, _inlet(system, stroke, x)
-    if stays(p) or edge is None:
+    if stays(system.parameters) or _inlet(system, stroke, x) is None:
         return None
-    slow = 1.75 * film_thickness(p, [edge], 1.0)
-    fast = (settings.offset / (THINNED * slow)) ** (1.0 / 0.6)
-    film = film_on(system, stroke, x, max(fast, start_speed(system, settings)))
+    film = film_on(system, stroke, x, start_speed(system, settings))
     return replace(film, rod_offset=settings.offset)
 
 
@@ -59,12 +55,14 @@ def thinning_stage(fast: FastFilm, film: FilmLoads, x: Array) -> tuple[Stage, Ar
     system = fast.system
     edge = _inlet(system, film.stroke, x)
     assert edge is not None
-    unit = inlet_time(system.parameters, edge, film.speed)
+    p = system.parameters
+    unit = inlet_time(p, edge, film.speed)
+    thicker = film.rod_offset / (1.75 * film_thickness(p, [edge], film.speed))
     hold = gap_masses(system, x)
     stage = Stage(
         name="contact to film",
         problem_at=lambda _: system.film_problem(film),
-        start=log(_SHORT),
+        start=log(_SHORT) - 3.0 * log(max(thicker, 1.0)),
         stop=log(_LONG),
         steps=_STEPS,
         sealed_pressure=film.sealed_pressure,
