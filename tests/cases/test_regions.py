@@ -8,12 +8,10 @@ import pytest
 
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.row import OK
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.grading import inlet_length
 from softehl.cases.seal.loads import ContactLoads
-from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.regions import PRESETS
@@ -128,36 +126,37 @@ def test_the_tangent_of_different_materials() -> None:
     assert change / (2.0 * step) == pytest.approx(exact, abs=1e-6 * np.abs(exact).max())
 
 
-def _contact(**changes: Any) -> tuple[SealSystem, Array]:
-    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
-    found = route.contact(ORing(**changes))
-    assert not isinstance(found, StageFailed)
-    return found
+WIDE = 28.0
+"""Width of a rectangle whose middle does not feel its ends, mm: with 9 it presses 13 % less, with
+16 2 %; bonded layers of different moduli pull at one another along the sides."""
 
 
-@pytest.mark.slow
+def _squeezed(**changes: Any) -> tuple[SealSystem, Array]:
+    route, system = (
+        ContactRoute(PathSettings(), PathDriver(Silent()).follow),
+        build_system(ORing(**changes)),
+    )
+    x = route._loaded(system)
+    assert not isinstance(x, StageFailed)
+    return system, x
+
+
 def test_two_layers_between_frictionless_plates() -> None:
     """Bonded, they have one stretch: p = m (lambda^-2 - lambda^2), m the mean of both by height."""
     stretch, cap, mu = 0.9, 1.0, 12.0
     gap = stretch * 3.53 + 0.01  # the rod is held 10 um off
-    system, x = _contact(
-        **{"section": "rectangular", "section_width": 9.0, "corner_radius": 0.1},
-        **{"inner_diameter": 1000.0, "rod_diameter": 1000.0, "groove_width": 12.0},
+    system, x = _squeezed(
+        **{"section": "rectangular", "section_width": WIDE, "corner_radius": 0.1},
+        **{"inner_diameter": 1000.0, "rod_diameter": 1000.0, "groove_width": 1.4 * WIDE},
         housing_diameter=1000.0 + 2.0 * gap,
         bulk_modulus=2e4,
         sealed_pressure=0.0,
         cap_thickness=cap,
+        density=1,
         materials={"cap": {"material": "neo-hooke", "mu": mu, "bulk_modulus": 2e4}},
     )
     z, _ = system.arc_film(x)
     found = contact_pressure(system, 0.0, x)[int(np.argmin(np.abs(z)))]
     mean = (cap * mu + (3.53 - cap) * 3.66) / 3.53
     assert found == pytest.approx(mean * (stretch**-2 - stretch**2), rel=5e-3)
-
-
-@pytest.mark.slow
-def test_a_stiffer_cap_has_a_film() -> None:
-    soft: dict[str, Any] = {"materials": {"cap": {"material": "neo-hooke", "mu": 10.0}}}
-    given = {**CAPPED, **soft, "density": 2, "stroke": "out", "speeds": (800.0, 200.0)}
-    found = run(ORing(**given, error_estimate=False), Silent())
-    assert [s.verdict for s in found.states] == [OK] * 2
+    assert found > 1.5 * 3.66 * (stretch**-2 - stretch**2)
