@@ -7,13 +7,19 @@ uses may have become another one: a `Same` says which.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import reduce
 from itertools import groupby
+from operator import or_
 
 from softehl.codegen.emit.order import arranged
 from softehl.codegen.emit.schedule import If, Same, Schedule, Statement
 from softehl.codegen.graph.graph import FREE, Graph, Node, Op
+from softehl.codegen.graph.traverse import reachable
+
+PART = 64
+"""Values at least, on average, of the pieces that a run is taken apart into."""
 
 
 def arranged_plan(g: Graph, plan: Schedule, roots: Sequence[Node]) -> Schedule:
@@ -41,6 +47,22 @@ def _runs(block: Sequence[Statement]) -> Iterator[list[Statement]]:
             yield list(row)
         else:
             yield from ([s] for s in row)
+
+
+def _groups(run: Sequence[Node], ends: Collection[Node]) -> list[list[Node]]:
+    """The ends in a run, together with those that hang on the same values from outside it."""
+    hangs: dict[Node, int] = {}
+    bit: dict[Node, int] = {}
+    for n in run:
+        outside = [a for a in n.args if a not in hangs and a.op not in FREE]
+        for a in outside:
+            bit.setdefault(a, 1 << len(bit))
+        hangs[n] = reduce(or_, (hangs.get(a, 0) | bit.get(a, 0) for a in n.args), 0)
+    groups: dict[int, list[Node]] = {}
+    for n in run:
+        if n in ends:
+            groups.setdefault(hangs[n], []).append(n)
+    return list(groups.values())
 
 
 class _Runs:
@@ -85,11 +107,32 @@ class _Runs:
         for run in _runs(block):
             nodes = [s for s in run if isinstance(s, Node)]
             if len(nodes) > 1:
-                out += self._arranged(nodes, computed)
+                for part in self._parts(nodes):
+                    out += self._arranged(part, computed)
             else:
                 out += [self._branch(s, computed) if isinstance(s, If) else s for s in run]
                 computed.update(nodes, *(s.merged for s in run if isinstance(s, If)))
         return out
+
+    def _parts(self, run: Sequence[Node]) -> list[list[Node]]:
+        """A long run in pieces, one for each of its groups of ends.
+
+        A tangent that is carried from modes to nodes is many small matrices side by side.  One
+        after the other they stay in the fastest memory; the scheduler, which sees few registers
+        and no plan, has all of them under way at once.
+        """
+        groups = _groups(run, self.ends)
+        if len(run) < PART * len(groups):
+            return [list(run)]
+        parts, part_of = [], dict[Node, int]()
+        place = {n: k for k, n in enumerate(run)}
+        for k, some in enumerate(groups):
+            found = reachable(some, stop=lambda n: n not in place or n in part_of)
+            new = [n for n in found if n in place and n not in part_of]
+            part_of.update(dict.fromkeys(new, k))
+            parts.append(sorted(new, key=place.__getitem__))
+        self.ends.update(a for n, k in part_of.items() for a in n.args if part_of.get(a, k) != k)
+        return parts
 
     def _branch(self, s: If, computed: set[Node]) -> If:
         sides = [self.block(side, set(computed)) for side in (s.then, s.otherwise)]

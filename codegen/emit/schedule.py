@@ -7,7 +7,7 @@ stage or a loop, a value that only one side of a branch needs is placed inside t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from softehl.codegen.graph.graph import Node, Op
@@ -33,6 +33,16 @@ class Same:
 
 
 Statement = Node | If | Same
+
+
+def flat(block: Iterable[Statement]) -> Iterator[Node | Same]:
+    """Every value and every other name in a block, those inside branches included."""
+    for s in block:
+        if isinstance(s, If):
+            yield from s.merged
+            yield from flat([*s.then, *s.otherwise])
+        else:
+            yield s
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,21 @@ than a group is filled up with its last element.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
 from softehl.codegen.emit import basis
 from softehl.codegen.emit.lanes import LanePrinter
+from softehl.codegen.emit.order import ADDITIONS
 from softehl.codegen.emit.printer import (
     data_expression,
     design_width,
     direction_expression,
     dofs_expression,
 )
-from softehl.codegen.emit.schedule import If, Loop, Schedule, Statement
+from softehl.codegen.emit.schedule import If, Loop, Same, Schedule, Statement, flat
 from softehl.codegen.graph.graph import FREE, Input, Node, Op
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
@@ -211,7 +213,14 @@ class _Group:
             sums.setdefault(s.args[0], []).append(s)
         for n in [n for n in sums if n.op in FREE or not n.varying]:
             self._add(sums.pop(n))
+        terms = added_at_once(loop)
         for statement in loop.body:
+            if isinstance(statement, Node) and statement in terms:
+                for s, sign, term in terms[statement]:
+                    p.line(2, f"{p.ref(s)} {sign}= {p.ref(term)};")
+                continue
+            if isinstance(statement, Same) and statement.new in terms:
+                continue
             p.block(2, [statement])
             for n in _values(statement):
                 self._add(sums.pop(n, []))
@@ -257,6 +266,29 @@ class _Group:
             for letter, width in self._written().items():
                 p.line(2, f"softehl_spoil(failed, {letter}, {width});")
             p.line(1, "}")
+
+
+def added_at_once(loop: Loop) -> dict[Node, list[tuple[Node, str, Node]]]:
+    """Partial sums at a point that only a sum over the points uses: (sum, sign, term) instead.
+
+    The terms go straight into the sum, each as a multiply-add where it is a product.
+    """
+    now = {s.old: s.new for s in flat(loop.body) if isinstance(s, Same)}
+    used = [a for n in flat(loop.body) if isinstance(n, Node) for a in n.args]
+    used += [*loop.outputs, *(s.args[0] for s in loop.sums)]
+    uses = Counter(now.get(a, a) for a in used)
+    plain = {s for s in loop.body if isinstance(s, Node)}
+    found: dict[Node, list[tuple[Node, str, Node]]] = {}
+    for s in loop.sums:
+        n: Node | None = now.get(s.args[0], s.args[0])
+        while n is not None and n in plain and n.op in ADDITIONS and uses[n] == 1:
+            signs = "+", "+" if n.op is Op.ADD else "-"
+            first = [k for k in range(2) if signs[k] == "+" and n.args[k].op in ADDITIONS]
+            inner = [k for k in first if n.args[k] in plain and uses[n.args[k]] == 1]
+            rest = [k for k in range(2) if not inner or k != inner[0]]
+            found[n] = [(s, signs[k], n.args[k]) for k in rest]
+            n = n.args[inner[0]] if inner else None
+    return found
 
 
 def _values(s: Statement) -> Sequence[Node]:
