@@ -34,11 +34,12 @@ help:
 oring: $(VENV)/.kernels
 	$(BIN)/softehl run oring --overwrite --out $(OUT)
 
+# worksteal: neighbours, which share what they are tested on, stay in one process
 test: $(VENV)/.dev $(VENV)/.kernels
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 slow: $(VENV)/.dev $(VENV)/.kernels
-	$(BIN)/python -m pytest -n 2 -m slow
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
 
 wheel: $(VENV)/.dev
 	$(BIN)/python -m tests.packaging.wheel
