@@ -18,7 +18,7 @@ from softehl.runtime.solve.linear import (
     SparseMatrix,
     checked_row_sums,
 )
-from softehl.runtime.solve.ordering import Arranged, Order, Orders
+from softehl.runtime.solve.ordering import MOST_ENTRIES, Arranged, Order, Orders
 
 Ordering: TypeAlias = Literal["NATURAL", "MMD_ATA", "MMD_AT_PLUS_A", "COLAMD"]
 _LARGE = 30_000_000  # entries of factors that are not copied to look at a few of them
@@ -62,23 +62,38 @@ class SuperLU:
         return self._factors(K, self.ordering)
 
     def _ordered(self, K: SparseMatrix) -> Factors:
-        """Factors of K, in the order that was found for its pattern before."""
-        order = self.orders.find(K)
-        if order is None:
-            factors = self.factors(K)
-            self.orders.add(Order.of(K, np.argsort(factors.perm_c)))
-            return factors
+        """Factors of K, in an order that its pattern alone decides; a very large one is not kept.
+
+        So they do not depend on what was factorised before: a path that is taken up again is the
+        same to the last bit.
+        """
+        if K.nnz > MOST_ENTRIES:
+            return self.factors(K)
+        order = self._order(K)
         return Arranged(order, self._as_it_is(order.arranged(K)))
+
+    def _order(self, K: SparseMatrix) -> Order:
+        """The order of the pattern of K, (n, n)."""
+        known = self.orders.find(K)
+        return known or self.orders.add(Order.of(K, self._found(K)))
 
     def _last(self, K: SparseMatrix, boundary: Integers) -> Order:
         """The order of the pattern of K, (n, n), with the boundary (m,) last."""
-        order = self.orders.find(K)
-        if order is not None:
-            return Order.of(K, order.unknowns, boundary)
-        sound = K.copy()
-        sound.data[:] = 0.0
-        sound.setdiag(1.0)
-        return Order.of(K, np.argsort(self.factors(sound).perm_c), boundary)
+        known = self.orders.find(K)
+        return Order.of(K, known.unknowns if known else self._found(K), boundary)
+
+    def _found(self, K: SparseMatrix) -> Integers:
+        """All unknowns (n,) as they are eliminated: an incomplete factorisation costs least."""
+        pattern = K.copy()
+        pattern.data[:] = 0.0
+        pattern.setdiag(1.0)
+        incomplete = sparse_linalg.spilu(
+            pattern,
+            drop_tol=0.5,
+            permc_spec=self.ordering,
+            options={"SymmetricMode": self.symmetric_mode},
+        )
+        return np.argsort(incomplete.perm_c)
 
     def _as_it_is(self, K: SparseMatrix) -> sparse_linalg.SuperLU:
         return self._factors(K, "NATURAL")

@@ -92,8 +92,15 @@ def test_right_side_that_is_not_finite_is_refused() -> None:
 
 
 def fill(K: SparseMatrix, solver: SuperLU) -> int:
-    factors = solver.factorise(K).factors
-    return int(factors.L.nnz + factors.U.nnz)
+    return int(solver.factors(K).nnz)
+
+
+def test_factors_do_not_depend_on_what_was_factorised_before() -> None:
+    used, b = SuperLU(), np.cos(np.arange(400.0))
+    for K in (grid(20), 2.0 * grid(20), grid(20)):
+        now = used.factorise(csc_array(K)).solve(b)
+        assert np.array_equal(now, SuperLU().factorise(csc_array(K)).solve(b))
+    assert len(used.orders.known) == 1
 
 
 def test_default_ordering_makes_less_fill_than_colamd_and_solves_as_well() -> None:
