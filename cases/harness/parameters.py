@@ -59,6 +59,11 @@ class Parameters(BaseModel):
         """
         return given
 
+    def __hash__(self) -> int:
+        """Of all values; a table counts by its entries in any order."""
+        values = (getattr(self, name) for name in type(self).model_fields)
+        return hash(tuple(frozenset(v.items()) if isinstance(v, dict) else v for v in values))
+
     def settled(self) -> dict[str, Any]:
         """The values of all keys, without the names that they came from: each can be changed."""
         fields = type(self).model_fields

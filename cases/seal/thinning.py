@@ -95,13 +95,13 @@ def gap_masses(system: SealSystem, x: Array) -> csc_array[np.float64]:
 
     Rows are the pressures'; what a film holds is lumped where these stand.
     """
-    rows, n = system.pressure_dofs(), system.layout.total
-    segments, order = system.mesh.arc_segments, rows.shape[1] - 1
+    pressures, n = system.pressure_dofs(), system.layout.total
+    segments, order = system.mesh.arc_segments, pressures.shape[1] - 1
     z = system.deformed(x)[:, 0]
     half = 0.5 * (z[segments[:, 1]] - z[segments[:, 0]])
     radii = system.layout.part(DISPLACEMENT).start + 2 * segments + 1
     masses = half[:, None, None] * (content_rule(order).weights[:, None] * _shapes(order))
-    at = np.broadcast_arrays(rows[:, :, None], radii[:, None, :])
+    at = np.broadcast_arrays(pressures[..., None], radii[:, None])
     places = tuple(part.ravel() for part in at)
     return csc_array(coo_array((masses.ravel(), places), shape=(n, n)))
 

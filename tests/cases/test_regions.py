@@ -160,3 +160,9 @@ def test_two_layers_between_frictionless_plates() -> None:
     mean = (cap * mu + (3.53 - cap) * 3.66) / 3.53
     assert found == pytest.approx(mean * (stretch**-2 - stretch**2), rel=5e-3)
     assert found > 1.5 * 3.66 * (stretch**-2 - stretch**2)
+
+
+def test_equal_parameters_with_a_cap_are_one() -> None:
+    values: dict[str, Any] = {"section": "rectangular", "materials": {"cap": {"mu": 10.0}}}
+    thin, again, thick = (ORing(**values, cap_thickness=t) for t in (0.4, 0.4, 0.5))
+    assert len({thin, again, thick, ORing()}) == 3
