@@ -124,45 +124,45 @@ class FilmPath:
 
     def fast(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
         """All film stages by modified Newton iterations; the one that ended early, if one did."""
+        fast = self._modified(x)
+        assert fast
+        first = fast.weight(weight_stage(self.system, self.settings, film))
+        return self._all(fast, first, film, x, on_speed)
+
+    def thinned(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All films of a stroke, the first by squeezing out what is in contact at x; see `fast`."""
+        fast = self._modified(x)
+        assert fast
+        first, y = thinning_stage(fast, film, x)
+        if self.system.parameters.shear_traction:
+            film = replace(film, shear=1.0)
+        return self._all(fast, first, film, y, on_speed)
+
+    def _all(
+        self, fast: FastFilm, first: Stage, film: FilmLoads, x: Array, on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """The first stage from x (n,), then shear, then falling speed."""
         system, settings, p = self.system, self.settings, self.system.parameters
-        linear = self.driver.newton.linear
-        assert isinstance(linear, Condenser)
-        fast = FastFilm.of(system, linear, x)
-        stages = [fast.weight(weight_stage(system, settings, film))]
+        stages = [first]
         if p.shear_traction:
             stages.append(fast.shear(shear_stage(system, settings, film)))
         stages.append(fast.speed(speed_stage(system, settings, film, p.speeds, on_speed)))
         end = self.driver.follow_all(stages, x)
         return end if isinstance(end, StageFailed) else None
 
-    def thinned(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
-        """All films of a stroke, the first by squeezing out what is in contact at x; see `fast`."""
-        system, settings, p = self.system, self.settings, self.system.parameters
-        linear = self.driver.newton.linear
-        assert isinstance(linear, Condenser)
-        fast = FastFilm.of(system, linear, x)
-        stage, y = thinning_stage(fast, film, x)
-        stages = [stage]
-        if p.shear_traction:
-            film = replace(film, shear=1.0)
-            stages.append(fast.shear(shear_stage(system, settings, film)))
-        stages.append(fast.speed(speed_stage(system, settings, film, p.speeds, on_speed)))
-        end = self.driver.follow_all(stages, y)
-        return end if isinstance(end, StageFailed) else None
-
     def carried(
         self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
     ) -> StageFailed | None:
         """The films that a coarser mesh has, as far as they lead from one to the next."""
-        linear, speeds = self.driver.newton.linear, tuple(sorted(known.films, reverse=True))
-        if not (self.quick and isinstance(linear, Condenser) and speeds):
+        fast, speeds = self._modified(x), tuple(sorted(known.films, reverse=True))
+        if not (fast and speeds):
             return None
         film = first_film(self.system, self.settings, stroke, x)
         _, gap = self.system.arc_film(x + known.built(speeds[0]))
         film = replace(film, speed=speeds[0], gap=gap)
         stage = speed_stage(self.system, self.settings, film, speeds, on_speed)
         try:
-            stage, start = FastFilm.of(self.system, linear, x).carried(stage, known, x)
+            stage, start = fast.carried(stage, known, x)
         except SingularMatrix:
             return None
         end = self.driver.follow(stage, start)
