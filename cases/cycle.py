@@ -13,7 +13,7 @@ from scipy.integrate import trapezoid
 from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.parameters import key
-from softehl.cases.harness.pictures import draw_columns
+from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.seal.assumed import assumed
 from softehl.cases.seal.motion import Motion, motion_keys, motion_of
@@ -177,7 +177,7 @@ class CycleCase(Case[Cycle, CycleRow]):
     title = "reciprocating O-ring seal in time: friction loop and leakage of every cycle"
     parameters, row = Cycle, CycleRow
     selection = ("cycles", "animation")
-    files = ("rows.png", *(f"{n}.{k}" for n in PICTURES for k in ("png", "svg")), ANIMATION)
+    files = (*(f"{n}.{k}" for n in ("rows", *PICTURES) for k in KINDS), ANIMATION)
 
     def assumed(self, parameters: Cycle, given: Collection[str]) -> list[str]:
         """See :class:`Case`."""
@@ -221,20 +221,24 @@ class CycleCase(Case[Cycle, CycleRow]):
         folder: Path,
         rows: Sequence[CycleRow],
         rejected: Sequence[CycleRow],
+        kinds: Sequence[str],
     ) -> None:
         """See :class:`Case`: friction loops, and the film of the last cycle."""
+        if not kinds:
+            return
         import matplotlib
 
         from softehl.cases.seal.report.cycle import loop_figure, map_figure, write_animation
-        from softehl.cases.seal.report.style import STYLE, save
+        from softehl.cases.seal.report.style import STYLE
 
         loops = {row.label(row.key): read_table(folder / row.file_names()[0]) for row in rows}
-        draw_columns(folder / "rows.png", loops, ("place_mm", "friction_N", "flux_air_mm2_s"))
+        shown = ("place_mm", "friction_N", "flux_air_mm2_s")
+        draw_columns(folder / "rows", loops, shown, kinds)
         names, last = rows[-1].file_names(), [*loops.values()][-1]
         film, outline = (read_table(folder / names[k]) for k in (1, 3))
         with matplotlib.rc_context(STYLE):
-            save(loop_figure(loops), folder / PICTURES[0])
-            save(map_figure(film, last), folder / PICTURES[1])
+            save(loop_figure(loops), folder / PICTURES[0], kinds)
+            save(map_figure(film, last), folder / PICTURES[1], kinds)
             if parameters.animation:
                 write_animation(folder / ANIMATION, parameters, film, last, outline)
 

@@ -94,9 +94,11 @@ class SealSystem:
     def moved(self, p: ORing, section: SealSection) -> SealSystem:
         """The system of other numbers on the same mesh with its nodes moved; nothing is checked."""
         constants = _contact_constants(p, section, self.blocks)
-        assembler = self.problem.assembler
+        assembler, stays = self.problem.assembler, section is self.section
         placed = [
-            section.coordinates(d.elements) if d.elements in section.elements else b.coordinates
+            section.coordinates(d.elements)
+            if d.elements in section.elements and not stays
+            else b.coordinates
             for b, d in zip(assembler.blocks, self.blocks, strict=True)
         ]
         elements = tuple(

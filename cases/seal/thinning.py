@@ -32,6 +32,10 @@ _SHORT, _LONG = 0.02, 1e4
 """tau over the time in which the rod passes the inlet. The pressure of contact squeezes a film that
 is k times as thick as the steady one k^3 times as fast: the first tau is shorter by as much."""
 
+_LONGER = 1e9
+"""The same where the film is not steady by then: above three shear moduli the pressure hardly rises
+from the flatter edge, and what is held off there takes long to leave."""
+
 _STEPS = StepRule(3.0, 0.05, 6.0, target_iterations=8)  # of log tau
 
 
@@ -71,6 +75,11 @@ def thinning_stage(fast: FastFilm, film: FilmLoads, x: Array) -> tuple[Stage, Ar
     )
     stage = fast.thinning(stage, hold, x, lambda t: -exp(-t) / unit)
     return stage, pressed_film(system, x, film.sealed_pressure)
+
+
+def longer(stage: Stage) -> Stage:
+    """What follows a stage of squeezing whose film is not steady yet."""
+    return replace(stage, start=stage.stop, stop=log(_LONGER))
 
 
 def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:

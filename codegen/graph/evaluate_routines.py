@@ -37,18 +37,9 @@ def results(r: Routine, args: Vector, evaluate: Evaluate) -> Vector:
 
 def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
     p, s = args[: r.inputs - r.outputs], args[r.inputs - r.outputs :]
-    size = range(len(s))
-    h = mpmath.mpf(10) ** (-mpmath.mp.dps // 3)
-    before = mpmath.inf
+    before, A = mpmath.inf, None
     for _ in range(200):
-        A = mpmath.matrix(len(s), len(s))
-        for j in size:
-            plus, minus = (
-                evaluate(r.equations, [v + t * h * (i == j) for i, v in enumerate(s)], p)
-                for t in (1, -1)
-            )
-            for i in size:
-                A[i, j] = (plus[i] - minus[i]) / (2 * h)
+        A = A or _slopes(r, s, p, evaluate)
         try:
             step = mpmath.lu_solve(A, mpmath.matrix(evaluate(r.equations, s, p)))
         except ZeroDivisionError:
@@ -60,7 +51,26 @@ def _newton(r: Newton, args: Vector, evaluate: Evaluate) -> Vector:
         if near or digits * max(1, *map(abs, s)) >= max(changes) > before / 2:
             return s  # to its own digits, or to those that rounding leaves
         before = max(changes)
+        if before > _CLOSE * max(map(abs, s)):  # else these slopes give eight digits a step
+            A = None
     return [mpmath.nan] * len(s)
+
+
+_CLOSE = 1e-8
+
+
+def _slopes(r: Newton, s: Vector, p: Vector, evaluate: Evaluate) -> mpmath.matrix:
+    """dg/ds by differences."""
+    h = mpmath.mpf(10) ** (-mpmath.mp.dps // 3)
+    A = mpmath.matrix(len(s), len(s))
+    for j in range(len(s)):
+        plus, minus = (
+            evaluate(r.equations, [v + t * h * (i == j) for i, v in enumerate(s)], p)
+            for t in (1, -1)
+        )
+        for i in range(len(s)):
+            A[i, j] = (plus[i] - minus[i]) / (2 * h)
+    return A
 
 
 def _isotropic(r: Isotropic, args: Vector, evaluate: Evaluate) -> Vector:

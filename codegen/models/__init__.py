@@ -7,7 +7,16 @@ from functools import partial
 
 from softehl.codegen.language import materials
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.models import boundary, contact, film, mixed_film, sheet, solid, support
+from softehl.codegen.models import (
+    boundary,
+    contact,
+    film,
+    mixed_film,
+    rheology,
+    sheet,
+    solid,
+    support,
+)
 
 MATERIALS = {
     "yeoh": materials.YEOH,
@@ -19,6 +28,11 @@ MATERIALS = {
 
 Their points are a loop: less than half the C, for a few per cent of the time of a run.
 """
+
+THINNING = {"eyring": rheology.eyring, "carreau": rheology.carreau}
+"""Oils of smooth films beside the Newtonian one."""
+
+_SMOOTH = {"film": film.reynolds_segment, "film_conserving": mixed_film.conserving_segment}
 
 
 def _of(name: str, energy: materials.Energy) -> Callable[[], Definition]:
@@ -42,6 +56,11 @@ ALL: dict[str, Callable[[], Definition]] = {
     "film_rough": mixed_film.rough_segment,
     "film_upwind_rough": mixed_film.rough_bubble_load,
     "film_void": mixed_film.void_fraction,
+    **{
+        (name := f"{film_name}_{oil}"): partial(page, name, law)
+        for film_name, page in _SMOOTH.items()
+        for oil, law in THINNING.items()
+    },
     "film_squeeze": mixed_film.squeeze,
     "film_squeeze_rough": mixed_film.rough_squeeze,
     "mean_rotation": support.mean_rotation,

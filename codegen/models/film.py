@@ -16,18 +16,19 @@ import sympy as sp
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
+from softehl.codegen.models import rheology
 
 Vectors = list[list[sp.Symbol]]
 """Components, and for each its values at the nodes."""
 
 
-def reynolds_segment() -> Definition:
+def reynolds_segment(name: str = "film", law: rheology.Law = rheology.newtonian) -> Definition:
     """Film segment (14), (21), (25)-(28) with tractions (17)-(18), any pressure order.
 
     The solid is on the left of the segment, the rod below it; xbar = z and h = r - R_rod on the
     deformed segment.  Cavitation by the penalty (25), viscosity by (13).
     """
-    m = Model("film", nodes=2, rule=quadrature.gauss(2, 1), doc=reynolds_segment.__doc__ or "")
+    m = Model(name, nodes=2, rule=quadrature.gauss(2, 1), doc=reynolds_segment.__doc__ or "")
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
     p, p_xi = m.interpolated("p")
@@ -40,6 +41,7 @@ def reynolds_segment() -> Definition:
         force_weight="factor on the nodal forces",
         shear_weight="factor on the shear traction",
     )
+    flow = law(m)
     (xi,) = m.point()
     N = shapes.line2(xi)
     x = [[a + b for a, b in zip(X[c], u[c], strict=True)] for c in (0, 1)]
@@ -50,8 +52,9 @@ def reynolds_segment() -> Definition:
     r = m.define("r", R_rod + h)
     slope = m.define("slope", p_xi / z_xi)
     eta = m.define("eta", viscosity(eta_0, alpha, p))
-    q = m.define("q", flux(U, h, conductance(h, eta), slope))
-    couette = m.define("couette", eta * U / h)
+    middle, driving = flow("", U, h, eta, slope)
+    q = m.define("q", flux(U, h, conductance(h, eta), driving))
+    couette = m.define("couette", middle)
     poiseuille = m.define("poiseuille", h / 2 * slope)
     tau = couette - poiseuille
     cavitation = m.define("cavitation", eps * sp.Max(-p, 0) * z_xi)
@@ -74,6 +77,7 @@ def reynolds_segment() -> Definition:
         flux=q,
         tau_rod=couette + poiseuille,
         eta=eta,
+        **rheology.more_fields(slope, driving),
     )
     m.offer(pseudo_load=True, fields_rate=True)
     return m.finish()

@@ -20,7 +20,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.model import Model
-from softehl.codegen.models import roughness
+from softehl.codegen.models import rheology, roughness
 from softehl.codegen.models.film import (
     bubble_model,
     conductance,
@@ -71,13 +71,15 @@ class Surfaces:
         )
 
 
-def conserving_segment() -> Definition:
+def conserving_segment(
+    name: str = "film_conserving", law: rheology.Law = rheology.newtonian
+) -> Definition:
     """Film segment that conserves mass where it ruptures, between smooth surfaces.
 
     As the page film, but for the void fraction in what the rod carries along, for any basis of
     pressure and void fraction, and for the axial speed w of the seal's surface: (14) with U - w.
     """
-    return _segment("film_conserving", conserving_segment.__doc__ or "", rough=False)
+    return _segment(name, conserving_segment.__doc__ or "", law, rough=False)
 
 
 def rough_segment() -> Definition:
@@ -86,10 +88,10 @@ def rough_segment() -> Definition:
     Asperities carry K F_3/2(h / sigma) and resist sliding by mu_b times that, regularised at the
     speed U_b. With the void fraction and the speed of the surface of conserving_segment.
     """
-    return _segment("film_rough", rough_segment.__doc__ or "", rough=True)
+    return _segment("film_rough", rough_segment.__doc__ or "", rheology.newtonian, rough=True)
 
 
-def _segment(name: str, doc: str, *, rough: bool) -> Definition:
+def _segment(name: str, doc: str, law: rheology.Law, *, rough: bool) -> Definition:
     m = Model(name, nodes=2, rule=_one_subcell(), doc=doc)
     X = m.coordinates("Z", "R")
     u = m.nodal_unknowns("u_z", "u_r")
@@ -103,6 +105,7 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
         force_weight="factor on the nodal forces",
         shear_weight="factor on the shear traction",
     )
+    flow = law(m)
     xi, *ends = m.point()
     N = shapes.line2(xi)
     (w_nodes,) = m.rates("u_z")
@@ -117,12 +120,20 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
     at_ends = [shapes.interpolate(shapes.line2(end), nodal_h) for end in ends]
     mean, narrowing = _wedge(m, [surfaces.effective_of(h_end) for h_end in at_ends])
     slope = m.define("slope", p_xi / z_xi)
-    filled = m.define("filled", sp.Max(V, 0) * (1 - v_out) + sp.Min(V, 0) * (1 - v_in))
+
+    def dragged(value: Any) -> Any:
+        return sp.Max(value, 0) * (1 - v_out) + sp.Min(value, 0) * (1 - v_in)
+
+    filled = m.define("filled", dragged(V))
     eta_cell = m.define("eta_cell", viscosity(eta_0, alpha, p_cell))
     pressed = surfaces.pressure_flow * narrowing**2 * conductance(mean, eta_cell)
-    q = m.define("q", flux(filled, narrowing * surfaces.carried, pressed, p_cell_xi / z_xi))
+    _, driving_cell = flow("_cell", V, mean, eta_cell, p_cell_xi / z_xi)
+    q = m.define("q", flux(filled, narrowing * surfaces.carried, pressed, driving_cell))
     oil = m.define("oil", viscosity(eta_0, alpha, p))
-    couette = m.define("couette", oil * filled / surfaces.effective * surfaces.couette)
+    middle, driving = flow(
+        "", V, surfaces.effective, oil, slope, lambda v: filled if v == V else dragged(v)
+    )
+    couette = m.define("couette", middle * surfaces.couette)
     poiseuille = m.define("poiseuille", surfaces.poiseuille * surfaces.effective / 2 * slope)
     tau = couette + tau_a - poiseuille
     load = p + p_a
@@ -149,6 +160,7 @@ def _segment(name: str, doc: str, *, rough: bool) -> Definition:
         tau_a=tau_a,
         v_out=v_out,
         v_in=v_in,
+        **rheology.more_fields(slope, driving),
     )
     m.offer(pseudo_load=True, fields_rate=True)
     return m.finish()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from math import log
 
@@ -11,12 +12,12 @@ import pytest
 from softehl.cases.seal.contact import approach_stage
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.film import FastFilm
+from softehl.cases.seal.film import METHOD, FastFilm, shear_stage
+from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.method import FilmPath
-from softehl.cases.seal.nearing import nearing_stage, without_rounding
+from softehl.cases.seal.nearing import neared, nearing_stage, without_rounding
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.state import Silent
 from softehl.cases.seal.system import DISPLACEMENT
 from softehl.cases.seal.thinning import gap_masses, thinned_film, thinning_stage
@@ -24,7 +25,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.propped import Propped
 from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.solve.linear import Condenser
-from softehl.runtime.solve.solution import Point
+from softehl.runtime.solve.solution import Branch, Point, Solution, Status
 
 SETTINGS = PathSettings()
 
@@ -120,6 +121,62 @@ def test_the_first_film_is_that_of_the_fading_contact() -> None:
     assert found[0] == pytest.approx(found[1], rel=1e-7)
 
 
+class Stalling(PathDriver):
+    """One whose fast way ends where the shear stress begins to act."""
+
+    def follow(self, stage: Stage, x0: Array) -> Followed:
+        """See `PathDriver`."""
+        if stage.name != "shear" or stage.method != METHOD:
+            return super().follow(stage, x0)
+        start = Solution(x0, Status.CONVERGED, "", (), 0, 0)
+        return StageFailed(stage, Branch((Point(0.0, start),), Status.DIVERGED, "stalled"))
+
+
+def test_where_the_fast_way_stalls_under_shear_newton_goes_on_to_the_same_film() -> None:
+    system, x = contact()
+    fast, film = thin(loads())
+    first, y = thinning_stage(fast, film, x)
+    built = PathDriver(Silent()).follow(first, y)
+    assert not isinstance(built, StageFailed)
+    stage, found = shear_stage(system, SETTINGS, replace(film, shear=1.0)), []
+    for driver in (PathDriver(Silent()), Stalling(Silent())):
+        end = FilmPath(system, SETTINGS, driver)._sheared(fast, stage, built)
+        assert not isinstance(end, StageFailed)
+        found.append(system.arc_film(end)[1])
+        assert driver.records[-1].method == (METHOD if type(driver) is PathDriver else "newton")
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-5)
+
+
+class Unsteady(PathDriver):
+    """One in which shear stress does not begin to act on the film that was squeezed first."""
+
+    def follow(self, stage: Stage, x0: Array) -> Followed:
+        """See `PathDriver`."""
+        if stage.name == "shear" and len(self.records) == 1:
+            return StageFailed(stage, Branch((), Status.DIVERGED, "not its start"))
+        return super().follow(stage, x0)
+
+
+def test_a_film_that_is_not_steady_is_squeezed_for_longer() -> None:
+    """It is the same one then: what was left of the squeezing was 1e-4 of an inlet's."""
+    system, x = contact()
+    found: list[dict[float, float]] = []
+    for kind in (PathDriver, Unsteady):
+        films: dict[float, float] = {}
+
+        def keep(film: FilmLoads, point: Point, into: dict[float, float] = films) -> None:
+            into[film.speed] = system.arc_film(point.solution.x)[1].min()
+
+        driver = kind(Silent())
+        assert FilmPath(system, SETTINGS, driver).thinned(loads(), x, keep) is None
+        found.append(films)
+    squeezed = [record for record in driver.records if record.name == "contact to film"]
+    assert len(squeezed) == 2
+    assert squeezed[1].parameters[0] == pytest.approx(squeezed[0].parameters[-1])
+    assert squeezed[1].parameters[-1] == pytest.approx(1e9)
+    assert found[1][400.0] == pytest.approx(found[0][400.0], rel=1e-7)
+
+
 def test_a_rod_that_nothing_touches_has_no_such_film() -> None:
     system, _ = contact()
     assert thinned_film(system, SETTINGS, "out", system.at_rest()) is None
@@ -131,7 +188,7 @@ def test_a_rod_that_comes_near_finds_the_contact_that_newton_finds() -> None:
     driver = PathDriver(Silent())
     linear = driver.newton.linear
     assert isinstance(linear, Condenser)
-    near = driver.follow(nearing_stage(system, SETTINGS, 0.004, x, linear), x)
+    near = neared(nearing_stage(system, SETTINGS, 0.004, x, linear), x, driver.follow)
     same = driver.follow(approach_stage(system, SETTINGS, 0.004), x)
     assert not isinstance(near, StageFailed)
     assert not isinstance(same, StageFailed)

@@ -13,7 +13,8 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.rules import Kind, facet_rule, film_rule
 from softehl.runtime.kernels import Kernel, Rule, load_kernel
 from tests.reference.calling import rule_of
-from tests.reference.states import mixed_states, void_states
+from tests.reference.states import State as Known
+from tests.reference.states import mixed_states, thinning_states, void_states
 from tests.shipped import RUBBERS
 
 MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))
@@ -202,9 +203,20 @@ def facets(rng: np.random.Generator, m_p: int) -> Iterator[Case]:
         yield replace(plain, rule=facet_rule(m_p))
 
 
+def thinning() -> Iterator[Known]:
+    """Of oils that thin; of Carreau's, for which the oracle needs its time, one of each film."""
+    for state in thinning_states((1,)):
+        if "thin" in state.label:
+            continue  # with forces that cancel in z
+        if "carreau" not in state.family:
+            yield state
+        elif state.label in ("m1-far", "m1-gauss-in-crossing"):
+            yield replace(state, count=2 if state.count else 0)
+
+
 def ruptured() -> Iterator[Case]:
-    """Films with void fractions, rough and moving ones: those of the other reference."""
-    for state in [*mixed_states((1, 3)), *void_states()]:
+    """Films with void fractions, rough and moving ones, those that thin: of the other reference."""
+    for state in [*mixed_states((1, 3)), *void_states(), *thinning()]:
         given = state.coordinates, state.dofs, state.parameters, state.data
         plain = _case(state.family, state.label, *given)
         data = np.array(state.point_data)[:, None] if state.point_data else None

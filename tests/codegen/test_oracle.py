@@ -90,7 +90,13 @@ def called(case: Case, kernel: Kernel | None = None) -> tuple[Array, Array]:
 # --------------------------------------------------------------------------------- the comparisons
 
 
-@pytest.mark.parametrize("name", CASES)
+LONG = ("film_conserving_carreau: m1-far",)
+"""Cases for which the oracle needs half a minute: seven unknowns, twice at every point."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in CASES]
+)
 def test_residual_and_tangent(name: str) -> None:
     case = CASES[name]
     d, (R, K) = definition(case.family), exact(name)
@@ -137,7 +143,7 @@ def test_no_field_is_zero_in_every_case(family: str) -> None:
         if c.family == family
     ]
     zero = np.array(load_kernel(family).fields)[np.max(scales, axis=0) == 0.0]
-    assert tuple(zero) == (SMOOTH if family == "film_conserving" else ())
+    assert tuple(zero) == (SMOOTH if family.startswith("film_conserving") else ())
 
 
 # ------------------------------------------------------------------------------------- what is met

@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 
 from softehl.cases.seal.materials import MATERIALS, shear_modulus
+from softehl.cases.seal.method import run
 from softehl.cases.seal.oils import GRADES
+from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.rubber import shore_band, youngs_modulus
 from softehl.cases.seal.rubber_data import fit, read_data
+from softehl.cases.seal.state import Silent
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -46,3 +49,17 @@ def test_fits_of_treloars_rubber() -> None:
 def test_grades() -> None:
     table = rows("oils.md", "grades")
     assert {int(n.split()[-1]): float(hot) for n, _, hot in table} == GRADES
+
+
+@pytest.mark.slow
+def test_what_thinning_does_to_an_o_ring() -> None:
+    """A line of the table of docs/oils.md, computed again: h* and friction, 800 mm/s, both ways."""
+    text = (DOCS / "oils.md").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    at = next(i for i, line in enumerate(lines) if line.startswith("| Carreau, 1e5 1/s"))
+    h, friction = ([float(v) for v in line.split("|")[2:6]] for line in lines[at : at + 2])
+    p = ORing(carreau_rate=1e5, carreau_exponent=0.6, carreau_plateau=0.6, speeds=(800.0,))
+    for row in run(p, Silent()).states:
+        column = 0 if row.rod_speed_mm_s > 0.0 else 2
+        assert row.h_star_um == pytest.approx(h[column], rel=1e-3)
+        assert abs(row.rod_friction_N) == pytest.approx(friction[column], rel=1e-3)

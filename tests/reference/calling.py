@@ -9,10 +9,11 @@ import numpy as np
 
 from softehl.runtime.fem import rules
 from softehl.runtime.kernels import load_kernel
+from tests.reference.mixed import CONSERVING
 from tests.reference.states import State
 
 RULES = {
-    "film_conserving": rules.rupture_rule,
+    **dict.fromkeys(CONSERVING, rules.rupture_rule),
     "film_rough": rules.rupture_rule,
     "film_squeeze": rules.content_rule,
     "film_squeeze_rough": rules.content_rule,
@@ -29,7 +30,7 @@ def rule_of(state: State) -> Any:
         pressures = len(state.dofs) - 4
         both = state.family != "film_upwind_rough"
         return RULES[state.family]((pressures // 2 if both else pressures) - 1)
-    if state.family not in ("film", "film_upwind"):
+    if state.family not in ("film", "film_eyring", "film_carreau", "film_upwind"):
         return None
     return rules.film_rule(len(state.dofs) - 5, state.kind, state.count)
 

@@ -2,7 +2,7 @@
 
 Unknowns: u_z1 u_r1 u_z2 u_r2 and the pressures at the Gauss-Lobatto-Legendre points, end 1 to 2.
 Parameters: rod_radius rod_speed viscosity pressure_viscosity cavitation_penalty force_weight
-shear_weight.
+shear_weight, then those of `tests.reference.rheology`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.rheology import thinned
 from tests.reference.rules import lagrange, lobatto, rule
 
 
@@ -33,6 +34,7 @@ class FilmPoint:
     flux: Number
     tau: Number
     tau_rod: Number
+    driving: Number  # dp/dx of the same flux without thinning
     n_ds: tuple[Number, Number]
 
 
@@ -47,7 +49,7 @@ def _tables(order: int, kind: str, count: int) -> list[tuple[Number, Number, Vec
 def film_points(
     X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
 ) -> Iterator[FilmPoint]:
-    """All quadrature points of the segment."""
+    """All quadrature points of the segment; what follows seven parameters is how the oil thins."""
     rod_radius, speed, eta_0, alpha = parameters[:4]
     z1, r1, z2, r2 = (X[i] + dofs[i] for i in range(4))
     pressures = dofs[4:]
@@ -59,6 +61,7 @@ def film_points(
         p = mp.fdot(basis, pressures)
         slope = mp.fdot(slopes, pressures) / half_z
         eta = eta_0 * mp.exp(alpha * p)
+        middle, driving = thinned(speed, h, eta, slope, parameters[7:])
         yield FilmPoint(
             shapes=(one, two),
             test=basis,
@@ -71,9 +74,10 @@ def film_points(
             p=p,
             slope=slope,
             viscosity=eta,
-            flux=speed / 2 * h - h**3 / (12 * eta) * slope,
-            tau=eta * speed / h - h / 2 * slope,
-            tau_rod=eta * speed / h + h / 2 * slope,
+            flux=speed / 2 * h - h**3 / (12 * eta) * driving,
+            tau=middle - h / 2 * slope,
+            tau_rod=middle + h / 2 * slope,
+            driving=driving,
             n_ds=(weight * half_r, -weight * half_z),
         )
 
@@ -82,7 +86,7 @@ def residual_film(
     X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
 ) -> Vector:
     """Forces of (18) on the two nodes (N), then the Reynolds rows (25)."""
-    penalty, force_weight, shear_weight = parameters[4:]
+    penalty, force_weight, shear_weight = parameters[4:7]
     forces, rows = [mpf(0)] * 4, [mpf(0)] * (len(dofs) - 4)
     for at in film_points(X, dofs, parameters, kind, count):
         pull = (at.p * at.n_ds[0] - shear_weight * at.tau * at.ds, at.p * at.n_ds[1])
@@ -104,8 +108,11 @@ def tangent_film(
 def fields_film(
     X: Sequence[Number], dofs: Sequence[Number], parameters: Sequence[Number], kind: str, count: int
 ) -> Matrix:
-    """x dx h p tau flux tau_rod eta at the quadrature points."""
-    return [
-        [at.x, abs(at.dx), at.h, at.p, at.tau, at.flux, at.tau_rod, at.viscosity]
-        for at in film_points(X, dofs, parameters, kind, count)
-    ]
+    """x dx h p tau flux tau_rod eta at the quadrature points, driving where the oil thins."""
+    found = []
+    for at in film_points(X, dofs, parameters, kind, count):
+        more = [at.driving] if parameters[7:] else []
+        found.append(
+            [at.x, abs(at.dx), at.h, at.p, at.tau, at.flux, at.tau_rod, at.viscosity, *more]
+        )
+    return found

@@ -13,6 +13,7 @@ from functools import partial
 from itertools import pairwise
 
 from tests.reference.differentiate import PI, Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.rheology import thinned
 from tests.reference.rules import gauss, lagrange, lobatto
 from tests.reference.upwind import bubble_load
 
@@ -126,7 +127,7 @@ class Film:
     tau_a: Number
     h_T: Number
     eta: Number
-    ends: tuple[Number, Number]
+    rest: tuple[Number, ...]  # void fractions at the ends; driving where the oil thins
 
 
 def film_at(at: Place, dofs: Vector, given: Words, rough: bool) -> Film:
@@ -152,10 +153,13 @@ def film_at(at: Place, dofs: Vector, given: Words, rough: bool) -> Film:
     mean_2, mean_3 = 1 / (a * b), (a + b) / 2 / (a * b) ** 2
     if not rough:
         carried = at.h * mean_2 / mean_3 / ((a + b) / 2)
-        q = V / 2 * full * carried - slope_cell / (12 * eta_cell * mean_3)
-        drag, back = eta * V / at.h * full, at.h / 2 * slope
-        zero = mpf(0)
-        return Film(p, slope, q, drag - back, drag + back, zero, zero, at.h, eta, void)
+        how = [given[name] for name in THINNING if name in given]
+        _, driving_cell = thinned(V, (a + b) / 2, eta_cell, slope_cell, how)
+        q = V / 2 * full * carried - driving_cell / (12 * eta_cell * mean_3)
+        middle, driving = thinned(V, at.h, eta, slope, how)
+        drag, back = middle * full, at.h / 2 * slope
+        zero, more = mpf(0), (driving,) if how else ()
+        return Film(p, slope, q, drag - back, drag + back, zero, zero, at.h, eta, (*void, *more))
     c = given["roughness_difference"]
     H = at.h / sigma
     E = effective(H)
@@ -174,17 +178,26 @@ SEGMENT = (
     *("rod_radius", "rod_speed", "viscosity", "pressure_viscosity"),
     *("force_weight", "shear_weight", "rate"),
 )
+THINNING = ("critical_stress", "thinning_exponent", "thinning_plateau")
 ROUGH = (
     *(*SEGMENT, "roughness", "roughness_difference"),
     *("asperity_stiffness", "boundary_friction", "boundary_speed"),
 )
 
 
+def _given(parameters: Sequence[Number], rough: bool) -> Words:
+    """Parameters by their names: those of an oil that thins stand before the rate."""
+    names: tuple[str, ...] = SEGMENT
+    if more := 0 if rough else len(parameters) - len(SEGMENT):
+        names = *SEGMENT[:-1], *THINNING[:more], *SEGMENT[-1:]
+    return dict(zip(ROUGH if rough else names, parameters, strict=True))
+
+
 def residual_film(
     X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number], rough: bool
 ) -> Vector:
     """Forces on the nodes (N), then a row for every pressure; none for the void fractions."""
-    given = dict(zip(ROUGH if rough else SEGMENT, parameters, strict=True))
+    given = _given(parameters, rough)
     half = len(dofs[4:]) // 2
     forces, rows = [mpf(0)] * 4, [mpf(0)] * (2 * half)
     dz, dr = (X[2 + k] + dofs[2 + k] - X[k] - dofs[k] for k in (0, 1))
@@ -203,13 +216,13 @@ def residual_film(
 def fields_film(
     X: Vector, dofs: Vector, data: Vector, parameters: Sequence[Number], rough: bool
 ) -> Matrix:
-    """x dx h p tau flux tau_rod eta h_T p_a tau_a v_out v_in at the points."""
-    given = dict(zip(ROUGH if rough else SEGMENT, parameters, strict=True))
+    """x dx h p tau flux tau_rod eta h_T p_a tau_a v_out v_in at the points; see Film.rest."""
+    given = _given(parameters, rough)
     found = []
     for at in places(X, dofs, data, given):
         f = film_at(at, dofs, given, rough)
         known = [at.x, at.dx, at.h, f.p, f.tau, f.flux, f.tau_rod, f.eta, f.h_T, f.p_a, f.tau_a]
-        found.append([*known, *f.ends])
+        found.append([*known, *f.rest])
     return found
 
 
@@ -273,10 +286,12 @@ def residual_upwind(X: Vector, dofs: Vector, _: Vector, parameters: Sequence[Num
     return [mpf(0), -moved, mpf(0), moved] + [mpf(0)] * (len(dofs) - 4)
 
 
+CONSERVING = ("film_conserving", "film_conserving_eyring", "film_conserving_carreau")
+
 Residual = Callable[[Vector, Vector, Vector, Sequence[Number]], Vector]
 
 RESIDUALS: dict[str, Residual] = {
-    "film_conserving": partial(residual_film, rough=False),
+    **{name: partial(residual_film, rough=False) for name in CONSERVING},
     "film_rough": partial(residual_film, rough=True),
     "film_void": residual_void,
     "film_squeeze": partial(residual_squeeze, rough=False),
@@ -284,7 +299,7 @@ RESIDUALS: dict[str, Residual] = {
     "film_upwind_rough": residual_upwind,
 }
 FIELDS: dict[str, Callable[[Vector, Vector, Vector, Sequence[Number]], Matrix]] = {
-    "film_conserving": partial(fields_film, rough=False),
+    **{name: partial(fields_film, rough=False) for name in CONSERVING},
     "film_rough": partial(fields_film, rough=True),
     "film_squeeze": partial(fields_squeeze, rough=False),
     "film_squeeze_rough": partial(fields_squeeze, rough=True),

@@ -58,6 +58,7 @@ def _exact(s: State) -> tuple[Vector, Vector, Vector]:
     return numbers(s.coordinates), numbers(s.dofs), numbers(s.parameters)
 
 
+SEGMENTS = ("film", "film_eyring", "film_carreau")
 OTHERS = {name: law for name, law in LAWS.items() if name != "mooney_rivlin"}
 
 RESIDUALS: dict[str, Oracle] = {
@@ -74,7 +75,7 @@ RESIDUALS: dict[str, Oracle] = {
     "contact": _contact(boundary.residual_contact),
     "contact_friction": _contact(boundary.residual_friction),
     "contact_corner": _contact(boundary.residual_corner),
-    "film": _film(film.residual_film),
+    **{name: _film(film.residual_film) for name in SEGMENTS},
     "film_upwind": _plain(upwind.residual_upwind),
     "film_facet": _plain(facet.residual_facet),
     "mean_rotation": _plain(section.residual_rotation),
@@ -96,7 +97,7 @@ TANGENTS: dict[str, Oracle] = {
     "contact": _contact(boundary.tangent_contact),
     "contact_friction": _contact(boundary.tangent_friction),
     "contact_corner": _contact(boundary.tangent_corner),
-    "film": _film(film.tangent_film),
+    **{name: _film(film.tangent_film) for name in SEGMENTS},
     "film_upwind": _plain(upwind.tangent_upwind),
     "film_facet": _plain(facet.tangent_facet),
     "mean_rotation": _plain(section.tangent_rotation),
@@ -127,7 +128,7 @@ FIELDS: dict[str, Oracle] = {
         f"solid_taylor_mean_{n}": _plain(partial(solids.fields_taylor_mean, law=law))
         for n, law in OTHERS.items()
     },
-    "film": _film(film.fields_film),
+    **{name: _film(film.fields_film) for name in SEGMENTS},
     "film_facet": _plain(facet.fields_facet),
     **{family: _mixed(fields) for family, fields in mixed.FIELDS.items()},
 }
@@ -160,7 +161,7 @@ def fields(state: State) -> Matrix:
     return exact
 
 
-PAIRS = ("film_conserving", "film_rough", "film_squeeze", "film_squeeze_rough")
+PAIRS = (*mixed.CONSERVING, "film_rough", "film_squeeze", "film_squeeze_rough")
 """Families with pressures and void fractions."""
 
 
@@ -170,7 +171,7 @@ def blocks(family: str, count: int) -> tuple[Block, ...]:
         "contact": 2,
         "contact_friction": 2,
         "contact_corner": 2,
-        "film": 4,
+        **dict.fromkeys(SEGMENTS, 4),
         "film_upwind": 4,
         "film_facet": 6,
     }

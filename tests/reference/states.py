@@ -245,12 +245,38 @@ def upwind_states(orders: tuple[int, ...] = ORDERS[1:]) -> Iterator[State]:
         yield replace(state, family="film_upwind", parameters=parameters)
 
 
-def thin_film_states() -> Iterator[State]:
+def thin_film_states(orders: tuple[int, ...] = (4,)) -> Iterator[State]:
     """A film of about 0.3 micrometres at a radius of 25 mm: h must not be lost in r - R_rod."""
-    for state in film_states((4,)):
+    for state in film_states(orders):
         dofs = list(state.dofs)
         dofs[1], dofs[3] = -0.3996, -0.44975
         yield replace(state, label="thin-" + state.label, dofs=tuple(dofs))
+
+
+OILS: dict[str, tuple[float, ...]] = {"eyring": (), "carreau": (0.45, 0.1)}
+"""What follows the critical stress of an oil that thins: exponent, plateau."""
+
+
+def thinned(state: State, stress: float) -> Iterator[State]:
+    """The state of a smooth film with oils that thin at about this stress (MPa)."""
+    last = -1 if state.family == "film_conserving" else None  # the rate comes after the oil
+    rate = state.parameters[-1:] if last else ()
+    for oil, more in OILS.items():
+        given = (*state.parameters[:last], stress, *more, *rate)
+        yield replace(state, family=f"{state.family}_{oil}", parameters=given)
+
+
+def thinning_states(orders: tuple[int, ...] = (4,)) -> Iterator[State]:
+    """Thick films that pressure shears, thin ones that the rod shears, by each oil."""
+    for state in film_states(orders):
+        if state.kind == "gauss":
+            yield from thinned(state, 0.2)
+    for state in thin_film_states(orders):
+        if state.kind == "gauss":
+            yield from thinned(state, 0.02)
+    for state in mixed_states((min(2, orders[0]),)):
+        if state.family == "film_conserving":
+            yield from thinned(state, 0.3 if "far" in state.label else 0.003)
 
 
 PLAIN = (25.0, 120.0, 6.59e-8, 0.02, 0.8, 0.9)
@@ -306,5 +332,5 @@ def void_states() -> Iterator[State]:
 def all_states() -> list[State]:
     """Every state of every family."""
     bodies = [*solid_states(), *rubber_states(), *boundary_states(), *section_states()]
-    films = [*film_states(), *upwind_states(), *facet_states()]
+    films = [*film_states(), *upwind_states(), *facet_states(), *thinning_states()]
     return [*bodies, *films, *mixed_states(), *void_states()]

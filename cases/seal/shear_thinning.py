@@ -1,0 +1,112 @@
+"""The keys of an oil that thins under shear, and what its films take from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from softehl.cases.harness.parameters import Parameters, key
+
+_EYRING, _CARREAU = ("eyring_stress",), ("carreau_stress", "carreau_rate")
+_OF_LAW = {
+    "eyring": _EYRING,
+    "carreau": (*_CARREAU, "carreau_exponent", "carreau_plateau"),
+}
+_USUAL = {
+    "eyring": 'eyring_stress = "5 MPa"',
+    "carreau": 'carreau_rate = "1e6 1/s" (or carreau_stress) and carreau_exponent = 0.5',
+}
+
+NUMBERS = tuple(name for names in _OF_LAW.values() for name in names)
+"""Keys of both laws."""
+
+
+class ThinningKeys(Parameters):
+    """How an oil thins under shear."""
+
+    shear_thinning: Literal["eyring", "carreau"] | None = key(
+        None,
+        "law by which the oil thins under shear",
+        bounds='"eyring", "carreau", left out = by the keys that follow, Newtonian without',
+    )
+    eyring_stress: float | None = key(
+        None, "Eyring: stress tau_0 at which the oil thins", unit="MPa", gt=0
+    )
+    carreau_stress: float | None = key(
+        None, "Carreau: stress tau_c at which the oil thins", unit="MPa", gt=0
+    )
+    carreau_rate: float | None = key(
+        None,
+        "Carreau: shear rate at which the oil thins at zero pressure, for carreau_stress",
+        unit="1/s",
+        gt=0,
+    )
+    carreau_exponent: float | None = key(
+        None,
+        "Carreau: exponent n of stress over rate where it has thinned",
+        bounds="0.2 to 1, 1 = Newtonian",
+        ge=0.2,
+        le=1,
+    )
+    carreau_plateau: float | None = key(
+        None,
+        "Carreau: viscosity at the highest rates over that at rest",
+        bounds="0 to 1, left out = 0",
+        ge=0,
+        le=1,
+    )
+
+    @property
+    def thins(self) -> str:
+        """Name of the law, empty for a Newtonian oil."""
+        given = (law for law, keys in _OF_LAW.items() if self._given(keys))
+        return self.shear_thinning or next(given, "")
+
+    def thinning_values(self, viscosity: float) -> Mapping[str, float]:
+        """What the kernels of films that thin ask for; viscosity: at rest and zero pressure."""
+        rate = self.carreau_rate or 0.0
+        stress = self.eyring_stress or self.carreau_stress or viscosity * rate
+        if not stress:
+            return {}
+        return {
+            "critical_stress": stress,
+            "thinning_exponent": self.carreau_exponent or 1.0,
+            "thinning_plateau": self.carreau_plateau or 0.0,
+        }
+
+    @property
+    def film_suffix(self) -> str:
+        """What the names of the kernels of smooth films have more than those of Newtonian ones."""
+        return f"_{self.thins}" if self.thins else ""
+
+    def require_smooth_film(self, *, dg: bool, rough: bool) -> None:
+        """Films whose flow factors or facets are those of a Newtonian oil.  ValueError."""
+        for given, what in ((dg, 'reynolds = "dg"'), (rough, "roughness")):
+            if given and self.thins:
+                raise ValueError(
+                    f"{what} knows Newtonian oils only; leave it out, or the keys of {self.thins}"
+                )
+
+    def _given(self, keys: tuple[str, ...]) -> list[str]:
+        return [name for name in keys if getattr(self, name) is not None]
+
+    @model_validator(mode="after")
+    def _thins_by_one_law(self) -> Self:
+        law = self.thins
+        if not law:
+            return self
+        for other, keys in _OF_LAW.items():
+            if other != law and (wrong := self._given(keys)):
+                also = f'shear_thinning = "{law}"' if self.shear_thinning else law
+                raise ValueError(f"{wrong[0]} is no key of {also}; leave one of them out")
+        if self.carreau_stress and self.carreau_rate:
+            raise ValueError(
+                f"carreau_stress = {self.carreau_stress:g} and carreau_rate = "
+                f"{self.carreau_rate:g}: one follows from the other; leave one of them out"
+            )
+        needed = [_EYRING] if law == "eyring" else [_CARREAU, ("carreau_exponent",)]
+        if not all(self._given(keys) for keys in needed):
+            raise ValueError(f'shear_thinning = "{law}" needs more, as in {_USUAL[law]}')
+        return self
