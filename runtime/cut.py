@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.band import Groups
 
 Small = NDArray[np.int32]
 Places = tuple[Integers, Integers]
@@ -34,6 +35,7 @@ class Cut:
     own: Places
     lower: int
     upper: int
+    groups: Groups | None = None
 
     @classmethod
     def of(cls, indptr: Small, indices: Small, m: int, size: int) -> Cut:
@@ -56,6 +58,7 @@ class Cut:
             own=(own, (lower + upper + i - j) + j * (2 * lower + upper + 1)),
             lower=lower,
             upper=upper,
+            groups=Groups.of(i, j, k, (lower, upper)),
         )
 
     def parts(self, data: Array) -> Parts:

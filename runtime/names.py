@@ -9,13 +9,22 @@ _AS_GOOD = 0.05
 """Names whose likeness differs by less are as likely: `pressure` may be `sealed_pressure`."""
 
 
+_FEW = 2
+"""Names that a hint has at most."""
+
+
 def meant(given: object, known: Iterable[str]) -> str:
-    """A hint at the name that was probably meant, at several that are as likely, or nothing."""
-    word = str(given)
-    close = difflib.get_close_matches(word, list(known), n=2)
+    """A hint at the name that was probably meant, at several that are as likely, or nothing.
+
+    Capitals do not count. What is like no name may be one of the words of a few.
+    """
+    word, names = str(given).lower(), list(known)
+    close = difflib.get_close_matches(word, [name.lower() for name in names], n=2)
     likeness = [difflib.SequenceMatcher(None, name, word).ratio() for name in close]
-    likely = [repr(n) for n, r in zip(close, likeness, strict=True) if r > likeness[0] - _AS_GOOD]
-    return f" (did you mean {' or '.join(likely)}?)" if likely else ""
+    likely = [n for n, r in zip(close, likeness, strict=True) if r > likeness[0] - _AS_GOOD]
+    likely = likely or [name.lower() for name in names if word in name.lower().split("_")]
+    found = [repr(name) for name in names if name.lower() in likely]
+    return f" (did you mean {' or '.join(found)}?)" if 0 < len(found) <= _FEW else ""
 
 
 def listed(known: Iterable[str]) -> str:

@@ -28,6 +28,7 @@ ORDER = {
     "runtime": (
         *(
             "arrays mpi names tuning",
+            "band",
             "cut library",
             "io",
             "calls",

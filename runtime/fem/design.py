@@ -7,7 +7,7 @@ directly (one solve for each variation) or from the adjoint K^T l = q_x (one for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,19 +52,23 @@ def _rows(block: ElementBlock, parameters: Array) -> Array:
     return np.hstack([coordinates, data, np.broadcast_to(parameters, (n, len(parameters)))])
 
 
-_STENCIL = ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0))  # places, weights times 12
-
-
-def rate_of(inputs: Callable[[float], Inputs], step: float) -> Inputs:
-    """d inputs / ds at s = 0 by the five-point difference, which is exact for polynomials of
-    degree 4: then only rounding is left, however wide the step is.
+def rate_of(inputs: Callable[[float], Inputs], step: float, degree: int = 4) -> Inputs:
+    """d inputs / ds at s = 0 by the central difference that is exact for polynomials of this
+    degree, 2 or 4: then only rounding is left, however wide the step is. What does not move has
+    no rate, to the last bit.
     """
-    at = [(inputs(k * step), weight / (12.0 * step)) for k, weight in _STENCIL]
-    names = at[0][0].blocks
-    return Inputs(
-        {name: np.asarray(sum(w * one.blocks[name] for one, w in at)) for name in names},
-        np.asarray(sum(w * one.values for one, w in at)),
-    )
+    pairs = [(inputs(k * step), inputs(-k * step)) for k in (1, 2)[: degree // 2]]
+    names = pairs[0][0].blocks
+    blocks = {n: _slope([(a.blocks[n], b.blocks[n]) for a, b in pairs], step) for n in names}
+    return Inputs(blocks, _slope([(a.values, b.values) for a, b in pairs], step))
+
+
+def _slope(pairs: Sequence[tuple[Array, Array]], step: float) -> Array:
+    """d/ds of values ahead and behind by a step, and by two steps if they are given."""
+    rise, *wider = [ahead - behind for ahead, behind in pairs]
+    for wide in wider:
+        rise = (8.0 * rise - wide) / 6.0
+    return np.asarray(rise / (2.0 * step))
 
 
 def pseudo_load(problem: Problem, x: Array, rate: Inputs) -> Array:
@@ -99,18 +103,18 @@ def kernel_of(block: ElementBlock) -> Kernel:
 
 @dataclass(frozen=True, eq=False)
 class FieldRates:
-    """Derivatives of the weighted sums of a block's fields at a state x (n,) of a problem."""
+    """Derivatives of a block's fields, and of their weighted sums, at a state x (n,)."""
 
     problem: Problem
     name: str
     x: Array
 
-    def along(self, rows: Array, weights: Weights) -> float:
-        """Rate of a weighted sum when elements and parameters move by rows, unknowns held."""
-        if not rows.any():
-            return 0.0
+    def along(self, rows: Array) -> dict[str, Array]:
+        """Field -> (elements, points): its rate when elements and parameters move by rows, unknowns
+        held.
+        """
         still = np.zeros((len(rows), self._block.dofs.shape[1]))
-        return float(_sum(self._rates(np.hstack([rows, still])), weights).sum())
+        return self._rates(np.hstack([rows, still]))
 
     def by_unknowns(self, weights: Weights) -> Array:
         """Derivative (n,) of a weighted sum by all unknowns; elements without weight are left out.
@@ -129,7 +133,7 @@ class FieldRates:
         for k in range(ndof):
             along = np.zeros((n, width + ndof))
             along[:, width + k] = 1.0
-            np.add.at(gradient, part.dofs[:, k], _sum(self._rates(along, part), some))
+            np.add.at(gradient, part.dofs[:, k], weighted(self._rates(along, part), some))
         return gradient
 
     @property
@@ -150,8 +154,8 @@ class FieldRates:
         return {name: values[:, :, i] for i, name in enumerate(kernel.fields)}
 
 
-def _sum(rates: Mapping[str, Array], weights: Weights) -> Array:
-    """(elements,) sums over fields and points."""
+def weighted(rates: Mapping[str, Array], weights: Weights) -> Array:
+    """(elements,) sums of the rates of fields (elements, points) over fields and points."""
     return np.asarray(sum((w * rates[name]).sum(axis=1) for name, w in weights.items()))
 
 

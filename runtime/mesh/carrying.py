@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.mesh.location import located, shapes
+from softehl.runtime.mesh.location import interpolated, located
 from softehl.runtime.mesh.sections import SectionMesh
 
 _PATCH = 32  # nodes of a local spline, at most
@@ -79,9 +79,7 @@ def _averaged(old: SectionMesh, middles: Array, values: Array) -> Array:
     at, count = old.quads.ravel(), len(old.points)
     total = np.bincount(at, area * np.repeat(values, 4), count)
     nodal = total / np.maximum(np.bincount(at, area, count), 1e-300)
-    cell, parent = located(old.points, old.quads, middles)
-    inside = np.clip(parent, -1.0, 1.0)
-    return np.asarray((shapes(inside) * nodal[old.quads[cell]]).sum(axis=1))
+    return interpolated(old.points, old.quads, nodal[:, None], middles)[:, 0]
 
 
 def carry_boundary(old: SectionMesh, new: SectionMesh, values: Array) -> Array:

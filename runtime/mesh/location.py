@@ -11,12 +11,13 @@ _NEIGHBOURS = (8, 32, 128)  # cells looked at, by their middles, until one holds
 _ITERATIONS = 8
 _WITHIN = 1e-12  # of the size of the mesh: a point so near to a cell is in it
 _FURTHEST = 4.0  # parent coordinates up to which values are extrapolated
-_SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+CORNERS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+"""Parent coordinates of the corners of a quadrilateral."""
 
 
 def shapes(at: Array) -> Array:
     """Bilinear shape functions (n, 4) at parent points (n, 2)."""
-    return np.asarray(0.25 * np.prod(1.0 + _SIGNS[None] * at[:, None], axis=2))
+    return np.asarray(0.25 * np.prod(1.0 + CORNERS[None] * at[:, None], axis=2))
 
 
 def located(points: Array, quads: Integers, at: Array) -> tuple[Integers, Array]:
@@ -50,12 +51,24 @@ def located(points: Array, quads: Integers, at: Array) -> tuple[Integers, Array]
     return cell, np.clip(parent, -_FURTHEST, _FURTHEST)
 
 
+def interpolated(
+    points: Array, quads: Integers, values: Array, at: Array, reach: float = 1.0
+) -> Array:
+    """Nodal values (V, k) at points at (n, 2), bilinear in the cells: (n, k).
+
+    reach: parent coordinates up to which a point outside is extrapolated to.
+    """
+    cell, parent = located(points, quads, at)
+    weights = shapes(np.clip(parent, -reach, reach))
+    return np.asarray(np.einsum("na,nak->nk", weights, values[quads[cell]]))
+
+
 def _inverse(x: Array, at: Array) -> Array:
     """Parent coordinates (n, m, 2) of points (n, 2) in cells with corners x (n, m, 4, 2)."""
     a = x.mean(axis=2)
-    b = np.einsum("a,nmad->nmd", _SIGNS[:, 0], x) / 4.0
-    c = np.einsum("a,nmad->nmd", _SIGNS[:, 1], x) / 4.0
-    d = np.einsum("a,nmad->nmd", _SIGNS.prod(axis=1), x) / 4.0
+    b = np.einsum("a,nmad->nmd", CORNERS[:, 0], x) / 4.0
+    c = np.einsum("a,nmad->nmd", CORNERS[:, 1], x) / 4.0
+    d = np.einsum("a,nmad->nmd", CORNERS.prod(axis=1), x) / 4.0
     xi = np.zeros((*x.shape[:2], 2))
     for _ in range(_ITERATIONS):
         s, t = xi[..., :1], xi[..., 1:]

@@ -10,21 +10,31 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator, RBFInterpolator
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.mesh.location import interpolated
 from softehl.runtime.mesh.sections import SectionMesh
 
+_LONG = 20.0  # ratio of the sides of an element, above which splines are not used
+_OUTSIDE = 1.1  # parent coordinates up to which values are extrapolated
 _NEIGHBOURS = 32  # of a local spline: about three rings of a structured mesh
 
 
 def transfer_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
     """Nodal values (V', k) on the new mesh from those, (V, k), on the old: local splines.
 
-    All nan, a start that no solver takes, where elements are so long that neighbours lie in a row.
+    Where old elements are so long that the neighbours lie in a row a spline leads anywhere: values
+    are bilinear in the elements then, which turns no thin element over.
     """
+    if _longest(old) > _LONG:
+        return interpolated(old.points, old.quads, values, new.points, _OUTSIDE)
     spline = RBFInterpolator(old.points, values, neighbors=_NEIGHBOURS, kernel="cubic", degree=2)
-    try:
-        return np.asarray(spline(new.points))
-    except np.linalg.LinAlgError:
-        return np.full((len(new.points), values.shape[1]), np.nan)
+    return np.asarray(spline(new.points))
+
+
+def _longest(mesh: SectionMesh) -> float:
+    """The largest ratio of two sides of an element."""
+    corners = mesh.points[mesh.quads]
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    return float((sides.max(axis=1) / sides.min(axis=1)).max())
 
 
 def transfer_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:

@@ -143,6 +143,9 @@ def eliminated_own(L: Parts, b: Array) -> Array:
     cut = L.cut
     if not cut.k:
         return b
+    found = cut.groups.solve(L.own, b) if cut.groups else None
+    if found is not None:
+        return found
     _, _, x, info = lapack.dgbsv(
         cut.lower, cut.upper, L.own, b, overwrite_ab=True, overwrite_b=True
     )

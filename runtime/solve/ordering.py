@@ -98,5 +98,16 @@ class Arranged:
         return x
 
 
+def without_zeros(K: SparseMatrix) -> SparseMatrix:
+    """K without the entries that are stored and zero: what is switched off keeps its place in a
+    pattern, and would fill the factors.
+    """
+    if K.data.all():
+        return K
+    K = K.copy()
+    K.eliminate_zeros()
+    return K
+
+
 def _same(old: Small, new: Small) -> bool:
     return old is new or np.array_equal(old, new)

@@ -18,7 +18,7 @@ from softehl.runtime.solve.linear import (
     SparseMatrix,
     checked_row_sums,
 )
-from softehl.runtime.solve.ordering import MOST_ENTRIES, Arranged, Order, Orders
+from softehl.runtime.solve.ordering import MOST_ENTRIES, Arranged, Order, Orders, without_zeros
 
 Ordering: TypeAlias = Literal["NATURAL", "MMD_ATA", "MMD_AT_PLUS_A", "COLAMD"]
 _LARGE = 30_000_000  # entries of factors that are not copied to look at a few of them
@@ -96,7 +96,7 @@ class SuperLU:
         return np.argsort(incomplete.perm_c)
 
     def _as_it_is(self, K: SparseMatrix) -> sparse_linalg.SuperLU:
-        return self._factors(K, "NATURAL")
+        return self._factors(without_zeros(K), "NATURAL")
 
     def _factors(self, K: SparseMatrix, ordering: Ordering) -> sparse_linalg.SuperLU:
         try:

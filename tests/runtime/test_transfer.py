@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softehl.runtime.mesh.sections import Disc, disc_mesh
+from softehl.runtime.mesh.sections import Disc, corner_jacobians, disc_mesh
 from softehl.runtime.mesh.spacing import Spot, graded
 from softehl.runtime.mesh.transfer import transfer_chain, transfer_elements, transfer_nodes
 
@@ -57,9 +57,18 @@ def test_a_chain_keeps_to_the_values_of_its_neighbours(part: str) -> None:
     assert moved[[0, -1]].tolist() == [0.0, 0.0]
 
 
-def test_elements_that_are_too_long_give_no_start() -> None:
+def test_a_field_on_long_elements_is_bilinear() -> None:
     z, r = np.meshgrid(1e-3 * np.arange(40.0), np.arange(10.0))
-    rows = replace(OLD, points=np.stack([z.ravel(), r.ravel()], axis=1))
-    moved = transfer_nodes(rows, NEW, rows.points)
-    assert moved.shape == NEW.points.shape
-    assert np.isnan(moved).all()
+    first = 40 * np.arange(9)[:, None] + np.arange(39)
+    quads = np.stack([first, first + 1, first + 41, first + 40], axis=-1).reshape(-1, 4)
+    rows = replace(OLD, points=np.stack([z.ravel(), r.ravel()], axis=1), quads=quads)
+    inside = replace(NEW, points=np.array([[0.0101, 3.3], [0.0256, 8.9]]))
+    assert transfer_nodes(rows, inside, rows.points) == pytest.approx(inside.points, abs=1e-9)
+
+
+def test_thin_elements_are_not_turned_over() -> None:
+    thin = Disc(0.0, 26.0, 1.7, -34.0, 43.0, layers=6, layer_growth=2.0**12)
+    old, new = disc_mesh(thin, 2), disc_mesh(replace(thin, arc_end=40.0), 2)
+    moved = transfer_nodes(old, new, 0.3 * np.sin(2.0 * old.points))
+    assert np.abs(moved - 0.3 * np.sin(2.0 * new.points)).max() < 0.006
+    assert corner_jacobians(replace(new, points=new.points + moved)).min() > 0.1
