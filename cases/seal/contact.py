@@ -165,16 +165,21 @@ def let_go_stage(system: SealSystem, settings: PathSettings, x: Array) -> Stage:
     )
 
 
+def released(p: ORing, force: float) -> float:
+    """Sealed pressure (MPa) that holds the section as a force (N) on the gland's area does."""
+    area = 0.25 * pi * (p.housing_diameter**2 - p.rod_diameter**2)
+    return min(abs(force) / area, p.sealed_pressure)
+
+
 def load_stage(
-    system: SealSystem, settings: PathSettings, sealed_pressure: float, force: float = 0.0
+    system: SealSystem, settings: PathSettings, *, force: float = 0.0, begin: float = 0.0
 ) -> Stage:
-    """First stage, continued: the sealed pressure rises from 0.
+    """First stage, continued: the sealed pressure rises from 0, or from where it began before, MPa.
 
     force: of the hold before, N; it fades as the pressure on the gland replaces it.
     """
-    p, steps = system.parameters, settings.load_steps
-    area = 0.25 * pi * (p.housing_diameter**2 - p.rod_diameter**2)
-    gone = min(abs(force) / area, sealed_pressure)
+    p = system.parameters
+    gone, steps = released(p, force), settings.reload_steps if begin else settings.load_steps
 
     def at(p_s: float) -> Problem:
         rest = force * max(0.0, 1.0 - p_s / gone) if gone else 0.0
@@ -183,10 +188,10 @@ def load_stage(
     return Stage(
         name="sealed pressure",
         problem_at=at,
-        start=0.0,
-        stop=sealed_pressure,
+        start=begin,
+        stop=p.sealed_pressure,
         steps=steps.scaled(p.shear_modulus),
-        sealed_pressure=sealed_pressure,
+        sealed_pressure=p.sealed_pressure,
         stroke="both",
     )
 

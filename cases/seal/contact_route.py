@@ -7,54 +7,45 @@ Where a route fails the next one begins on a finer mesh, the last of them on the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
 
 from softehl.cases.seal.contact import (
     against_wall,
     along,
-    approach_stage,
     held_place,
     lean_stage,
     let_go_stage,
-    load_stage,
     squeeze_stage,
     wedged,
 )
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
-from softehl.cases.seal.contacts import contact_edges
+from softehl.cases.seal.contacts import Edge, contact_edges
 from softehl.cases.seal.equations import SealSystem, build_system
+from softehl.cases.seal.film_edges import between
 from softehl.cases.seal.grading import (
+    MOST_SEGMENTS,
     PASSES,
     graded_layout,
     inlet_length,
     placed_layout,
-    slowest_film,
+    slowest_films,
 )
 from softehl.cases.seal.layout import Layout
-from softehl.cases.seal.nearing import nearing_stage, without_rounding
+from softehl.cases.seal.loading import Loading, State
+from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
-from softehl.cases.seal.refinement import carried_contact, finer
+from softehl.cases.seal.refinement import finer
 from softehl.cases.seal.results import unsealed
+from softehl.cases.seal.trail import Trail
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.newton import Newton
-
-State: TypeAlias = tuple[SealSystem, Array]
 
 _CUTS = (1.0, 0.25, 0.0625)  # of the first step of the squeeze, one after the other
 
-_CARRIED = ((14, False), (30, True))
-"""Iterations that a state may need that was carried to another mesh, and whether each has to reduce
-the residual: that helps where the ring is squeezed into the corners of its groove."""
-
 COARSE = 1
 """Density on which a path from rest is followed first: it is cheap there."""
-
-_JUMPS = (0.003, 0.006, 0.015, 0.04)
-"""Steps of the pressure over a kink of the path, one after the other, in shear moduli."""
 
 SEALS = 3
 """How often a mesh is made anew because the sealed pressure ends where nothing touches."""
@@ -72,13 +63,14 @@ class ContactRoute:
     """Routes to a contact state.
 
     follow: solves a stage from a start. newton: corrector of stored states. contacts: states of
-    uniform meshes that runs leave for each other.
+    uniform meshes that runs leave for each other. trail: what is kept of the last path.
     """
 
     settings: PathSettings
     follow: Callable[[Stage, Array], Followed]
     newton: Newton = field(default_factory=Newton)
     contacts: ContactStore = field(default_factory=ContactStore)
+    trail: Trail = field(default_factory=Trail)
 
     def contact(self, p: ORing) -> State | StageFailed:
         """The system of a case, uniform or graded, and its unknowns in contact under p_s."""
@@ -137,29 +129,15 @@ class ContactRoute:
             if isinstance(free, StageFailed):
                 return free
             x = free
-        stage = load_stage(system, self.settings, p_s, force)
-        return self._over_kinks(system, self._quicker(system, stage), x)
+        return self._loading.followed(system, x, force=force)
+
+    @property
+    def _loading(self) -> Loading:
+        return Loading(self.settings, self.follow, self.newton, self.trail)
 
     def _quicker(self, system: SealSystem, stage: Stage) -> Stage:
         """A stage whose steps are corrected by what is quickest."""
         return replace(stage, corrector=along(system, self.newton))
-
-    def _over_kinks(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
-        """To the end of a stage in which nodes slide round the edge of an open gap.
-
-        Where no step is small enough a longer one may be: a node that slides from fillet to bore
-        makes a kink in the path, and Newton's method alternates between its sides.
-        """
-        found, mu = self.follow(stage, x), system.parameters.shear_modulus
-        jumps = list(_JUMPS) if system.parameters.opens else []
-        while jumps and isinstance(found, StageFailed) and found.branch.points:
-            start = found.branch.points[-1].parameter + jumps.pop(0) * mu
-            if start >= stage.stop:
-                break
-            beyond = self.follow(replace(stage, start=start), found.branch.last.x)
-            if not isinstance(beyond, StageFailed) or beyond.branch.points:
-                found, jumps = beyond, list(_JUMPS)
-        return found
 
     def _graded(self, p: ORing) -> State | StageFailed:
         """Graded at a low density, from the uniform mesh of that density, then refined."""
@@ -201,21 +179,42 @@ class ContactRoute:
         for number in range(NEARER):
             if isinstance(found, StageFailed) or not self._short(*found):
                 break
-            system, x = found
-            offset = slowest_film(system, x)
-            near = self.follow(self._nearing(system, offset, x), x)
+            near = self._near(*found)
             if isinstance(near, StageFailed):
                 break
-            layout = placed_layout(system, without_rounding(system, near), p)
+            also = [edge for y in near[1:] for edge in contact_edges(found[0], y)]
+            layout = placed_layout(found[0], near[0], p, also=also)
             found = self._on(layout, p, found, PASSES + SEALS + number)
         return found
 
-    def _nearing(self, system: SealSystem, offset: float, x: Array) -> Stage:
-        """The rod comes to an offset, mm, from the contact state x (n,)."""
-        linear = self.newton.linear
-        if system.parameters.solver == "auto" and isinstance(linear, Condenser):
-            return nearing_stage(system, self.settings, offset, x, linear)
-        return self._quicker(system, approach_stage(system, self.settings, offset))
+    def for_film(self, state: State, edges: Sequence[Edge]) -> State | StageFailed:
+        """A contact state on a mesh that is fine at the edges of a film, too."""
+        system, x = state
+        near = self._near(system, x) if self._short(system, x) else [x]
+        states = [x] if isinstance(near, StageFailed) else near
+        others = [edge for y in states[1:] for edge in contact_edges(system, y)]
+        more = between(edges, contact_edges(system, states[0]))
+        also, most = [*others, *edges, *more], 2 * MOST_SEGMENTS
+        layout = placed_layout(system, states[0], system.parameters, most, also)
+        new = build_system(system.parameters, layout)
+        return self._loading.carried(system, x, new, "contact on the mesh of the film")
+
+    def _near(self, system: SealSystem, x: Array) -> list[Array] | StageFailed:
+        """The contact state x with the rod where slow films have it, the thinnest first."""
+        found = list[Array]()
+        for offset in slowest_films(system, x):
+            near = self._neared(system, offset, x)
+            if isinstance(near, StageFailed):
+                return near
+            found.append(without_rounding(system, near))
+        return found
+
+    def _neared(self, system: SealSystem, offset: float, x: Array) -> Followed:
+        """With the rod at an offset, mm, from the contact state x (n,)."""
+        quick = system.parameters.solver == "auto"
+        return rod_brought_near(
+            system, self.settings, offset, x, self.newton, self.follow, quick=quick
+        )
 
     def _short(self, system: SealSystem, x: Array) -> bool:
         """Whether the edges of the contact x move by inlets when the rod comes nearer."""
@@ -258,7 +257,7 @@ class ContactRoute:
     def _on(self, layout: Layout, p: ORing, before: State, number: int) -> State | StageFailed:
         """On a graded mesh: carried to it, or else by the path from rest, coarse or as it is."""
         new = build_system(p, layout)
-        state = self.carried(*before, new, f"contact on graded mesh {number}")
+        state = self._loading.carried(*before, new, f"contact on graded mesh {number}")
         for density in _doublings(COARSE, p.density):
             if isinstance(state, StageFailed):
                 coarse = build_system(_at(p, density), layout)
@@ -281,7 +280,7 @@ class ContactRoute:
                 break
             graded = build_system(p, graded_layout(*state))
             name = f"contact on graded mesh {number}"
-            state = self.carried(*state, graded, name)
+            state = self._loading.carried(*state, graded, name)
         return state
 
     def _refined(self, system: SealSystem, x: Followed, density: int) -> State | StageFailed:
@@ -289,7 +288,7 @@ class ContactRoute:
         state = x if isinstance(x, StageFailed) else (system, x)
         while not isinstance(state, StageFailed) and state[0].parameters.density < density:
             coarse = state[0]
-            state = self.carried(
+            state = self._loading.carried(
                 *state, build_system(finer(coarse.parameters), coarse.section.layout)
             )
             if not isinstance(state, StageFailed) and coarse.parameters.mesh != "graded":
@@ -298,23 +297,8 @@ class ContactRoute:
 
     def elsewhere(self, old: SealSystem, x: Array, new: SealSystem) -> Followed:
         """Unknowns in contact on a mesh of its own, from the contact state x of another one."""
-        state = self.carried(old, x, new, "contact")
+        state = self._loading.carried(old, x, new, "contact")
         return self._loaded(new) if isinstance(state, StageFailed) else state[1]
-
-    def carried(
-        self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
-    ) -> State | StageFailed:
-        """The contact state x of one mesh on another."""
-        stage, start = carried_contact(old, new, self.settings, x, name)
-        if not new.section.placed:
-            found = self.follow(stage, start)
-            return found if isinstance(found, StageFailed) else (new, found)
-        for iterations, line_search in _CARRIED:
-            newton = replace(self.newton, max_iterations=iterations, line_search=line_search)
-            found = self.follow(replace(stage, corrector=newton), start)
-            if not isinstance(found, StageFailed):
-                break
-        return found if isinstance(found, StageFailed) else (new, found)
 
 
 def _doublings(first: int, last: int) -> Iterator[int]:

@@ -33,8 +33,9 @@ WITHOUT_INFLUENCE = (
     *("cavitation", "cavitation_pressure", "roughness", "asperity_stiffness", "boundary_friction"),
     *("ring", "rod", "squeeze", "gland", "backup"),  # diameters follow from them
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
-    *("rotation", "solver", "linear", "upwinding", "error_estimate", "tolerance"),
-    *("sensitivity", "tolerances"),
+    *("shear_thinning", "eyring_stress", "carreau_stress", "carreau_rate", "carreau_exponent"),
+    *("carreau_plateau", "rotation", "solver", "linear", "upwinding", "error_estimate"),
+    *("tolerance", "sensitivity", "tolerances"),
 )
 """Parameters that the contact stage does not know."""
 

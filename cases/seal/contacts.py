@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,15 +12,22 @@ from softehl.cases.seal.equations import SealSystem
 from softehl.runtime.arrays import Array, Flags, Integers
 
 CONTACT_FILM = 0.02
-"""Film thickness that counts as contact, mm; a gap above it parts two contacts."""
+"""Film thickness that counts as contact, mm; a gap above it parts two contacts of a film."""
+
+GRAZED = 1e-3
+"""Gap that parts two dry contacts, mm: a film opens a groove whose ground is so near to the rod."""
 
 
 @dataclass(frozen=True)
 class Edge:
-    """An edge of the contact: its place on the arc, mm, and K^2 of its pressure, MPa^2/mm."""
+    """An edge of the contact: its place on the arc, mm, and K^2 of its pressure, MPa^2/mm.
+
+    sealed: whether the contact begins there, coming from the sealed side.
+    """
 
     place: float
     rise: float
+    sealed: bool = True
 
 
 def groups(h: Array, inside: Flags, apart: float = CONTACT_FILM) -> list[Integers]:
@@ -40,7 +47,22 @@ def groups(h: Array, inside: Flags, apart: float = CONTACT_FILM) -> list[Integer
 def contacts(system: SealSystem, x: Array) -> list[Integers]:
     """Arc nodes of each contact with the rod in the contact state x, from the sealed side on."""
     _, h = system.arc_film(x)
-    return groups(h - h.min(), system.rod_multipliers(x) < 0.0)
+    return groups(h - h.min(), system.rod_multipliers(x) < 0.0, GRAZED)
+
+
+def traps(system: SealSystem, x: Array, y: Array, apart: float) -> bool:
+    """Whether the film y (n,) holds oil between what is one contact in the contact state x (n,).
+
+    apart: film thickness that parts two contacts, mm, or more than `CONTACT_FILM` of thick films.
+
+    Squeezing a film out leaves some where contact presses less than on both sides, as under a
+    groove that is pressed flat. It stays there, steadily, at a pressure of its own: there are two
+    films then, and the mesh is that of the other one.
+    """
+    _, h = system.arc_film(y)
+    found = contacts(system, x)
+    apart = max(apart, CONTACT_FILM)
+    return 0 < len(found) < len(groups(h, h < apart, apart))
 
 
 def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
@@ -65,7 +87,7 @@ def _edges(system: SealSystem, x: Array, touching: Integers) -> Iterator[Edge]:
         if system.section.layout.flat:
             outside = s[min(max(i[0] + way, 0), len(s) - 1)]
             edge = _bracketed(edge, (outside, s[i[0]]), (s[i[1]], pressure[i[1]] ** 2), -way)
-        yield edge
+        yield replace(edge, sealed=way < 0)
 
 
 def _edge(s: Array, y: Array) -> Edge:

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.method import FilmPath
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.quantities import quantities

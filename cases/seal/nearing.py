@@ -7,13 +7,14 @@ contact of the arc as the layer these changes concern a small matrix only.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from softehl.cases.seal.contact import approach_stage
+from softehl.cases.seal.contact import along, approach_stage
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.system import ROD
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
@@ -25,6 +26,7 @@ from softehl.runtime.solve.steps import StepRule
 
 _NEAR = 0.3
 _TOLERANCE = 1e-6  # by which gaps are right to hundredths of a micrometre
+_LOOSE = 1e-3  # on the way
 _TOUCHES = 1e-9  # of the largest pressure: what is less is rounding
 _STEPS = StepRule(0.5, 0.02, 5.0, target_iterations=8)  # of the logarithm of the offset
 
@@ -44,6 +46,38 @@ def nearing_stage(
 
     corrector = corrector.with_tolerance(_TOLERANCE)
     return replace(stage, problem_at=problem_at, steps=_STEPS, corrector=corrector)
+
+
+def neared(stage: Stage, x: Array, follow: Callable[[Stage, Array], Followed]) -> Followed:
+    """The contact state at the end of a `nearing_stage` from x (n,), roughly followed.
+
+    follow: solves a stage from a start.
+    """
+    assert isinstance(stage.corrector, SchurCorrector)
+    y = follow(replace(stage, corrector=stage.corrector.with_tolerance(_LOOSE)), x)
+    if isinstance(y, StageFailed):
+        return y
+    return follow(replace(stage, start=stage.stop), y)
+
+
+def rod_brought_near(
+    system: SealSystem,
+    settings: PathSettings,
+    offset: float,
+    x: Array,
+    newton: Newton,
+    follow: Callable[[Stage, Array], Followed],
+    *,
+    quick: bool,
+) -> Followed:
+    """From the contact state x (n,) to that with the rod at an offset, mm.
+
+    quick: whether modified Newton iterations are to be tried, where the linear solver condenses.
+    """
+    if quick and isinstance(newton.linear, Condenser):
+        return neared(nearing_stage(system, settings, offset, x, newton.linear), x, follow)
+    stage = approach_stage(system, settings, offset)
+    return follow(replace(stage, corrector=along(system, newton)), x)
 
 
 def without_rounding(system: SealSystem, x: Array) -> Array:

@@ -1,6 +1,6 @@
 """Whether a deformed section runs into itself, as the lips of a cup do under a high pressure.
 
-Contact of a section with itself is not modelled: it is only noticed.
+Contact of a section with itself is not modelled, nor with the rod beyond the film: it is noticed.
 """
 
 from __future__ import annotations
@@ -12,9 +12,16 @@ from softehl.runtime.arrays import Array
 
 
 def overlap(system: SealSystem, x: Array) -> str:
-    """Where the deformed outline of the state x crosses itself, in words; empty if nowhere."""
-    place = crossing(system.deformed(x)[system.mesh.boundary])
-    return "" if place is None else f"at z = {place[0]:.3g}, r = {place[1]:.4g} mm"
+    """What the deformed outline of the state x runs into, in words; empty if nothing."""
+    deformed = system.deformed(x)
+    place = crossing(deformed[system.mesh.boundary])
+    if place is not None:
+        return f"into itself at z = {place[0]:.3g}, r = {place[1]:.4g} mm"
+    z, r = deformed[system.mesh.outer_nodes].T
+    within = int(np.argmin(r))
+    if r[within] < system.rod_radius:
+        return f"into the rod beyond its film at z = {z[within]:.3g} mm"
+    return ""
 
 
 def crossing(loop: Array) -> Array | None:

@@ -7,7 +7,7 @@ import numpy as np
 from softehl.cases.seal.profiles import Slider
 from softehl.cases.seal.strip import Oil, Strip
 from softehl.cases.seal.surfaces import Surfaces
-from softehl.cases.seal.system import DISPLACEMENT, PRESSURE
+from softehl.cases.seal.system import DISPLACEMENT, FILM, PRESSURE
 from softehl.runtime.fem import dofs, rules
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.chain import chain_block
@@ -19,7 +19,8 @@ from softehl.runtime.solve.solution import Solution, Status
 def strip_of(p: Slider, alpha: float) -> Strip:
     """The film of a slider that conserves mass; alpha: coefficient of Barus' law."""
     surfaces = Surfaces.of(p.roughness, p.asperity_stiffness, p.boundary_friction)
-    oil = Oil(p.viscosity, alpha, p.cavitation_pressure)
+    thinning = p.film_suffix, p.thinning_values(p.viscosity)
+    oil = Oil(p.viscosity, alpha, p.cavitation_pressure, *thinning)
     return Strip(*p.ends, p.pressure_order, oil, surfaces)
 
 
@@ -39,8 +40,11 @@ def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
     nodes, oil = np.stack([x, p.gap(x)], axis=1), np.array([0.0, speed, p.viscosity, alpha])
     numbers = (dofs.separate_dofs if dg else dofs.chain_dofs)(p.segments, m_p, nodes.size)
     layout = dofs.DofLayout.of(displacement=nodes.size, pressure=numbers.max() + 1 - nodes.size)
-    blocks = [chain_block("film", nodes, numbers, rules.film_rule(m_p))]
-    parameters = {"film": np.append(oil, [p.cavitation_penalty, 1.0, 1.0])}
+    film = chain_block(f"film{p.film_suffix}", nodes, numbers, rules.film_rule(m_p))
+    blocks = [replace(film, name=FILM)]
+    thinning = p.thinning_values(p.viscosity)
+    own = [thinning[name] for name in film.kernel.parameters if name in thinning]
+    parameters = {FILM: np.concatenate([oil, [p.cavitation_penalty, 1.0, 1.0], own])}
     if dg:
         parameters["film_facet"] = oil
         sides = np.hstack([numbers[:-1], numbers[1:]])

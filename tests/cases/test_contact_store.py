@@ -54,7 +54,14 @@ ROUGH: dict[str, Any] = {
 }
 """The same for a film that the ones above do not go together with."""
 
+THINNING: dict[str, Any] = {
+    **{"shear_thinning": "carreau", "carreau_stress": 0.01, "carreau_exponent": 0.7},
+    "carreau_plateau": 0.2,
+}
+"""The same for an oil that thins."""
+
 OTHER_WORDS = {
+    *("eyring_stress", "carreau_rate"),
     *("ring", "rod", "squeeze", "gland", "backup", "sensitivity", "tolerances"),
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
 }
@@ -130,14 +137,19 @@ def plain(**changes: Any) -> Outcome:
 
 
 def test_every_parameter_either_matters_or_does_not() -> None:
-    assert set(OTHER) | set(ROUGH) | OTHER_WORDS | {"tolerance"} == set(WITHOUT_INFLUENCE)
+    assert {*OTHER, *ROUGH, *THINNING} | OTHER_WORDS | {"tolerance"} == set(WITHOUT_INFLUENCE)
     assert contact_key(case(rod=50.5)) == contact_key(case(rod_diameter=50.5))
     assert contact_key(case(rod=50.5)) != contact_key(case())
     sections = {name: section for section in SECTIONS for name in dimensions(section)}
     known = {*CHANGED, *RUBBERS, *sections, "section", "outline", "cap_thickness", "materials"}
     assert known == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
     key = contact_key(case())
-    assert contact_key(case(**OTHER)) == contact_key(case(**ROUGH)) == key
+    assert {contact_key(case(**other)) for other in (OTHER, ROUGH, THINNING)} == {key}
+    assert (
+        contact_key(case(eyring_stress=0.01))
+        == contact_key(case(carreau_rate=1e5, carreau_exponent=0.7))
+        == key
+    )
     graded = case(mesh="graded"), case(mesh="graded", tolerance=0.7)
     assert contact_key(graded[0]) == contact_key(graded[1])
     keys = {contact_key(case(**{name: value})) for name, value in CHANGED.items()}

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.contact import load_stage
-from softehl.cases.seal.contact_route import ContactRoute, State
+from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.failure import explained
+from softehl.cases.seal.loading import State
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.results import contact_numbers
@@ -68,7 +69,7 @@ def test_the_mesh_is_fine_where_the_section_meets_the_edge() -> None:
 
 def test_a_run_that_ends_in_the_gap_says_so() -> None:
     p = ORing(density=1, extrusion_gap=0.05, corner_fillet=0.2, sealed_pressure=9.0)
-    stage = load_stage(build_system(p), PathSettings(), 9.0)
+    stage = load_stage(build_system(p), PathSettings())
     failed = StageFailed(stage, Branch((), Status.STEP_TOO_SMALL, ""))
     text = explained(failed, "contact", p)[1]
     for word in ("9 MPa", "gap of 0.05 mm", "fillet 0.2 mm", "backup = true"):

@@ -69,7 +69,7 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
     stages = {
         "% of the way": squeeze_stage(system, PathSettings()),
         "pushed against the wall of the air side": lean_stage(system, PathSettings(), 0.0),
-        "sealed pressure 9 MPa was not reached": load_stage(system, PathSettings(), 9.0),
+        "sealed pressure 9 MPa was not reached": load_stage(system, PathSettings()),
     }
     for says, stage in stages.items():
         failed = StageFailed(stage, Branch((), Status.MAX_ITERATIONS, "last norms"))
