@@ -5,6 +5,7 @@ from pathlib import Path
 
 from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
 from softehl.cases.seal import catalogue, plan
@@ -28,9 +29,9 @@ class ORingCase(Case[ORing, FilmRow]):
     selection = ("speeds", "stroke", "solver", "linear", "tolerance")
     ways = ("solver", "linear")
     files = (
-        *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv", "tornado.png", "tornado.svg"),
+        *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv"),
         *("leakage.csv", "fit.csv", "contact_*.csv", "contact_*.vtu", *paraview.FILES),
-        *(f"{name}.{kind}" for name in (*PICTURES, *SOME) for kind in ("png", "svg")),
+        *(f"{name}.{kind}" for name in (*PICTURES, *SOME, "tornado") for kind in KINDS),
     )
     shared = "contacts"
     left_out = LEFT_OUT
@@ -103,15 +104,20 @@ class ORingCase(Case[ORing, FilmRow]):
         return [*doubts, f"smooth surfaces: {words}: {self.named(thin)}; give their roughness"]
 
     def draw(
-        self, parameters: ORing, folder: Path, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]
+        self,
+        parameters: ORing,
+        folder: Path,
+        rows: Sequence[FilmRow],
+        rejected: Sequence[FilmRow],
+        kinds: Sequence[str],
     ) -> None:
         """See :class:`Case`."""
         paraview.write_paraview(parameters, folder, rows)
-        write_plots(parameters, folder, rows, rejected)
+        write_plots(parameters, folder, rows, rejected, kinds)
         if parameters.sensitivity:
             from softehl.cases.seal.report.sensitivity import write_sensitivities
 
-            write_sensitivities(parameters, folder, rows)
+            write_sensitivities(parameters, folder, rows, kinds)
 
     def report(self, runs: Sequence[FinishedRun]) -> Sequence[Part]:
         """See :class:`Case`."""

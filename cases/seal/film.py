@@ -28,6 +28,7 @@ from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.modified_newton import ModifiedNewton
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Point
@@ -39,6 +40,7 @@ _NEAR = 0.3  # residual at which the section is in equilibrium well enough to be
 _LOOSE = 1e-3  # between contact and film, whose states are not results
 _FIRM = 1e-6  # of the state from which speeds fall: a section is condensed there that is at rest
 _STALE = 0.1  # a condensation costs about three iterations, and many films follow each other
+_CAVITIES = 40  # inner iterations: where oil ruptures and joins again moves node by node
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
 _SHEAR_STEPS = StepRule(1.0, 0.005, target_iterations=8)
 _FROM_SPEED_TO_SPEED = StepRule(1e3, 1e3)
@@ -49,6 +51,10 @@ FILMS_OFF = (5.0, 2.5, 10.0)
 """Where a film is built up the rod is so many of `film_thickness` off, one after the other: a film
 of p_s = 0 needs three h*, below which pressures rise without bound; others come sooner from one or
 two, or from more."""
+
+GROOVED_OFF = (2.5, 1.5, 5.0, 10.0)
+"""The same of a section with a groove between two lobes: the farther the rod is off, the more oil
+is left in the groove when the film is squeezed out, which takes long and may stay there."""
 
 
 def film_offsets(
@@ -63,7 +69,7 @@ def film_offsets(
     if stays(p) or not edges:
         return (settings.offset,)
     h = film_thickness(p, [edges[0 if stroke == "out" else -1]], start_speed(system, settings))
-    return tuple(films * h for films in FILMS_OFF)
+    return tuple(films * h for films in (GROOVED_OFF if p.lobes > 1 else FILMS_OFF))
 
 
 def start_speed(system: SealSystem, settings: PathSettings) -> float:
@@ -184,7 +190,11 @@ class FastFilm:
     def of(cls, system: SealSystem, linear: Condenser, x: Array) -> FastFilm:
         """For a stroke begun at x (n,); factors of the section are kept from stage to stage."""
         finish = Newton(max_iterations=1, linear=linear)
-        return cls(system, system.film_layer(x), SchurCorrector(linear, near=_NEAR, finish=finish))
+        iteration = ModifiedNewton()
+        if system.parameters.conserving:
+            iteration = replace(iteration, max_inner=_CAVITIES)
+        corrector = SchurCorrector(linear, iteration, near=_NEAR, finish=finish)
+        return cls(system, system.film_layer(x), corrector)
 
     def weight(self, stage: Stage) -> Stage:
         """The stage from contact to film, to a loose tolerance: its states are not results."""

@@ -11,7 +11,6 @@ edges and are as K^(-6/5) at them resolve every speed, and one mesh serves both 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle
 
 import numpy as np
 
@@ -57,8 +56,13 @@ def graded_layout(system: SealSystem, x: Array) -> Layout:
 REACH, FILMS = 0.15, 60.0
 """The arc that the contact places ends where the gap is this wide, mm, or so many films."""
 
-STEEPEST = 55.0
-"""Or where the surface is this steep, degrees: beyond it is no film."""
+STEEPEST, STEEPEST_NARROW = 55.0, 68.0
+"""Or where the surface is this steep, degrees: beyond it is no film. The second where the gap is
+narrower there than half of those films."""
+
+_FAR_SHORT, _GENTLE = 0.8, 35.0
+"""An arc that ends at a gap of less than so much of what it is to have is made longer, where its
+surface is not steeper than this, degrees: a wall is near where it is."""
 
 MOST_SEGMENTS, FINEST = 60, 0.45
 """An arc that the contact places gets more segments, up to so many at density 1, until the finest
@@ -69,20 +73,29 @@ DEPTH = 2.5
 was two per cent too small, with half as many as this it changes by 0.2 %."""
 
 _MULTIPLE = 3  # of segments at density 1: meshes exist for thirds of a density
-_PLACED_COARSEST = 12  # as COARSEST, of an arc that the contact places
+_PLACED_COARSEST, _FLAT_COARSEST = 12, 24
+"""As COARSEST, of an arc that the contact places: on a round section, on one that may have flats,
+along which the pressure hardly changes and the film does."""
 
 
-def placed_layout(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGMENTS) -> Layout:
+def placed_layout(
+    system: SealSystem,
+    x: Array,
+    p: ORing,
+    most: int = MOST_SEGMENTS,
+    also: Sequence[Edge] = (),
+) -> Layout:
     """The layout of a case whose arc reaches as far as a film may matter in the contact state x.
 
     With k = K / K_max of each edge, segments are as k^-0.3 at it and grow by 0.3 k^0.5 outside and
     0.3 min(1 / k, 1.5) inside: at the flatter edge the dip is as wide as the inlet of the other
     one, and lies outside. The exponents were fitted to states at p_s / mu = 0, 1 and 2.7.
     most: segments at density 1 that it may get; a state that shows the edges only roughly is no
-    reason for many.
+    reason for many. also: edges elsewhere that are to be fine too.
     """
     s, edges = system.section.places, contact_edges(system, x)
-    ends = _way_out(system, x, s, 0, p), _way_out(system, x, s, 1, p)
+    most_ends = uniform_layout(p).bounds(system.section.layout)
+    ends = _way_out(system, x, s, 0, most_ends[0]), _way_out(system, x, s, 1, most_ends[1])
     seen = system.section.layout.held(
         system.mesh, system.pressing(ROD, x), system.pressing(BORE, x), p.sealed_pressure
     )
@@ -91,15 +104,15 @@ def placed_layout(system: SealSystem, x: Array, p: ORing, most: int = MOST_SEGME
         return layout
     length, steepest = ends[1] - ends[0], max(edge.rise for edge in edges)
     spots = []
-    for edge, side in zip(edges, cycle((0, 1)), strict=False):
-        k = (edge.rise / steepest) ** 0.5
+    for edge in (*edges, *also):
+        k = min(edge.rise / steepest, 1.0) ** 0.5
         rates = RATE * k**0.5, RATE * min(1.0 / k, 1.5)
         place = min(max(edge.place - ends[0], 0.0), length)
-        spots.append(Spot(place, k**-0.3, rates if side == 0 else rates[::-1]))
+        spots.append(Spot(place, k**-0.3, rates if edge.sealed else rates[::-1]))
     if p.opens:
         spots.append(_edge_spot(system, x, p, ends))
     parts, inlet = len(edges) // 2, inlet_length(p, steepest)
-    coarsest = length / (parts * _PLACED_COARSEST)
+    coarsest = length / max(parts * _PLACED_COARSEST, _FLAT_COARSEST if layout.flat else 0)
     for long in range(layout.long, max(parts * most, layout.long) + 1, parts * _MULTIPLE):
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
         if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet:
@@ -141,14 +154,28 @@ def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
     return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
 
 
-def slowest_film(system: SealSystem, x: Array) -> float:
-    """About the least h* (mm) of a case whose contact state is x."""
+def slowest_films(system: SealSystem, x: Array) -> tuple[float, ...]:
+    """About the least h* (mm) of a case whose contact state is x, thinnest first.
+
+    That of each stroke where they are far apart; of a round section the thicker one serves both.
+    """
+    p, edges = system.parameters, contact_edges(system, x)
+    inlets = (edges[:1], edges[-1:]) if system.section.layout.flat else (edges,)
+    films = sorted(1.75 * film_thickness(p, some, min(p.speeds)) for some in inlets)
+    return tuple(films[:1] if films[-1] < _APART * films[0] else films)
+
+
+_APART = 2.0
+"""Ratio of the slowest films of both strokes from which contact under one says little of the other:
+its edges are elsewhere, far away where the surface lies nearly along the rod."""
+
+
+def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) -> float:
+    """Where on the arc (mm) an end of the film is to be: side 0 the sealed, 1 the air end.
+
+    At most at `bound`, which may lie beyond the arc.
+    """
     p = system.parameters
-    return 1.75 * film_thickness(p, contact_edges(system, x), min(p.speeds))
-
-
-def _way_out(system: SealSystem, x: Array, s: Array, side: int, p: ORing) -> float:
-    """Where on the arc (mm) an end of the film is to be: side 0 the sealed, 1 the air end."""
     z, h = system.arc_film(x)
     touching = np.flatnonzero(system.pressing(ROD, x) > 0.0)
     if not len(touching):
@@ -157,11 +184,17 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, p: ORing) -> flo
         z, h, s, first = -z[::-1], h[::-1], s[::-1], len(s) - 1 - touching[0]
     else:
         first = touching[-1]
-    reach = max(REACH, FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds)))
-    steep = np.degrees(np.arctan2(np.diff(h), np.diff(z))) >= STEEPEST
+    films = FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds))
+    reach = max(REACH, films)
+    steep = np.arctan2(np.diff(h), np.diff(z))
     for i in range(first, len(s) - 1):
-        if steep[i]:  # on a coarse mesh next to the contact, which the arc has to contain
+        narrow = h[i] < 0.5 * films
+        if np.degrees(steep[i]) >= (STEEPEST_NARROW if narrow else STEEPEST):
+            # on a coarse mesh next to the contact, which the arc has to contain
             return float(s[max(i, first + 1)])
         if h[i + 1] >= reach:
             return float(np.interp(reach, h[i : i + 2], s[i : i + 2]))
-    return float(s[-1])
+    if h[-1] >= _FAR_SHORT * reach or not 0.0 < steep[-1] < np.radians(_GENTLE):
+        return float(s[-1])
+    longer = min((reach - h[-1]) / np.sin(steep[-1]), abs(bound - s[-1]))
+    return float(s[-1] + np.copysign(longer, bound - s[-1]))

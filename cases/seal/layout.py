@@ -17,7 +17,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.sections.files import finer as divided
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.postprocess import run_around
-from softehl.runtime.mesh.outline import Shape
+from softehl.runtime.mesh.outline import Shape, gentle
 from softehl.runtime.mesh.outline_mesh import outline_mesh
 from softehl.runtime.mesh.parted_mesh import parted_mesh
 from softehl.runtime.mesh.sections import LAYERS, SHORT, Disc, SectionMesh, disc_mesh
@@ -63,6 +63,9 @@ class Layout(Protocol):
         rod, housing: pressures in excess of it, (arc nodes,) and (outer nodes,) of this mesh, MPa.
         """
 
+    def bounds(self, old: Layout) -> tuple[float, float]:
+        """Places (mm) on the arc of another one between which parts of this one's lie."""
+
     def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
         """The same laid out on an arc whose ends are at these places of that of another one."""
 
@@ -87,6 +90,9 @@ LONG_OPEN = 42
 
 LONG_PLACED = 33
 """Segments at density 1 of an arc that the contact has placed."""
+
+BEYOND = 0.3
+"""How far beyond a film as drawn contact is looked for on the air side, in heights of a section."""
 
 _SIDES = 25.0  # degrees that the side blocks need at least
 _CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
@@ -156,6 +162,13 @@ class RoundLayout:
         """Of points (..., 2) on its circle from the bottom, degrees in (-180, 180]."""
         z, r = np.moveaxis(points - self.disc.centre, -1, 0)
         return np.asarray(np.degrees(np.arctan2(z, -r)))
+
+    def bounds(self, old: Layout) -> tuple[float, float]:
+        """See `Layout`."""
+        assert isinstance(old, RoundLayout)
+        angles, begin = (self.disc.arc_start, self.disc.arc_end), old.disc.arc_start
+        first, last = (old.disc.radius * float(np.radians(a - begin)) for a in angles)
+        return first, last
 
     def between(self, old: Layout, ends: tuple[float, float]) -> RoundLayout:
         """See `Layout`."""
@@ -264,6 +277,11 @@ class OutlineLayout:
         nodes = _dam_nodes(self, mesh, rod, housing, p_s)
         return replace(self, dams=_moved(self.dams, nodes, mesh.places))
 
+    def bounds(self, old: Layout) -> tuple[float, float]:
+        """See `Layout`: the other arc itself, as what lies beyond may be a corner or a wall."""
+        assert isinstance(old, OutlineLayout)
+        return 0.0, old.film[1] - old.film[0]
+
     def between(self, old: Layout, ends: tuple[float, float]) -> OutlineLayout:
         """See `Layout`."""
         assert isinstance(old, OutlineLayout)
@@ -351,7 +369,10 @@ def uniform_layout(p: ORing) -> Layout:
     if p.mesh == "file":
         return FileLayout.of(p)
     if not p.round:
-        return OutlineLayout(p.free_section, p.free_section.film, None, p.lobes * LONG_PLACED)
+        shape = p.free_section
+        rolls = p.sealed_pressure > 0.0  # else both sides are to be alike
+        film = _reaching(shape, BEYOND * p.section_diameter if rolls else 0.0)
+        return OutlineLayout(shape, film, None, p.lobes * LONG_PLACED)
     radius = 0.5 * p.section_diameter
     centre = 0.0, 0.5 * p.inner_diameter + radius
     if p.given_arc:
@@ -359,6 +380,19 @@ def uniform_layout(p: ORing) -> Layout:
     long = LONG_OPEN if p.opens else LONG_PLACED
     guide = Disc(*centre, radius, -GUIDE_ARC, GUIDE_ARC, top=GUIDE_TOP, long=long)
     return RoundLayout(replace(guide, spacing=_fine_at_edge(guide)) if p.opens else guide)
+
+
+def _reaching(shape: Shape, most: float) -> tuple[float, float]:
+    """The film (s0, s1) of a shape and as much as `most`, mm, of what faces the rod behind it.
+
+    The sealed pressure rolls it onto the rod. A cap ends it too.
+    """
+    begin, end = shape.film
+    length = shape.outline.length
+    _, steep = gentle(shape.outline, 0.5 * pi)
+    last = (steep - begin) % length if shape.chord is None else (shape.chord[1] - begin) % length
+    film = (end - begin) % length
+    return begin, begin + min(max(film, last), film + most)
 
 
 def _fine_at_edge(guide: Disc) -> Spacing:

@@ -46,7 +46,8 @@ class PathSettings:
     the section is pushed against its wall before the pressure does it, in section diameters.
     start_speed: least |U| at which the film is built up, mm/s. placed_start_speed: the same on an
     arc that the contact has placed, where the rod is put as far off as that film will be thick.
-    load_steps: in shear moduli. The rest: step rules.
+    load_steps, reload_steps: in shear moduli, from rest and from a loaded state that was carried to
+    another mesh. The rest: step rules.
     """
 
     offset: float = 0.01
@@ -57,6 +58,7 @@ class PathSettings:
     placed_start_speed: float = 1600.0
     longest_squeeze: float = 0.3
     load_steps: StepRule = field(default_factory=lambda: StepRule(0.055, 3e-4, 0.3))
+    reload_steps: StepRule = field(default_factory=lambda: StepRule(0.15, 3e-4, 0.3))
     weight_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-5))
     shear_steps: StepRule = field(default_factory=lambda: StepRule(1.0, 1e-3))
     order_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-4))

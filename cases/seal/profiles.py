@@ -5,12 +5,13 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from softehl.cases.harness.parameters import Nonzeros, Parameters, key
+from softehl.cases.harness.parameters import Nonzeros, key
+from softehl.cases.seal.shear_thinning import ThinningKeys
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness
 from softehl.runtime.arrays import Array
 
 
-class Slider(Parameters):
+class Slider(ThinningKeys):
     """Everything that defines one run of the slider."""
 
     profile: Literal["wedge", "parabola", "cosine", "exponential", "pocket"] = key(
@@ -83,6 +84,7 @@ class Slider(Parameters):
                 'cavitation = "penalty" knows no roughness, supply, pocket or cavitation_pressure; '
                 "leave cavitation out"
             )
+        self.require_smooth_film(dg=self.reynolds == "dg", rough=any(self.roughness))
         return self
 
     @property

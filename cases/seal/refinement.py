@@ -131,18 +131,24 @@ def _closed(system: SealSystem, chain: str) -> bool:
 
 
 def carried_contact(
-    old: SealSystem, new: SealSystem, settings: PathSettings, x: Array, name: str = ""
+    old: SealSystem,
+    new: SealSystem,
+    settings: PathSettings,
+    x: Array,
+    name: str = "",
+    sealed_pressure: float | None = None,
 ) -> tuple[Stage, Array]:
     """A stage of one step that solves for contact on another mesh of a section, and its start.
 
     x: unknowns of the contact state on the old mesh. name: of the stage, by the density if left
-    out. The start is nan, which Newton's method rejects, where the state cannot be carried over.
+    out. sealed_pressure: that of the state, MPa, if it is not that of the case.
     """
-    carry, p = _carrier(old, new), new.parameters
-    pressures = element_pressures(contact_problem(old, settings, p.sealed_pressure), old.solids, x)
+    carry = _carrier(old, new)
+    p_s = new.parameters.sealed_pressure if sealed_pressure is None else sealed_pressure
+    pressures = element_pressures(contact_problem(old, settings, p_s), old.solids, x)
     y = _unknowns(old, new, carry, x)
     problem = LaggedPressure.of(
-        contact_problem(new, settings, p.sealed_pressure).since(y),
+        contact_problem(new, settings, p_s).since(y),
         new.solids,
         load_kernel("follower_pressure"),
         carry.elements(pressures),

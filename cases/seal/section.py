@@ -56,7 +56,7 @@ class SealSection:
             "wall_nodes": self.chains["wall_nodes"][0][:, None],
         }
 
-    @property
+    @cached_property
     def chains(self) -> Mapping[str, tuple[Integers, Integers]]:
         """Nodes (n,) and segments (m, 2) of what may meet the rod, the housing, a wall."""
         mesh = self.mesh
@@ -71,6 +71,11 @@ class SealSection:
     def lowest(self) -> int:
         """Index of the arc node at which the sealed pressure of the contact ends: see `Layout`."""
         return self.layout.lowest(self.mesh)
+
+    @property
+    def crown(self) -> int:
+        """Index in the boundary of the node at which the sealed pressure of the housing ends."""
+        return self.mesh.arc + self.layout.pressed(self.mesh)
 
     @property
     def pressed_ends(self) -> tuple[int, int]:

@@ -274,6 +274,14 @@ class Observer(Protocol):
         return None
 
 
+_DOUBTS = (OK, OSCILLATING, CLIPPED, UNCERTAIN, UNDER_RESOLVED, COLLAPSED)
+
+
+def doubt(state: FilmRow) -> tuple[int, float]:
+    """How little a state is to be believed beside another one of the same film."""
+    return _DOUBTS.index(state.verdict), state.oscillation_index
+
+
 class Silent(Observer):
     """The observer that does nothing (for tests and scripts)."""
 

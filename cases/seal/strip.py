@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,11 +25,16 @@ _EVEN = 1e-9  # relative rise of the void fraction that counts as none
 
 @dataclass(frozen=True)
 class Oil:
-    """Viscosity (MPa s) at zero pressure, Barus' coefficient (1/MPa), pressure of cavitation."""
+    """Viscosity (MPa s) at zero pressure, Barus' coefficient (1/MPa), pressure of cavitation.
+
+    suffix, thinning: how it thins under shear, see `ThinningKeys`.
+    """
 
     viscosity: float
     alpha: float = 0.0
     cavitation_pressure: float = 0.0
+    suffix: str = ""
+    thinning: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +75,7 @@ class Strip:
         film = dofs.gather_rows(moved, pressures, pressures + m)
         voids = dofs.gather_rows(4 * n + np.arange(m), 4 * n + m + np.arange(m))
         rough = bool(self.surfaces.sigma)
-        flow = load_kernel("film_rough" if rough else "film_conserving")
+        flow = load_kernel("film_rough" if rough else f"film_conserving{self.oil.suffix}")
         content = load_kernel("film_squeeze_rough" if rough else "film_squeeze")
         history = np.zeros((n, self.order + 1, 1))
         blocks = [
@@ -88,7 +94,7 @@ class Strip:
         values = {
             **{"rod_radius": 0.0, "rod_speed": speed, "viscosity": self.oil.viscosity},
             **{"pressure_viscosity": self.oil.alpha, "force_weight": 0.0, "shear_weight": 0.0},
-            **{"rate": 0.0, **self.surfaces.values()},
+            **{"rate": 0.0, **self.oil.thinning, **self.surfaces.values()},
         }
         chosen = {name: values[name] for name in flow.parameters}
         return Problem(

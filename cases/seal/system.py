@@ -62,7 +62,7 @@ def _rubs(p: ORing) -> bool:
 
 
 _RUPTURING: tuple[tuple[str, Callable[[ORing], bool]], ...] = (
-    ("conserving", lambda p: p.conserving and not p.rough),
+    ("conserving{oil}", lambda p: p.conserving and not p.rough),
     ("rough", lambda p: p.rough),
 )
 
@@ -99,7 +99,7 @@ BLOCKS = (
     Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
     *_walls(),
     Block(
-        *(FILM, "film", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        *(FILM, "film{oil}", "arc", (DISPLACEMENT, PRESSURE), "film"),
         layer=True,
         needed=lambda p: not p.conserving,
         rule=_segment_rule,
@@ -226,6 +226,7 @@ def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
         "shear_modulus": p.surface_modulus,
         "upwinding": p.upwinding * copysign(1.0, film.rod_speed),
         "rate": film.rate,
+        **p.thinning_values(p.viscosity),
         **p.surfaces.values(),
         "boundary_speed": film.slip,
         **void_values(p.cavitation_pressure),

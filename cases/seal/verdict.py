@@ -75,7 +75,7 @@ class FilmNumbers:
     mean_gap: least h_T, mm. lambda_ratio: that
     over sigma, nan between smooth surfaces. asperity_load, boundary_friction: shares of asperities.
     contacts: from the sealed side on, where there are several; h_star is then that of the first one
-    that the oil reaches.
+    that the oil reaches. drag: the part of the friction that is not of the slope of the pressure.
     """
 
     speed: float
@@ -96,6 +96,7 @@ class FilmNumbers:
     asperity_load: float = 0.0
     boundary_friction: float = 0.0
     contacts: tuple[ContactNumbers, ...] = ()
+    drag: float = nan
 
     @property
     def mismatch(self) -> float:
@@ -126,14 +127,14 @@ class Verdict:
 
     reference: maximum contact pressure without film, MPa. last: the latest film. collapsed: what
     gave a spurious collapsed film away, if anything did: a pressure well above the contact's, a
-    friction that rises while the speed falls, or a thickness that falls too fast. A path that
+    drag that rises while the speed falls, or a thickness that falls too fast. A path that
     has once collapsed does not recover; too few segments in the inlet or an oscillating film
     are judged for each film alone. fewest: segments that the inlet needs. ratios: credible
     inlet_ratio. error: estimated error of the last film's h*, %, None where none is wanted. rough:
     between rough surfaces friction may rise while the speed falls, and h may be negative.
     unsealed: where the sealed pressure ends although nothing is touched there. references: maximum
-    contact pressures of each contact, from the sealed side on. overlap: where the section runs into
-    itself.
+    contact pressures of each contact, from the sealed side on. overlap: what the section runs into:
+    itself, or the rod beyond its film.
     """
 
     reference: float
@@ -192,7 +193,7 @@ class Verdict:
             )
         if word == UNCERTAIN and self.overlap:
             return (
-                f"the section runs into itself {self.overlap}, which the model does not hinder; "
+                f"the section runs {self.overlap}, which the model does not hinder; "
                 "try a lower sealed_pressure, a harder rubber or a wider mouth"
             )
         if word == UNCERTAIN and last.mismatch > LARGEST_ERROR:
@@ -231,8 +232,8 @@ class Verdict:
                 )
         if self.rough or self.last is None or not film.speed < self.last.speed:
             return ""
-        if abs(film.friction) > abs(self.last.friction):
-            return "the friction on the rod rises while the speed falls"
+        if abs(film.drag) > abs(self.last.drag):
+            return "the drag on the rod rises while the speed falls"
         if film.h_star <= 0.0 or self._exponent(film) > LARGEST_EXPONENT:
             return "its thickness falls too fast with the speed"
         return ""

@@ -115,7 +115,7 @@ def test_cost(default: tuple[Outcome, Recorder]) -> None:
 
 
 def test_newton_ends_quadratically_in_every_stage() -> None:
-    outcome = run(oring(density=2, speeds=(1600.0, 400.0), solver="monolithic"), Recorder())
+    outcome = run(oring(density=1, speeds=(1600.0, 400.0), solver="monolithic"), Recorder())
     assert {stage.method for stage in outcome.stages} == {"newton"}
     checked = 0
     for stage in outcome.stages:

@@ -12,11 +12,11 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import contact_key
-from softehl.cases.seal.contacts import contact_edges, contacts, groups
+from softehl.cases.seal.contacts import contact_edges, contacts, groups, traps
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.layout import dam
+from softehl.cases.seal.layout import OutlineLayout, dam, uniform_layout
 from softehl.cases.seal.method import run
-from softehl.cases.seal.overlap import crossing
+from softehl.cases.seal.overlap import crossing, overlap
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.results import contact_peaks, contact_pressure, film_parts
@@ -50,7 +50,10 @@ def _curve(**changes: Any) -> Outcome:
         ({"section": "x_ring", "lobe_radius": 3.0}, "lobe_radius = 3 mm; at most half"),
         ({"section": "u_cup"}, "at least the width of the section, 4.589 mm"),
         ({"section": "d_ring", "extrusion_gap": 0.05}, 'extrusion_gap: for section = "round" only'),
-        ({"section": "d_ring", "sensitivity": True}, 'sensitivity: for section = "round" only'),
+        (
+            {"section": "d_ring", "sensitivity": True, "cap_thickness": 1.4},
+            "not of an outline of a file",
+        ),
         ({"section": "quad"}, "'round', 'rectangular', 'x_ring'"),
         ({"outline": "nothing.dxf"}, "there is no such file"),
     ],
@@ -111,6 +114,62 @@ def test_an_outline_that_runs_into_itself_is_seen() -> None:
     assert crossing(square) is None
     cup = np.array([[0, 0], [6, 0], [6, 4], [0, 4], [0, 1.5], [4, 2.5], [4, 1.5], [0, 2.5]])
     assert crossing(cup.astype(float)) is not None
+
+
+def test_a_section_that_reaches_into_the_rod_beyond_its_film_is_seen() -> None:
+    system = build_system(ORing(section="trapezoid", density=1, **GROOVE))
+    x = system.at_rest()
+    assert overlap(system, x) == ""
+    beyond = system.mesh.outer_nodes[3]
+    away = system.mesh.points[beyond, 1] - system.rod_radius
+    system.displacements(x)[beyond, 1] = -away + 1e-6
+    assert overlap(system, x) == ""
+    system.displacements(x)[beyond, 1] = -away - 1e-3
+    assert overlap(system, x).startswith("into the rod beyond its film at z = ")
+    word = Verdict(3.7, overlap=overlap(system, x)).after(_numbers(0.27, 0.27))
+    assert word.word == "uncertain"
+    assert "runs into the rod" in word.advice
+
+
+@pytest.mark.parametrize("section", ["trapezoid", "rectangular", "d_ring"])
+def test_contact_is_looked_for_on_the_side_that_rolls_onto_the_rod(section: str) -> None:
+    p = ORing.model_validate({"section": section, **GROOVE})
+    guide, drawn = uniform_layout(p), p.free_section.film
+    assert isinstance(guide, OutlineLayout)
+    begin, end = guide.film
+    assert begin == drawn[0]
+    assert end - drawn[1] == pytest.approx(0.3 * p.section_diameter)
+    # nothing rolls without pressure, and a side that faces away from the rod never meets it
+    guide = uniform_layout(p.model_copy(update={"sealed_pressure": 0.0}))
+    assert isinstance(guide, OutlineLayout)
+    assert guide.film == pytest.approx(drawn)
+    x_ring = ORing(**X_RING)
+    guide = uniform_layout(x_ring)
+    assert isinstance(guide, OutlineLayout)
+    heading = x_ring.free_section.outline.heading(np.array([guide.film[1] - 1e-6]))
+    assert np.degrees(heading[0]) == pytest.approx(90.0, abs=0.1)
+
+
+def test_a_groove_that_grazes_the_rod_parts_two_contacts_and_films_may_trap_oil_in_it() -> None:
+    system = build_system(ORing(section="rectangular", **GROOVE))
+    x = system.at_rest()
+    pressure = np.zeros(len(system.section.places))
+    pressure[10:60] = 2.0 + np.sin(np.arange(50.0))
+    system.rod_multipliers(x)[:] = -pressure
+    nodes = system.mesh.arc_nodes
+    system.displacements(x)[nodes, 1] = -system.mesh.points[nodes, 1] + system.rod_radius + 0.01
+    film = x.copy()
+    system.displacements(film)[nodes[28:41], 1] += 0.03
+    assert len(contact_edges(system, x)) == 2
+    assert traps(system, x, film, 0.0)
+    assert not traps(system, x, film, 0.05)  # of a thick film they are a part
+    assert not traps(system, x, x, 0.0)
+    pressure[30:40] = 0.0
+    system.rod_multipliers(x)[:] = -pressure
+    assert len(contact_edges(system, x)) == 2  # nothing presses, but the gap stays closed
+    system.displacements(x)[nodes[30:40], 1] += 0.0022
+    assert len(contact_edges(system, x)) == 4
+    assert not traps(system, x, film, 0.0)
 
 
 def test_corner_peaks_do_not_place_an_edge() -> None:
@@ -242,11 +301,12 @@ def test_lobes_of_an_x_ring_are_equal_without_pressure() -> None:
 
 @pytest.mark.slow
 def test_an_x_ring_whose_lobes_are_one_circle_is_the_o_ring() -> None:
+    """To 0.05 and 0.01 % at 800 and 100 mm/s, to 0.01 % at density 4."""
     given: dict[str, Any] = {"stroke": "out", "speeds": (800.0, 100.0), "density": 2}
     circle = _curve(section="x_ring", lobe_radius=1.765, **given)
     ring = _curve(**given)
     for a, b in zip(circle.states, ring.states, strict=True):
-        assert a.h_star_um == pytest.approx(b.h_star_um, rel=4e-3)
+        assert a.h_star_um == pytest.approx(b.h_star_um, rel=2e-3)
         assert a.verdict == b.verdict == OK
 
 
@@ -277,8 +337,7 @@ def test_the_films_that_are_documented(section: str) -> None:
     assert [s.h_star_um for s in found.states] == pytest.approx(
         _documented()[section][:2], rel=0.01
     )
-    slow = OSCILLATING if section == "x_ring" else OK  # as the page says
-    assert [s.verdict for s in found.states] == [OK, slow]
+    assert [s.verdict for s in found.states] == [OK, OK]
 
 
 @pytest.mark.slow

@@ -128,6 +128,13 @@ class SectionKeys(_Keys):
             raise ValueError(f"outline and {', '.join(others)}: give one of them")
         return shape_of_file(Path(self.outline), inner_diameter)
 
+    def measured(self, height: float) -> dict[str, float]:
+        """Key of each dimension but the height -> what it is, given or left out, mm."""
+        if self.round or self.outline is not None:
+            return {}
+        page = SECTIONS[self.section](**self.sized(height))
+        return {name: getattr(page, own) for name, own in dimensions(self.section).items()}
+
     def sized(self, height: float) -> dict[str, float]:
         """The dimensions that are given, as their page calls them.  ValueError for others'."""
         known = dimensions(self.section)

@@ -1,0 +1,316 @@
+"""The films of a contact state: built up from it, then followed as the speed falls or rises."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from math import log
+
+from softehl.cases.seal.coarser_films import CoarserFilms
+from softehl.cases.seal.contacts import contact_edges, traps
+from softehl.cases.seal.dry import (
+    dry_film,
+    rising_stage,
+    settle_stage,
+    sliding_stages,
+    wetting_stages,
+)
+from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.film import (
+    FastFilm,
+    film_offsets,
+    first_film,
+    release_stage,
+    shear_stage,
+    speed_stage,
+    weight_stage,
+)
+from softehl.cases.seal.grading import film_thickness
+from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.nearing import rod_brought_near, without_rounding
+from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
+from softehl.cases.seal.thinning import longer, thinned_film, thinning_stage
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.linear import Condenser, SingularMatrix
+from softehl.runtime.solve.solution import Branch, Point, Status
+
+_SOONER = 1e3
+"""How much sooner a film begins that is not solved where the squeezing out begins: under a lip that
+is as flat as the rod it is thicker than the gap that contact leaves, and fills at once."""
+
+_POCKET = 5.0
+"""Of `film_thickness`, above which oil is trapped rather than part of a thick film."""
+
+OnSpeed = Callable[[FilmLoads, Point], None]
+BuiltFilm = tuple[FilmLoads, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class FilmPath:
+    """The films of a system: built up from its contact state, then followed as the speed falls.
+
+    tolerance: of films by modified Newton iterations that are no results, None for that of results.
+    """
+
+    system: SealSystem
+    settings: PathSettings
+    driver: PathDriver
+    tolerance: float | None = None
+
+    def starts(self, stroke: Stroke, x: Array) -> Iterator[BuiltFilm]:
+        """First films of a stroke, one after the other, and the contact states they begin at.
+
+        x: the contact state of the section.
+        """
+        system, settings = self.system, self.settings
+        for offset in film_offsets(system, settings, stroke, x):
+            y: Followed = x
+            if offset != settings.offset:
+                newton, follow = self.driver.newton, self.driver.follow
+                y = rod_brought_near(system, settings, offset, x, newton, follow, quick=self.quick)
+            if not isinstance(y, StageFailed):
+                y = without_rounding(system, y)
+                yield first_film(system, replace(settings, offset=offset), stroke, y), y
+
+    @property
+    def quick(self) -> bool:
+        """Whether modified Newton iterations are to be tried."""
+        p, linear = self.system.parameters, self.driver.newton.linear
+        held = p.rotation == "fixed" and not p.rubs
+        return p.solver == "auto" and held and isinstance(linear, Condenser)
+
+    def fast(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All film stages by modified Newton iterations; the one that ended early, if one did."""
+        fast = self._modified(x)
+        assert fast
+        first = fast.weight(weight_stage(self.system, self.settings, film))
+        return self._falling(fast, film, self.driver.follow(first, x), on_speed)
+
+    def thinned(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All films of a stroke, the first by squeezing out what is in contact at x; see `fast`."""
+        fast, p = self._modified(x), self.system.parameters
+        assert fast
+        first, start = thinning_stage(fast, film, x)
+        y = self.driver.follow(first, start)
+        if isinstance(y, StageFailed) and not y.branch.points:
+            y = self.driver.follow(replace(first, start=first.start - log(_SOONER)), start)
+        thick = _POCKET * film_thickness(p, contact_edges(self.system, x), film.speed)
+        if not isinstance(y, StageFailed) and traps(self.system, x, y, thick):
+            y = StageFailed(first, Branch((), Status.DIVERGED, "oil is trapped"))
+        if p.shear_traction:
+            film = replace(film, shear=1.0)
+        failed = self._falling(fast, film, y, on_speed)
+        if failed is None or isinstance(y, StageFailed) or failed.branch.points:
+            return failed
+        y = self.driver.follow(longer(first), y)  # it was not steady yet
+        return self._falling(fast, film, y, on_speed)
+
+    def _near(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All films of a stroke from the contact state x with the rod near: squeezed out, or else
+        by their weight; see `fast`.
+        """
+        if film.rod_offset != self.settings.offset:
+            failed = self._squeezed(film, x, on_speed)
+            if failed is None or "falling speed" in failed.stage.name:
+                return failed
+        return self.fast(film, x, on_speed)
+
+    def _squeezed(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All films of a stroke from the contact state x with the rod near, squeezed out."""
+        near = replace(self.settings, offset=film.rod_offset)
+        thin = thinned_film(self.system, near, film.stroke, x)
+        return self.thinned(thin, x, on_speed) if thin else self.fast(film, x, on_speed)
+
+    def _falling(
+        self, fast: FastFilm, film: FilmLoads, y: Followed, on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """From the first film y (n,), if there is one, to shear, then to falling speed."""
+        system, settings, p = self.system, self.settings, self.system.parameters
+        if p.shear_traction and not isinstance(y, StageFailed):
+            y = self._sheared(fast, shear_stage(system, settings, film), y)
+        if not isinstance(y, StageFailed):
+            stage = speed_stage(system, settings, film, p.speeds, on_speed)
+            y = self.driver.follow(fast.speed(stage), y)
+        return y if isinstance(y, StageFailed) else None
+
+    def _sheared(self, fast: FastFilm, stage: Stage, x: Array) -> Followed:
+        """The shear stage from x (n,), at once if that leads there; by Newton's method from where
+        the fast way ends.
+
+        Where shear pulls corners of the section off the groove or into it the fast way stalls.
+        """
+        y = self.driver.follow(fast.shear(replace(stage, start=stage.stop)), x)
+        if isinstance(y, StageFailed):
+            y = self.driver.follow(fast.shear(stage), x)
+        if isinstance(y, StageFailed) and y.branch.points:
+            last = y.branch.points[-1]
+            y = self.driver.follow(replace(stage, start=last.parameter), last.solution.x)
+        return y
+
+    def carried(
+        self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """The films that a coarser mesh has, as far as they lead from one to the next."""
+        fast, speeds = self._modified(x), tuple(sorted(known.films, reverse=True))
+        if not (fast and speeds):
+            return None
+        film = first_film(self.system, self.settings, stroke, x)
+        _, gap = self.system.arc_film(x + known.built(speeds[0]))
+        film = replace(film, speed=speeds[0], gap=gap)
+        stage = speed_stage(self.system, self.settings, film, speeds, on_speed)
+        try:
+            stage, start = fast.carried(stage, known, x)
+        except SingularMatrix:
+            return None
+        end = self.driver.follow(stage, start)
+        return end if isinstance(end, StageFailed) else None
+
+    def onward(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> None:
+        """The films that are slower than one that is known, x (n,), as far as they are reached."""
+        fast, speeds = self._modified(x), below(self.system.parameters.speeds, film.speed)
+        if fast and speeds:
+            stage = speed_stage(self.system, self.settings, film, speeds, on_speed)
+            self.driver.follow(fast.speed(stage), x)
+
+    def begun(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> tuple[FilmLoads, Array] | None:
+        """The start to go on from by Newton's method, None if the films of a stroke are all solved.
+
+        Other starts are tried where one does not lead to a film.
+        """
+        grooved = self.system.parameters.lobes > 1
+        thick = None
+        if self.quick and not grooved:
+            thick = thinned_film(self.system, self.settings, stroke, x)
+        if thick:
+            failed = self.thinned(thick, x, on_speed)
+            if failed is None:
+                return None
+            if "falling speed" in failed.stage.name:
+                return first_film(self.system, self.settings, stroke, x), x
+        first: BuiltFilm | None = None
+        for way in (self._squeezed, self.fast) if grooved else (self._near,):
+            for film, y in self.starts(stroke, x):
+                first = first or (film, y)
+                if not self.quick:
+                    return first
+                failed = way(film, y, on_speed)
+                if failed is None:
+                    return None
+                if _was_film(failed, grooved):
+                    return film, y
+        return first or (first_film(self.system, self.settings, stroke, x), x)
+
+    def films(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """All films of a stroke from the settled contact state x; what went wrong, if anything."""
+        if self.system.parameters.rough:
+            return self.rise(stroke, x, on_speed)
+        start = self.begun(stroke, x, on_speed)
+        if start is None:
+            return None
+        return self.slower(self.build(*start), self.system.parameters.speeds, on_speed)
+
+    def settled(self, x: Array) -> Followed:
+        """The contact state x where the rod is as near as asperities let it; x itself if smooth."""
+        if not self.system.parameters.rough:
+            return x
+        stage = settle_stage(self.system, self.settings, self.driver.newton)
+        return self.driver.follow(stage, x)
+
+    def rise(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """Rough films: from asperities in contact at x to dry sliding, then to higher speeds."""
+        system, p = self.system, self.system.parameters
+        film = dry_film(system, stroke, x)
+        y = self.driver.follow_all(wetting_stages(system, film, x), x)
+        if not isinstance(y, StageFailed):
+            fast = self._modified(y)
+            y = self._sliding(film, y, fast)
+        if isinstance(y, StageFailed):
+            return y
+        shear = 1.0 if p.shear_traction else 0.0
+        moment = 0.0 if p.rotation == "free" else film.moment
+        return self._faster(replace(film, shear=shear, moment=moment), y, on_speed, fast)
+
+    def _modified(self, x: Array) -> FastFilm | None:
+        """Modified Newton iterations of a stroke begun at x (n,), None where they do not serve."""
+        linear = self.driver.newton.linear
+        if not self.quick or not isinstance(linear, Condenser):
+            return None
+        fast = FastFilm.of(self.system, linear, x)
+        if self.tolerance is None:
+            return fast
+        return replace(fast, corrector=fast.corrector.with_tolerance(self.tolerance))
+
+    def _sliding(self, film: FilmLoads, x: Array, fast: FastFilm | None) -> Followed:
+        """The dry film x (n,) with its friction; by Newton's method where the fast way fails."""
+        stages = sliding_stages(self.system, self.settings, film, x)
+        if fast:
+            y = self.driver.follow_all(map(fast.shear, stages), x)
+            if not isinstance(y, StageFailed):
+                return y
+        return self.driver.follow_all(stages, x)
+
+    def _faster(
+        self, film: FilmLoads, x: Array, on_speed: OnSpeed, fast: FastFilm | None
+    ) -> StageFailed | None:
+        """Rising speeds by modified Newton iterations; by Newton's method where they fail."""
+        system, p = self.system, self.system.parameters
+        reached = [(film, x)]
+
+        def keep(at: FilmLoads, point: Point) -> None:
+            if at.speed > reached[0][0].speed or not reached[1:]:
+                reached[1:] = [(at, point.solution.x)]
+                on_speed(at, point)
+
+        def stage(start: FilmLoads) -> Stage:
+            speeds = tuple(u for u in p.speeds if u >= start.speed)
+            return rising_stage(system, self.settings, start, speeds, keep)
+
+        if fast:
+            end = self.driver.follow(fast.rising(stage(film)), x)
+            if not isinstance(end, StageFailed):
+                return None
+        film, x = reached[-1]
+        reached[:] = [(film, x)]
+        end = self.driver.follow(stage(film), x)
+        return end if isinstance(end, StageFailed) else None
+
+    def build(self, film: FilmLoads, x: Array) -> BuiltFilm | StageFailed:
+        """By Newton's method from the contact state x to the film at its first speed."""
+        system, settings, p = self.system, self.settings, self.system.parameters
+        y = self.driver.follow(weight_stage(system, settings, film), x)
+        if film.moment is None and p.rotation == "free" and not isinstance(y, StageFailed):
+            y = self.driver.follow(release_stage(system, settings, film, y), y)
+            film = replace(film, moment=0.0)
+        if p.shear_traction and not isinstance(y, StageFailed):
+            y = self.driver.follow(shear_stage(system, settings, film), y)
+        return y if isinstance(y, StageFailed) else (film, y)
+
+    def without_film(self, film: FilmLoads, _: Array) -> StageFailed:
+        """What is said where there is no film, and another mesh had one: nothing more is tried."""
+        speeds = self.system.parameters.speeds
+        stage = speed_stage(self.system, self.settings, film, speeds, lambda at, point: None)
+        return StageFailed(stage, Branch((), Status.DIVERGED, "no film on this mesh"))
+
+    def slower(
+        self, built: BuiltFilm | StageFailed, speeds: tuple[float, ...], on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """By Newton's method from a film to slower ones; what went wrong, if anything did."""
+        if isinstance(built, StageFailed):
+            return built
+        film, x = built
+        end = self.driver.follow(speed_stage(self.system, self.settings, film, speeds, on_speed), x)
+        return end if isinstance(end, StageFailed) else None
+
+
+def _was_film(failed: StageFailed, grooved: bool) -> bool:
+    """Whether there was a film before a stage failed, from which Newton's method may go on.
+
+    grooved: where another start of the film is cheaper than that, as long as no speed was reached.
+    """
+    name = failed.stage.name
+    return "falling speed" in name if grooved else "contact to film" not in name
+
+
+def below(speeds: tuple[float, ...], speed: float) -> tuple[float, ...]:
+    """The speeds that are slower than another one."""
+    return tuple(u for u in speeds if u < speed)
