@@ -51,7 +51,8 @@ class Field:
 class Block:
     """Elements of one kernel.
 
-    kernel: its name; {solid} stands for the solid of its region, "" where it is the case's.
+    kernel: its name; {solid} stands for the solid of its region, "" where it is the case's, {oil}
+    for how the oil thins.
     elements: a set of `SealSection.elements`. fields: whose unknowns its dof map holds, in this
     order. group: which values its parameters are taken from. layer: whether it belongs to the film
     in the modified Newton iteration, which then treats it exactly. needed: whether a case has it.
@@ -72,7 +73,8 @@ class Block:
 
     def kernel_of(self, p: ORing) -> str:
         """Name of the kernel in a case."""
-        return self.kernel.format(solid=p.rubber(self.region).solid_kernel(p.solid))
+        solid = p.rubber(self.region).solid_kernel(p.solid)
+        return self.kernel.format(solid=solid, oil=p.film_suffix)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.quantities import QUANTITIES
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmState
+from softehl.runtime.names import meant
 
 TOLERANCE = 0.01
 """Of the quantity, relative: about what two meshes of neighbouring values differ by."""
@@ -45,10 +46,11 @@ class Target:
     @classmethod
     def of(cls, text: str) -> Target:
         """From "friction -10 %".  Raises NoDesignError."""
-        found = _TARGET.fullmatch(text.strip())
+        found = _TARGET.fullmatch(text.strip().replace("h*", "h_star"))
         if not found or found["name"] not in QUANTITIES or float(found["change"]) <= -100.0:
+            hint = meant(found["name"], QUANTITIES) if found else ""
             raise NoDesignError(
-                f'the target "{text}" is not understood; allowed: a change in per cent of '
+                f'the target "{text}" is not understood{hint}; allowed: a change in per cent of '
                 f'{", ".join(QUANTITIES)}, as in "friction -10%"'
             )
         return cls(found["name"], 1.0 + 0.01 * float(found["change"]))

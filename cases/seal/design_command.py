@@ -16,29 +16,56 @@ from softehl.cases.seal.state import FilmState, Silent
 from softehl.cases.seal.variation import NUMBERS, PRESSURE_KEY
 from softehl.runtime.names import meant
 
+SAME = {"rod": "rod_diameter"}
+"""Names of a key."""
+
+_SPEED = "not by the speed: sensitivity.csv has U, and each of `speeds` is a row of a run"
+_MODULUS = "the modulus follows from it: use mu, or mu_1 and mu_2"
+INSTEAD = {
+    **dict.fromkeys(("U", "speed", "speeds", "rod_speed"), _SPEED),
+    **dict.fromkeys(("shore_A", "shore", "hardness", "modulus"), _MODULUS),
+    "squeeze": "housing_diameter decides it",
+    "gap": "housing_diameter decides it",
+    "gland": "housing_diameter and groove_width make it",
+    "ring": "section_diameter and inner_diameter make it",
+    "oil": "viscosity and pressure_viscosity make it",
+    "temperature": "viscosity follows from it",
+}
+"""What cannot be chosen freely: what to do."""
+
 
 def design_case(p: ORing, target: str, key: str) -> int:
     """Print the way to the target; exit code 0, or 3 where it is not reached.  Raises BadInput."""
-    if key not in (*NUMBERS, PRESSURE_KEY) or not isinstance(getattr(p, key), float):
-        known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
-        raise BadInput(f"--by {key}{meant(key, known)}: allowed: {', '.join(known)}")
-    if len(p.speeds) > 1 or p.stroke == "both":
-        p = p.model_copy(update={"speeds": p.speeds[:1], "stroke": _one(p.stroke)})
-    p = p.model_copy(update={"sensitivity": True, "error_estimate": False})
+    key = SAME.get(key, key)
+    known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
+    if key not in known:
+        hint = f" ({INSTEAD[key]})" if key in INSTEAD else meant(key, known)
+        raise BadInput(f"--by {key}{hint}: allowed: {', '.join(known)}")
+    p = _one_film(p)
     try:
         wanted = Target.of(target)
         steps = designed(p, wanted, key, _solve, lambda q: _hold(q, wanted.quantity, key))
     except NoDesignError as error:
         raise BadInput(str(error)) from None
     except ValidationError as error:
-        reason = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise BadInput(f"the target needs a {key} that a case cannot have: {reason}") from None
+        wrong = f"the target needs a {key} that a case cannot have: {_reason(error)}"
+        raise BadInput(wrong) from None
     _tell(p, wanted, key, steps)
     return 0
 
 
-def _one(stroke: str) -> str:
-    return "out" if stroke == "both" else stroke
+def _one_film(p: ORing) -> ORing:
+    """The case of its first speed, at outstroke unless it has one stroke.  Raises BadInput."""
+    stroke = "out" if p.stroke == "both" else p.stroke
+    given = {"speeds": p.speeds[:1], "stroke": stroke, "error_estimate": False}
+    try:
+        return ORing(**{**p.settled(), **given, "sensitivity": True})
+    except ValidationError as error:
+        raise BadInput(f"a design needs the sensitivities: {_reason(error)}") from None
+
+
+def _reason(error: ValidationError) -> str:
+    return error.errors()[0]["msg"].removeprefix("Value error, ")
 
 
 def _solve(p: ORing) -> FilmState | None:

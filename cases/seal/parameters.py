@@ -24,6 +24,7 @@ from softehl.cases.seal.sections.keys import (
     surface_of,
     with_outline,
 )
+from softehl.cases.seal.shear_thinning import ThinningKeys
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness, Surfaces
 from softehl.cases.seal.tolerances import read_tolerances
 from softehl.runtime.mesh.outline import Shape
@@ -40,7 +41,7 @@ _LOWEST_ESTIMATED = 3
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 
 
-class ORing(SectionKeys, RubberKeys):
+class ORing(SectionKeys, RubberKeys, ThinningKeys):
     """Everything that defines one run of the O-ring case, or of a seal of another section.
 
     Raises pydantic.ValidationError also for a geometry in which the seal is not squeezed.
@@ -294,6 +295,11 @@ class ORing(SectionKeys, RubberKeys):
         return right - left
 
     @property
+    def measures(self) -> dict[str, float]:
+        """Key of each dimension of the section but its height -> what it is, mm."""
+        return self.measured(self.section_diameter)
+
+    @property
     def lobes(self) -> int:
         """How many contacts with the rod the section is made for."""
         return 1 if self.round else lobes(self.free_section)
@@ -447,6 +453,7 @@ class ORing(SectionKeys, RubberKeys):
                 raise ValueError(f'cavitation = "penalty" knows no {name}; leave cavitation out')
         if self.conserving and self.reynolds == "dg":
             raise ValueError('reynolds = "dg" knows the penalty only; use "fe", or leave it out')
+        self.require_smooth_film(dg=self.reynolds == "dg", rough=self.rough)
         return self
 
     @model_validator(mode="after")
@@ -511,10 +518,14 @@ class ORing(SectionKeys, RubberKeys):
         for name, given in (
             ("arc_start and arc_end", self.arc_start is not None),
             ("extrusion_gap", self.opens),
-            ("sensitivity", self.sensitivity),
         ):
             if given:
                 raise ValueError(f'{name}: for section = "round" only; leave it out')
+        if self.sensitivity and (self.outline is not None or self.cap_thickness is not None):
+            raise ValueError(
+                "sensitivity = true: not of an outline of a file, which has no dimensions, and not "
+                "of a section with a cap; leave it out"
+            )
         return self
 
     @model_validator(mode="after")

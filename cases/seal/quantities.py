@@ -6,17 +6,18 @@ pressure, the segment of the flux, where the film is 20 um thick) the choice is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import pi
 
 import numpy as np
 
 from softehl.cases.seal.contacts import CONTACT_FILM
+from softehl.cases.seal.results import film_parts
 from softehl.cases.seal.system import DISPLACEMENT, FACET, FILM
 from softehl.cases.seal.variation import SPEED, FilmCase
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.design import FieldRates, Inputs
+from softehl.runtime.fem.design import FieldRates, Inputs, weighted
 from softehl.runtime.fem.problem import Problem
 
 QUANTITIES = ("h_star", "friction", "leakage", "p_max", "contact_width")
@@ -63,7 +64,9 @@ def _flux(
     case: FilmCase, problem: Problem, at: Mapping[str, Array], x: Array
 ) -> tuple[float, dict[str, dict[str, Array]]]:
     """The flux at the largest pressure and the weights of its logarithm; see `film_numbers`."""
-    top = int(np.argmax(at["p"].max(axis=1)))
+    parts = film_parts(case.system.arc_film(x)[1])
+    first = parts[0 if case.film.stroke == "out" else -1]  # which the oil reaches first
+    top = int(first.start + np.argmax(at["p"][first].max(axis=1)))
     if case.system.parameters.reynolds == "dg":
         flux = problem.fields(FACET, x)["flux"]
         chosen = slice(max(top - 1, 0), top + 1)
@@ -112,14 +115,30 @@ def by_unknowns(case: FilmCase, problem: Problem, x: Array, q: Quantity) -> Arra
     return gradient
 
 
-def along(problem: Problem, x: Array, q: Quantity, name: str, rate: Inputs) -> float:
-    """Derivative of the logarithm of a quantity by that of a parameter, the unknowns held.
+Moved = Mapping[str, Mapping[str, Array]]
+"""Block -> field -> (elements, points), how fast its values change; blocks at rest are left out."""
+
+
+def fields_along(
+    problem: Problem, x: Array, rate: Inputs, of: Iterable[Quantity]
+) -> dict[str, dict[str, Array]]:
+    """How fields that these quantities are made of change with a parameter, the unknowns held.
 
     rate: that of the inputs, see `FilmCase.rate`.
     """
+    blocks = {block for q in of for block in q.fields if rate.blocks[block].any()}
+    return {b: FieldRates(problem, b, x).along(rate.blocks[b]) for b in blocks}
+
+
+def along(problem: Problem, q: Quantity, name: str, rate: Inputs, moved: Moved) -> float:
+    """Derivative of the logarithm of a quantity by that of a parameter, the unknowns held.
+
+    rate, moved: of the inputs and of the fields that follow from these alone, see `fields_along`.
+    """
     total = q.speed * (name == SPEED) + q.rod * (name == "rod_diameter")
     for block, weights in q.fields.items():
-        total += FieldRates(problem, block, x).along(rate.blocks[block], weights)
+        if block in moved:
+            total += float(weighted(moved[block], weights).sum())
     if q.z is not None and q.h is not None:
         ends = rate.blocks[FILM][:, :4].reshape(-1, 2, 2)  # (segments, both nodes, (z, r))
         nodes = np.concatenate([ends[:, 0], ends[-1:, 1]])

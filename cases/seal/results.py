@@ -78,13 +78,17 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
     q = float(flux[around].mean())
     h_star = q / (0.5 * film.rod_speed)
+    drag, friction = (
+        float(2.0 * pi * system.rod_radius * (tau * at["dx"]).sum())
+        for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
+    )
     return FilmNumbers(
         speed=film.speed,
         flux=q,
         h_star=h_star,
         h_min=float(h.min()),
         p_max=float(at["p"].max()),
-        friction=float(2.0 * pi * system.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
+        friction=friction,
         flux_variation=relative_spread(flux[whole]),
         jump=jump,
         oscillation=max(oscillation(*(v[_nodes(k)] for v in (z, h))) for k in parts),
@@ -94,6 +98,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         lacking=0.0 if system.parameters.rough else lacking(inlet, film, z, h),
         **rough_numbers(system, at),
         contacts=_contacts(at, (z, h), parts, film) if len(parts) > 1 else (),
+        drag=drag,
     )
 
 
@@ -102,8 +107,8 @@ def end_gap(z: Array, h: Array) -> float:
 
     z, h: (nodes,) towards the exit.
     """
-    slope = (h[-1] - h[-2]) / (z[-1] - z[-2])
-    return inf if slope > tan(radians(EXIT_SLOPE)) else float(h[-1])
+    steep = h[-1] - h[-2] > tan(radians(EXIT_SLOPE)) * (z[-1] - z[-2])  # also straight up
+    return inf if steep else float(h[-1])
 
 
 def film_parts(h: Array) -> list[slice]:
@@ -174,24 +179,30 @@ def lacking(at: Mapping[str, Array], film: FilmLoads, z: Array, h: Array) -> flo
     rise, in excess of the pressure outside.
     """
     first, second = (0, 1) if film.stroke == "out" else (-1, -2)
-    slope = (h[first] - h[second]) / abs(z[first] - z[second])
+    rise, width = h[first] - h[second], abs(z[first] - z[second])
     steepest = _steepest(at, film)
-    if steepest is None or not slope > 0.0:
+    if steepest is None or not rise > 0.0:
         return np.inf
     outside, eta = (at[name].ravel()[0 if film.stroke == "out" else -1] for name in ("p", "eta"))
     inlet = float(at["p"].ravel()[steepest] - outside)
-    return float(6.0 * eta * film.speed / (slope * h[first]) / inlet) if inlet > 0.0 else np.inf
+    if not inlet > 0.0:
+        return np.inf
+    return float(6.0 * eta * film.speed * width / (rise * h[first]) / inlet)
 
 
 def _steepest(at: Mapping[str, Array], film: FilmLoads) -> int | None:
     """Where in the inlet the pressure rises most steeply, None if it does not rise."""
-    x, h, p = (at[name].ravel() for name in ("x", "h", "p"))
-    slope = (at["tau_rod"] - at["tau"]).ravel() / h
+    x, p, slope = at["x"].ravel(), at["p"].ravel(), _slope(at).ravel()
     top = x[np.argmax(p)]
     inlet = x < top if film.rod_speed > 0.0 else x > top
     rise = np.where(inlet, np.copysign(1.0, film.rod_speed) * slope, -np.inf)
     steepest = int(np.argmax(rise))
     return steepest if rise[steepest] > 0.0 else None
+
+
+def _slope(at: Mapping[str, Array]) -> Array:
+    """p' at the points, MPa/mm; of an oil that thins that of a Newtonian one of the same flux."""
+    return at["driving"] if "driving" in at else (at["tau_rod"] - at["tau"]) / at["h"]
 
 
 def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> float:
@@ -203,8 +214,8 @@ def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> floa
     steepest = _steepest(at, film)
     if steepest is None:
         return np.nan
-    h, eta = (at[name].ravel()[steepest] for name in ("h", "eta"))
-    rise = abs((at["tau_rod"] - at["tau"]).ravel()[steepest]) / h
+    eta = at["eta"].ravel()[steepest]
+    rise = abs(_slope(at).ravel()[steepest])
     return float(h_star / np.sqrt(8.0 * eta * film.speed / (9.0 * rise)))
 
 

@@ -6,14 +6,14 @@ the mesh frozen (`cases.seal.variation`). The film does not depend on the contac
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.quantities import along, by_unknowns, quantities
+from softehl.cases.seal.quantities import QUANTITIES, along, by_unknowns, fields_along, quantities
 from softehl.cases.seal.variation import SPEED, FilmCase
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs, Tangent
@@ -26,7 +26,7 @@ def rates_of(
 ) -> dict[str, Inputs]:
     """Parameter -> rate of the inputs of a film by its logarithm.
 
-    known: the rates at another speed of the stroke; of these only that of the speed is another.
+    known: the rates of another film of the system; of these only that of the speed is another.
     """
     case = FilmCase(system, film)
     kept = {name: rate for name, rate in known.items() if name != SPEED}
@@ -39,25 +39,28 @@ def sensitivities(
     x: Array,
     linear: LinearSolver,
     rates: Mapping[str, Inputs],
+    *,
     method: str = "adjoint",
+    wanted: Sequence[str] = QUANTITIES,
 ) -> dict[str, dict[str, float]]:
     """Quantity -> parameter -> d log quantity / d log parameter at a converged film x (n,).
 
     rates: of the parameters, by `rates_of` at this film. method: "adjoint", a solve for each
-    quantity, or "direct", one for each parameter. Raises SingularMatrix.
+    quantity, or "direct", one for each parameter. wanted: names of quantities. Raises
+    SingularMatrix.
     """
     case, problem = FilmCase(system, film), system.film_problem(film)
-    found, tangent = quantities(case, problem, x), Tangent.at(problem, x)
+    values, tangent = quantities(case, problem, x), Tangent.at(problem, x)
+    found = {name: values[name] for name in wanted}
     gradients = np.stack([by_unknowns(case, problem, x, q) for q in found.values()], axis=1)
     loads = np.stack([tangent.load(rate) for rate in rates.values()], axis=1)
     if method == "adjoint":
         through = -adjoints(linear, tangent.reduced, gradients).T @ loads
     else:
         through = gradients.T @ direct(linear, tangent.reduced, loads)
-    return {
-        name: {
-            key: float(through[i, j]) + along(problem, x, q, key, rate)
-            for j, (key, rate) in enumerate(rates.items())
-        }
-        for i, (name, q) in enumerate(found.items())
-    }
+    slopes: dict[str, dict[str, float]] = {name: {} for name in found}
+    for j, (key, rate) in enumerate(rates.items()):
+        moved = fields_along(problem, x, rate, found.values())
+        for i, (name, q) in enumerate(found.items()):
+            slopes[name][key] = float(through[i, j]) + along(problem, q, key, rate, moved)
+    return slopes

@@ -1,8 +1,9 @@
 """A case whose parameters vary while its mesh is frozen: the map from its measures to the nodes.
 
 A mesh is laid out by angles and shares (where the arc begins and ends, how its segments are
-spaced); these are frozen, so that every node is centre + radius times a constant. A remeshed run
-differs from that by the error of its mesh.
+spaced); these are frozen, so that every node is centre + radius times a constant, or, of a section
+with an outline, keeps its part of a line or an arc. A remeshed run differs from that by the error
+of its mesh.
 """
 
 from __future__ import annotations
@@ -10,14 +11,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from softehl.cases.seal import materials
+import numpy as np
+
+from softehl.cases.seal import materials, shear_thinning
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.given import number, times
-from softehl.cases.seal.layout import RoundLayout, uniform_layout
+from softehl.cases.seal.layout import OutlineLayout, RoundLayout, uniform_layout
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section import SealSection
 from softehl.runtime.fem.design import Inputs, rate_of
+from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
 
 SPEED, PRESSURE_KEY = "U", "sealed_pressure"
 """Parameters of a film that are no numbers of the case alone: the rod speed, as it is named in
@@ -32,7 +36,7 @@ LENGTHS = (
 NUMBERS = (
     *LENGTHS,
     *(*materials.KEYS, "bulk_modulus"),
-    *("viscosity", "pressure_viscosity", "cavitation_penalty"),
+    *("viscosity", "pressure_viscosity", "cavitation_penalty", *shear_thinning.NUMBERS),
 )
 """Physical and geometric keys of a case; the terms of an Ogden rubber count as one."""
 
@@ -50,7 +54,7 @@ class FilmCase:
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters that are not zero."""
         p = self.system.parameters
-        values = {name: getattr(p, name) for name in (*NUMBERS, PRESSURE_KEY)}
+        values = {name: getattr(p, name) for name in (*NUMBERS, PRESSURE_KEY)} | p.measures
         return (*(name for name, v in values.items() if _varies(v)), SPEED)
 
     def scaled(self, name: str, by: float) -> FilmCase:
@@ -60,8 +64,9 @@ class FilmCase:
             return replace(self, film=replace(film, speed=(1.0 + by) * film.speed))
         if name == PRESSURE_KEY:
             film = replace(film, sealed_pressure=(1.0 + by) * film.sealed_pressure)
-        value = times(getattr(p, name), 1.0 + by)
-        return FilmCase(frozen(self.system, p.model_copy(update={name: value})), film)
+        value = times(p.measures.get(name, getattr(p, name)), 1.0 + by)
+        held = p.measures if name == "section_diameter" else {}
+        return FilmCase(frozen(self.system, p.model_copy(update={**held, name: value})), film)
 
     def inputs(self) -> Inputs:
         """What its equations are given."""
@@ -70,10 +75,13 @@ class FilmCase:
     def rate(self, name: str) -> Inputs:
         """The rate of its inputs by the logarithm of a parameter.
 
-        All of them are polynomials of the keys, of degree 4 at most (polar moment of the section),
-        but for the augmentation of contacts, on which no converged state depends.
+        All of them are polynomials of the keys, of degree 4 at most (polar moment of the section)
+        of lengths and linear in the others, but for the augmentation of contacts, on which no
+        converged state depends, and for arcs, which are smooth: there the step leaves 1e-7.
         """
-        return rate_of(lambda by: self.scaled(name, by).inputs(), _WIDE)
+        lengths = *LENGTHS, *self.system.parameters.measures
+        degree = 4 if name in lengths else 2
+        return rate_of(lambda by: self.scaled(name, by).inputs(), _WIDE, degree)
 
 
 def _varies(value: Any) -> bool:
@@ -85,18 +93,39 @@ def _varies(value: Any) -> bool:
 def frozen(system: SealSystem, p: ORing) -> SealSystem:
     """The system of other parameters on the same mesh, moved with the measures of its section."""
     old, new = system.section.layout, uniform_layout(p)
+    if isinstance(old, OutlineLayout):
+        assert isinstance(new, OutlineLayout)
+        return _carried(system, p, old, new)
     assert isinstance(old, RoundLayout)
     assert isinstance(new, RoundLayout)
-    disc = replace(
-        old.disc,
-        centre_z=new.disc.centre_z,
-        centre_r=new.disc.centre_r,
-        radius=new.disc.radius,
-    )
+    measures = ("centre_z", "centre_r", "radius")
+    moved = {name: getattr(new.disc, name) for name in measures}
+    if all(getattr(old.disc, name) == value for name, value in moved.items()):
+        return system.moved(p, system.section)
+    disc = replace(old.disc, **moved)
     mesh = system.mesh
     unit = (mesh.points - old.disc.centre) / old.disc.radius
     points = disc.centre + disc.radius * unit
     scale = disc.radius / old.disc.radius
     places, length = scale * mesh.places, scale * mesh.length
-    moved = replace(mesh, points=points, places=places, length=length)
-    return system.moved(p, SealSection(RoundLayout(disc), moved, system.section.placed))
+    placed = replace(mesh, points=points, places=places, length=length)
+    return system.moved(p, SealSection(RoundLayout(disc), placed, system.section.placed))
+
+
+def _carried(system: SealSystem, p: ORing, old: OutlineLayout, new: OutlineLayout) -> SealSystem:
+    """On an outline; the sealed pressure ends at the nodes at which it ended."""
+    before, after = old.shape.outline, new.shape.outline
+    section = system.section
+    if before.pieces == after.pieces:
+        return system.moved(p, section)
+    mesh = carried_mesh(section.mesh, before, after)
+    film = carried_places(np.array(old.film), before, after)
+    ends = mesh.places[section.lowest] - mesh.places[0] + film[0], mesh.places[section.crown]
+    layout = replace(
+        new,
+        film=(float(film[0]), float(film[1])),
+        spacing=old.spacing,
+        long=old.long,
+        dams=(float(ends[0]), float(ends[1])),
+    )
+    return system.moved(p, replace(section, layout=layout, mesh=mesh))

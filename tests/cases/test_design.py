@@ -90,8 +90,39 @@ def test_what_is_out_of_reach_is_said() -> None:
 def test_a_key_that_is_no_number_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["design", "oring", "friction -3%", "--by", "density"]) == 2
     assert "--by density: allowed: section_diameter" in capsys.readouterr().err
-    assert main(["design", "slider", "friction -3%", "--by", "density"]) == 2
-    assert "slider has no sensitivities" in capsys.readouterr().err
+    for case in ("slider", "cycle"):
+        assert main(["design", case, "friction -3%", "--by", "rod_diameter"]) == 2
+        assert f"{case} has no sensitivities" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("typed", "words"),
+    [
+        (("friction -3%", "--by", "rod_diamter"), "(did you mean 'rod_diameter'?)"),
+        (("friction -3%", "--by", "housing"), "(did you mean 'housing_diameter'?)"),
+        (("friction -3%", "--by", "speed"), "not by the speed"),
+        (("friction -3%", "--by", "squeeze"), "housing_diameter decides it"),
+        (("friction -3%", "--by", "shore_A"), "the modulus follows from it"),
+        (("friktion -3%", "--by", "rod"), "(did you mean 'friction'?)"),
+        (("friktion", "-3%", "--by", "rod"), '"friktion -3%" is not understood'),
+        (("friction 3%", "--by", "rod"), 'as in "friction -10%"'),
+        (
+            ("friction -3%", "--by", "rod", "--set", "housing_friction=0.1"),
+            "a design needs the sensitivities",
+        ),
+    ],
+    ids=str,
+)
+def test_what_a_stranger_types_is_answered(
+    typed: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["design", "oring", *typed]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
+
+
+def test_h_star_may_be_typed_as_it_is_printed() -> None:
+    assert Target.of("h* +5%") == Target.of("h_star +5 %") == Target("h_star", 1.05)
 
 
 @pytest.mark.slow

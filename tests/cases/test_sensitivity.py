@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -17,21 +18,24 @@ from softehl.__main__ import main
 from softehl.cases.oring import CASE
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contacts import CONTACT_FILM
+from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.method import FilmPath
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.quantities import QUANTITIES
 from softehl.cases.seal.results import film_numbers
+from softehl.cases.seal.sections import SECTIONS
+from softehl.cases.seal.sections.keys import dimensions
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import SensitivityRow, resolved
 from softehl.cases.seal.state import FilmRow, Silent
 from softehl.cases.seal.tolerances import band, read_tolerances
-from softehl.cases.seal.variation import LENGTHS, FilmCase
+from softehl.cases.seal.variation import LENGTHS, SPEED, FilmCase
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
 from softehl.runtime.fem.postprocess import interval_below
 from softehl.runtime.io import read_csv
+from softehl.runtime.solve.linear import Factorisation, SparseMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Point
 from softehl.runtime.solve.superlu import SuperLU
@@ -51,7 +55,16 @@ CASES = {
     "in": film_of(400.0, stroke="in"),
     "dg": film_of(800.0, reynolds="dg", solid="fbar"),
     "conserving": film_of(400.0, cavitation="mass-conserving"),
+    "section rectangular": film_of(
+        400.0, section="rectangular", corner_radius=0.4, groove_width=4.3, housing_diameter=56.4
+    ),
+    "section x_ring": film_of(400.0, section="x_ring", groove_width=4.3, housing_diameter=56.4),
+    "thinning": film_of(
+        400.0, carreau_stress=0.01, carreau_exponent=0.6, carreau_plateau=0.3, stroke="in"
+    ),
 }
+MEASURES = (*LENGTHS, *dict.fromkeys(key for name in SECTIONS for key in dimensions(name)))
+ALL = [pytest.param(n, marks=[pytest.mark.slow] * n.startswith("section")) for n in CASES]
 STEP = 5e-7
 """A tenth of what makes a point of the film cavitate: there the friction has a kink."""
 
@@ -100,7 +113,7 @@ def reported(case: FilmCase, x: Array) -> dict[str, float]:
 def slopes(name: str, method: str = "adjoint") -> SLOPES:
     case, x = state(name)
     rates = rates_of(case.system, case.film)
-    return sensitivities(case.system, case.film, x, SuperLU(), rates, method)
+    return sensitivities(case.system, case.film, x, SuperLU(), rates, method=method)
 
 
 def differences(name: str, key: str) -> dict[str, float]:
@@ -128,7 +141,7 @@ def test_every_derivative_agrees_with_central_differences(name: str) -> None:
             assert abs(found[quantity][key] - expected[quantity]) <= 1e-5 * scale, (key, quantity)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", ALL)
 def test_direct_and_adjoint_agree(name: str) -> None:
     one, other = slopes(name), slopes(name, "direct")
     for quantity in QUANTITIES:
@@ -142,15 +155,15 @@ def defects(found: SLOPES) -> dict[str, float]:
     for quantity, pressures, lengths in (("h_star", 0, 1), ("friction", 1, 2), ("p_max", 1, 0)):
         s = found[quantity]
         stress = sum(s[k] for k in ("mu_1", "mu_2", "bulk_modulus", "sealed_pressure", "viscosity"))
-        stress -= s["pressure_viscosity"] + s["cavitation_penalty"]
+        stress += s.get("carreau_stress", 0.0) - s["pressure_viscosity"] - s["cavitation_penalty"]
         left[f"{quantity} stress"] = stress - pressures
         left[f"{quantity} time"] = s["viscosity"] - s["U"] - s["cavitation_penalty"]
-        length = sum(s.get(k, 0.0) for k in LENGTHS) + s["U"] + s["cavitation_penalty"]
+        length = sum(s.get(k, 0.0) for k in MEASURES) + s["U"] + s["cavitation_penalty"]
         left[f"{quantity} length"] = length - lengths
     return left
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", ALL)
 def test_dimensions_are_kept(name: str) -> None:
     assert max(map(abs, defects(slopes(name)).values())) < 1e-6
 
@@ -179,6 +192,60 @@ def test_the_rates_of_one_speed_serve_another() -> None:
     one, other = (sensitivities(case.system, slower, y, SuperLU(), r) for r in (known, new))
     for quantity in QUANTITIES:
         assert one[quantity] == pytest.approx(other[quantity], rel=1e-9, abs=1e-9)
+
+
+def test_the_rates_of_one_stroke_serve_the_other() -> None:
+    case, _ = state("out")
+    inward = replace(case.film, stroke="in")
+    out, back = rates_of(case.system, case.film), rates_of(case.system, inward)
+    for key in set(out) - {SPEED}:
+        for name, rows in out[key].blocks.items():
+            assert rows == pytest.approx(back[key].blocks[name], rel=1e-9, abs=1e-9)
+    assert out[SPEED].blocks["film"] == pytest.approx(-back[SPEED].blocks["film"])
+
+
+def test_what_does_not_move_has_no_rate() -> None:
+    """To the last bit: its kernels are not called."""
+    case, _ = state("out")
+    still = {
+        key: {n for n, rows in case.rate(key).blocks.items() if not rows.any()}
+        for key in ("rod_diameter", "viscosity", "section_diameter")
+    }
+    assert "solid" in still["rod_diameter"] & still["viscosity"]
+    assert "film" not in still["rod_diameter"] | still["viscosity"]
+    assert not {"solid", "film", "housing"} & still["section_diameter"]
+
+
+def test_one_factorisation_serves_all_quantities_and_parameters() -> None:
+    """And a kernel is called for a parameter only where this moves its elements."""
+    case, x = state("in")
+    counted, called = Counting(), Counter[str]()
+    rates = rates_of(case.system, case.film)
+    sensitivities(case.system, case.film, x, counted, rates)
+    assert counted.made == 1
+    for rate in rates.values():
+        called.update(name for name, rows in rate.blocks.items() if rows.any())
+    assert called["solid"] < called["film"] < len(rates)
+    assert sum(called.values()) < 0.5 * len(rates) * len(rates["mu_1"].blocks)
+
+
+class Counting(SuperLU):
+    """Counts factorisations."""
+
+    made = 0
+
+    def factorise(self, K: SparseMatrix) -> Factorisation:
+        """See `LinearSolver`."""
+        self.made += 1
+        return super().factorise(K)
+
+
+def test_one_quantity_alone_is_as_among_the_others() -> None:
+    case, x = state("in")
+    rates = rates_of(case.system, case.film)
+    alone = sensitivities(case.system, case.film, x, SuperLU(), rates, wanted=["friction"])
+    assert set(alone) == {"friction"}
+    assert alone["friction"] == pytest.approx(slopes("in")["friction"], rel=1e-9, abs=1e-9)
 
 
 def test_only_states_that_the_mesh_shows_are_differentiated() -> None:

@@ -3,6 +3,7 @@
 import csv
 import itertools
 import json
+import math
 import os
 import re
 import signal
@@ -24,6 +25,7 @@ from softehl.cases.harness import sampling
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.study_file import WAYS, Study, read_study
+from softehl.cases.seal.tolerances import band
 from softehl.cases.shipped import SHIPPED
 
 GRID = """
@@ -263,6 +265,11 @@ def test_a_sweep_is_its_runs(reference: Path) -> None:
     assert content["fixed"] == {"speeds": [400, 200], "segments": 40}
 
 
+def test_a_sweep_is_no_run_to_report(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert softehl.main(["report", str(reference)]) == 2
+    assert f"holds a sweep; allowed: its runs, as in {reference}/runs" in capsys.readouterr().err
+
+
 def test_a_folder_with_a_sweep(
     reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -418,6 +425,46 @@ def test_runs_follow_the_sensitivities(tmp_path: Path) -> None:
         assert np.exp(np.log(off) @ powers) == pytest.approx(found, rel=0.025)
         turned = powers * np.where(np.array(keys) == "viscosity", -1.0, 1.0)
         assert np.exp(np.log(off) @ turned) != pytest.approx(found, rel=0.025)
+
+
+SHARES = {
+    "modulus": (0.15, ("mu_1", "mu_2")),
+    "viscosity": (0.2, ("viscosity",)),
+    "rod_diameter": (5e-4, ("rod_diameter",)),
+    "section_diameter": (0.0288, ("section_diameter",)),
+    "inner_diameter": (0.009, ("inner_diameter",)),
+}
+
+
+@pytest.mark.slow
+def test_a_tolerance_band_is_that_of_the_runs(tmp_path: Path) -> None:
+    """Each tolerance half of it up or down, in balance: twice the deviation of the eight runs has
+    no chance in it, and is the linear band but for what is not linear; without one tolerance the
+    band is another.
+    """
+    given: Any = load_case(SHIPPED["oring"]).parameters(
+        stroke="out", speeds=(400.0,), error_estimate=False, sensitivity=True
+    )
+    text = 'case = "oring"\nstroke = "out"\nspeeds = [400]\nerror_estimate = false\n'
+    for a, b, c in itertools.product((-1, 1), repeat=3):
+        text += "[[list]]\n"
+        for sign, (share, keys) in zip((a, b, c, a * b, a * c), SHARES.values(), strict=True):
+            factor = math.exp(0.5 * sign * share)
+            text += "".join(f"{key} = {factor * getattr(given, key)!r}\n" for key in keys)
+    assert swept(tmp_path / "s.toml", text) == 0
+    rows = table(tmp_path / "s")
+    assert [row["verdict"] for row in rows] == ["ok"] * 8
+    state = softehl.run_oring(given, softehl.Silent()).states[0]
+    assert state.sensitivity is not None
+    columns = {"h_star": "h_star_um", "friction": "rod_friction_N", "leakage": "leak_rate_mm3_s"}
+    for quantity, column in columns.items():
+        logs = np.log([abs(float(row[column])) for row in rows])
+        of_runs = 200.0 * float(logs.std())
+        slopes = state.sensitivity[quantity]
+        likely = band((1.0, 400.0), quantity, slopes, SHARES).likely_percent
+        assert of_runs == pytest.approx(likely, rel=0.04), quantity
+        fewer = {name: share for name, share in SHARES.items() if name != "viscosity"}
+        assert band((1.0, 400.0), quantity, slopes, fewer).likely_percent < 0.95 * of_runs
 
 
 def test_points_are_few_enough() -> None:

@@ -4,7 +4,7 @@ LEFT_OUT = (
     "Time: every speed is a steady state; no start, no stop, no dwell.",
     "Viscoelasticity and set: the rubber is hyperelastic, and as it was made.",
     "Heat: oil and rubber are at one temperature, which friction does not raise.",
-    "Shear thinning: the oil is Newtonian.",
+    "Shear thinning, unless the case has keys for it: the oil is then Newtonian.",
     "Roughness of rod and seal, unless the case has keys for it: a film thinner than the surfaces "
     "are rough is not what the numbers say.",
     "Starvation: both ends of the film are flooded, unless the case says otherwise.",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softehl.cases.harness.pictures import save
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure
 from softehl.cases.seal.report.fit import fit_figure, fit_of, write_residuals
@@ -19,19 +20,28 @@ if TYPE_CHECKING:
     from softehl.cases.seal.parameters import ORing
 
 PICTURES = ("curve", "profiles", "section")
-"""Names of the files, each .png and .svg, of every run."""
+"""Names of the files, each .png or .svg or both, of every run."""
 
 SOME = ("fit", "stribeck")
 """Those where the rubber was fitted to tests, and where surfaces are rough."""
 
 
 def write_plots(
-    p: ORing, folder: Path, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()
+    p: ORing,
+    folder: Path,
+    rows: Sequence[FilmRow],
+    rejected: Sequence[FilmRow] = (),
+    kinds: Sequence[str] = ("png",),
 ) -> None:
     """Draw every picture of a run, whose rows have their files in its folder, into the folder.
 
-    Raises OSError, and ValueError where a profile or a section cannot be read back.
+    kinds: of the files of each; none if empty. Raises OSError, and ValueError where a profile or a
+    section cannot be read back.
     """
+    if found := fit_of(p):
+        write_residuals(found, folder / "fit.csv")
+    if not kinds:
+        return
     import matplotlib
 
     results = [(row, read_profile(folder, row)) for row in rows]
@@ -39,15 +49,14 @@ def write_plots(
     views = [View(row, at, read_section(folder, row)) for row, at in results if row in fastest]
     views = [view for view in views if view.complete]
     with matplotlib.rc_context(style.STYLE):
-        style.save(curve_figure(p, rows, rejected), folder / "curve")
-        style.save(profiles_figure(p, results), folder / "profiles")
-        if found := fit_of(p):
-            write_residuals(found, folder / "fit.csv")
-            style.save(fit_figure([found]), folder / "fit")
+        save(curve_figure(p, rows, rejected), folder / "curve", kinds)
+        save(profiles_figure(p, results), folder / "profiles", kinds)
+        if found:
+            save(fit_figure([found]), folder / "fit", kinds)
         if stribeck := stribeck_figure(p, rows):
-            style.save(stribeck, folder / "stribeck")
+            save(stribeck, folder / "stribeck", kinds)
         if views:
-            style.save(section_figure(p, views), folder / "section")
+            save(section_figure(p, views), folder / "section", kinds)
 
 
 def _fastest(rows: Sequence[FilmRow]) -> list[FilmRow]:

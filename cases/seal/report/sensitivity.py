@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softehl.cases.harness.pictures import save
 from softehl.cases.seal.report import style
 from softehl.cases.seal.sensitivity_table import SensitivityRow
 from softehl.cases.seal.state import FilmRow
@@ -25,10 +26,12 @@ _TICKS = (-10.0, -1.0, 0.0, 1.0, 10.0)
 Table = dict[float, dict[str, dict[str, float]]]
 
 
-def write_sensitivities(p: ORing, folder: Path, rows: Sequence[FilmRow]) -> None:
+def write_sensitivities(
+    p: ORing, folder: Path, rows: Sequence[FilmRow], kinds: Sequence[str]
+) -> None:
     """Join the sensitivities of the states into `sensitivity.csv`; tolerances; the picture.
 
-    Raises OSError, ValueError.
+    kinds: of the files of the picture. Raises OSError, ValueError.
     """
     parts = [folder / f"sensitivity_{row.name}.csv" for row in rows]
     header = SensitivityRow.header()
@@ -48,10 +51,12 @@ def write_sensitivities(p: ORing, folder: Path, rows: Sequence[FilmRow]) -> None
             for name, slopes in found.items()
         ]
         write_csv(folder / "tolerances.csv", bands[0].header(), [b.cells() for b in bands])
+    if not kinds:
+        return
     import matplotlib
 
     with matplotlib.rc_context(style.STYLE):
-        style.save(tornado_figure(p, table), folder / "tornado")
+        save(tornado_figure(p, table), folder / "tornado", kinds)
 
 
 def tornado_figure(p: ORing, table: Table) -> Figure:

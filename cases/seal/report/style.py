@@ -1,11 +1,8 @@
-"""The look that the pictures of a run share, and how one is saved."""
+"""The look that the pictures of a run share."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from softehl.runtime.io import replacing
 
 if TYPE_CHECKING:  # imported late: matplotlib is slow to import
     from matplotlib.figure import Figure
@@ -31,8 +28,6 @@ STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "softehl",
 }
-_PACKED = 3  # of 9: a fifth larger than what takes three times as long
-
 STROKES = {"out": "outstroke", "in": "instroke"}
 COLOURS = {"out": "#1b6ca8", "in": "#c8553d"}
 MARKERS = {"out": "o", "in": "s"}
@@ -77,14 +72,3 @@ def set_margins(
         wspace=between,
         hspace=between,
     )
-
-
-def save(figure: Figure, stem: Path) -> None:
-    """Write a figure as .png and .svg, each at once or not at all, the same bytes every time."""
-    kinds: dict[str, dict[str, Any]] = {
-        "png": {"pil_kwargs": {"compress_level": _PACKED}},
-        "svg": {"metadata": {"Date": None}},
-    }
-    for kind, how in kinds.items():
-        with replacing(stem.with_suffix(f".{kind}")) as temporary:
-            figure.savefig(temporary, format=kind, **how)
