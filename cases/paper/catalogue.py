@@ -3,6 +3,7 @@
 from softehl.cases.paper import (
     blind,
     checks,
+    choices,
     curves,
     inverse,
     onset,
@@ -26,6 +27,7 @@ ITEMS: dict[str, Item] = {
     for item in [
         *sorted(_PAPER, key=_number),
         *checks.ITEMS,
+        *choices.ITEMS,
         *blind.ITEMS,
         *onset.ITEMS,
         *points.ITEMS,

@@ -143,12 +143,18 @@ def fig_17(scope: Scope) -> Chart:
 def fig_18(scope: Scope) -> Chart:
     """h* over density for the rules of Gauss and Lobatto."""
     series = [
-        _over_density(scope, f"{rule}, $m_p$ = {m}", 0, i, style, quadrature=rule, pressure_order=m)
+        _over_density(
+            *(scope, f"{rule}, $m_p$ = {m}", panel, i, style),
+            reynolds=kind,
+            quadrature=rule,
+            pressure_order=m,
+        )
+        for panel, kind in enumerate(("fe", "dg"))
         for i, m in enumerate((1, 2, 4))
         for rule, style in (("gauss", "-"), ("lobatto", "--"))
     ]
-    caption = _density_caption(scope, " FE.")
-    return Chart([""], series, "mesh density", caption, log_x=True)
+    titles = ("(a) FE", "(b) DG")
+    return Chart(titles, series, "mesh density", _density_caption(scope), log_x=True)
 
 
 FIG_20_PRESSURES = (0.0, 1.0, 2.0, 5.0)

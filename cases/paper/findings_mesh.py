@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import isfinite
 
 from softehl.cases.paper.checks import observed_order
@@ -108,18 +108,25 @@ def _onset_by_density(query: Query) -> Finding:
 
 def _more_at_low_speed(query: Query) -> Finding:
     d = query.scope.mesh(16)
-    values = [_index(query, d, 5.0, u) for u in _FALLING]
-    found = counted(list(itertools.pairwise(values)), "halvings over which it grows")
-    return Finding(f"index {numbers(values, '.2g')}; {found.text}", found.holds)
+    values = [ripple(query.state(d, 5.0, u)) for u in _FALLING]
+    found = counted(_seen(itertools.pairwise(values)), "halvings over which it grows")
+    return Finding(f"ripple {numbers(values, '.2g')} h*; {found.text}", found.holds)
 
 
 def _severe(query: Query) -> Finding:
     d = query.scope.mesh(16)
-    values = [_index(query, d, p, s * 200.0) for p in (1.0, 5.0) for s in (1.0, -1.0)]
-    text = f"|U| = 200: p_s 1 out {values[0]:.2g} in {values[1]:.2g}; p_s 5 out {values[2]:.2g}"
+    values = [ripple(query.state(d, p, s * 200.0)) for p in (1.0, 5.0) for s in (1.0, -1.0)]
+    text = f"ripple at |U| = 200: p_s 1 out {values[0]:.2g} in {values[1]:.2g} h*;"
     pairs = [(values[0], values[1]), (values[0], values[2]), (values[1], values[3])]
-    found = counted(pairs, "comparisons that hold")
-    return Finding(f"{text} in {values[3]:.2g}; {found.text}", found.holds)
+    found = counted(_seen(pairs), "comparisons that hold")
+    return Finding(
+        f"{text} p_s 5 out {values[2]:.2g} in {values[3]:.2g}; {found.text}", found.holds
+    )
+
+
+def _seen(pairs: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The pairs of ripples of which one can be seen: the others are no oscillations."""
+    return [pair for pair in pairs if not max(pair) <= RIPPLE]
 
 
 def _mild_oscillations(query: Query) -> Finding:

@@ -176,6 +176,14 @@ class Store:
         columns = read_columns(path, ("x_mm", "p_MPa"))
         return columns["x_mm"], columns["p_MPa"]
 
+    def effort(self, parameters: ORing, stages: Sequence[str], stroke: str) -> tuple[int, float]:
+        """Iterations and seconds of some stages of a run; nan seconds where there is none."""
+        path = self.run_folder(parameters) / "run.json"
+        found = read_json(path).get("stages", []) if path.exists() else []
+        mine = [stage for stage in found if stage["name"] in stages and stage["stroke"] == stroke]
+        seconds = sum(stage["seconds"] for stage in mine) if mine else nan
+        return sum(stage["iterations"] for stage in mine), seconds
+
     def _read(self, place: Path) -> list[FilmRow]:
         if place not in self._rows:
             folder = CurveFolder(place, FilmRow)

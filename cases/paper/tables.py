@@ -1,4 +1,4 @@
-"""Tables 1 and 2 and the deformed sections of Fig. 4."""
+"""Tables 1 and 2, the meshes of Fig. 3 and the deformed sections of Fig. 4."""
 
 from __future__ import annotations
 
@@ -58,10 +58,15 @@ def table_2_densities(scope: Scope) -> tuple[int, ...]:
 
 
 @cache
-def unknowns(density: int) -> tuple[int, int]:
-    """Numbers of all unknowns and of those of pressure of a mesh, m_p = 4."""
-    system = build_system(setup(density, 1.0))
+def counted(p: ORing) -> tuple[int, int]:
+    """Numbers of all unknowns and of those of pressure of a case."""
+    system = build_system(p)
     return system.layout.total, system.pressure_count
+
+
+def unknowns(density: int) -> tuple[int, int]:
+    """The same of a mesh, m_p = 4."""
+    return counted(setup(density, 1.0))
 
 
 def table_2(_: Store, scope: Scope) -> Product:
@@ -72,6 +77,44 @@ def table_2(_: Store, scope: Scope) -> Product:
         rows.append((density, total, TABLE_2[density][0], film, TABLE_2[density][1]))
     header = ("density", "unknowns", "unknowns_paper", "pressures", "pressures_paper")
     return Product({"table2": Table(header, rows)}, "Numbers of unknowns, m_p = 4.")
+
+
+def fig_3(_: Store, scope: Scope) -> Product:
+    """The undeformed mesh, with the rod and the housing that it will be pressed between."""
+    densities = scope.meshes((1, 2), default=2)
+    setups = [setup(d, scope.pressure(1.0)) for d in densities]
+    meshes = [build_system(p).mesh for p in setups]
+    rows = [
+        (d, len(m.points), len(m.quads), len(m.arc_nodes) - 1, len(m.boundary))
+        for d, m in zip(densities, meshes, strict=True)
+    ]
+    header = ("density", "nodes", "quadrilaterals", "arc_segments", "boundary_segments")
+
+    def draw(figure: Figure) -> None:
+        panels = figure.subplots(1, len(meshes), squeeze=False)[0]
+        for axes, p, mesh, letter in zip(panels, setups, meshes, "ab", strict=False):
+            _quads(axes, mesh.points[mesh.quads])
+            half = 0.55 * p.section_diameter
+            for radius in (0.5 * p.rod_diameter, 0.5 * p.housing_diameter):
+                axes.plot([-half, half], [radius, radius], color="black")
+            axes.set_aspect("equal")
+            axes.set_ylim(*sorted(axes.get_ylim(), reverse=True))
+            axes.set_axis_off()
+            axes.set_title(f"({letter}) mesh density {p.density}")
+
+    words = " Rod (upper line) on the top, sealed side on the left; the ring is not yet squeezed."
+    caption = density_words(densities, (1, 2)) + words
+    return Product({"fig3": Table(header, rows)}, caption, draw, (5.6, 2.9))
+
+
+def _quads(axes: Axes, corners: Any) -> None:
+    from matplotlib.collections import PolyCollection
+
+    axes.add_collection(
+        PolyCollection(corners, facecolors="#e8eef4", edgecolors="0.35", linewidths=0.25),
+        autolim=True,
+    )
+    axes.autoscale_view()
 
 
 def _fig_4_requests(scope: Scope) -> list[Request]:
@@ -119,7 +162,6 @@ def fig_4(store: Store, scope: Scope) -> Product:
 def _section(axes: Axes, p: ORing, store: Store) -> None:
     """The mesh and the walls, in z to the right and r downwards."""
     import meshio
-    from matplotlib.collections import PolyCollection
 
     found = store.contact(p)
     axes.set_axis_off()
@@ -129,9 +171,7 @@ def _section(axes: Axes, p: ORing, store: Store) -> None:
     name = number_text(p.sealed_pressure)
     mesh = meshio.read(store.run_folder(p) / f"contact_{name}.vtu")
     corners: Any = np.asarray(mesh.points)[mesh.cells[0].data][:, :, :2]
-    axes.add_collection(
-        PolyCollection(corners, facecolors="#e8eef4", edgecolors="0.35", linewidths=0.25)
-    )
+    _quads(axes, corners)
     rod, housing, half = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter, 0.5 * p.groove_width
     axes.plot([-1.2 * half, 1.2 * half], [rod, rod], color="black")
     axes.plot([-half, -half, half, half], [rod + 0.4, housing, housing, rod + 0.4], color="black")
@@ -145,5 +185,6 @@ def _section(axes: Axes, p: ORing, store: Store) -> None:
 ITEMS = (
     Item("table1", "Geometrical, process and material parameters", table_1),
     Item("table2", "Number of unknowns", table_2),
+    Item("fig3", "O-ring in the initial configuration", fig_3),
     Item("fig4", "O-ring in the deformed configuration", fig_4, _fig_4_requests),
 )

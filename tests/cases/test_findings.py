@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from softehl.cases.paper import findings_mesh
 from softehl.cases.paper.findings import FINDINGS
 from softehl.cases.paper.item import Scope
 from softehl.cases.paper.query import Query
@@ -56,6 +57,20 @@ def test_only_mild_oscillations_leave_the_film(
         return coarse if density == 4 else {}
 
     assert decided(32, told) is holds
+
+
+@pytest.mark.parametrize(
+    ("slow", "holds"),
+    [((0.03, 0.05, 0.2), True), ((0.03, 0.2, 0.1), False), ((0.0, 1e-3, 0.0), None)],
+)
+def test_only_ripples_that_can_be_seen_are_compared(
+    slow: tuple[float, ...], holds: bool | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ripples = dict(
+        zip((800.0, 400.0, 200.0, 100.0, 50.0, 25.0), (2e-7, 1e-7, 0.0, *slow), strict=True)
+    )
+    monkeypatch.setattr(findings_mesh, "ripple", lambda state: ripples[state.rod_speed])
+    assert decided(30, lambda *_, **__: {}) is holds
 
 
 @pytest.mark.parametrize(

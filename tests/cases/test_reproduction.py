@@ -29,7 +29,7 @@ from softehl.cases.seal.state import FilmRow
 from softehl.runtime.io import write_csv, write_json
 
 SMALL = Scope(density=1, speeds=(1600.0,), pressures=(1.0,))
-"""Every item from density 1, p_s = 1 MPa, |U| = 1600 mm/s: 22 runs."""
+"""Every item from density 1, p_s = 1 MPa, |U| = 1600 mm/s: 28 runs."""
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -92,7 +92,7 @@ def test_an_unknown_item_is_named_with_the_list(
     target = tmp_path / "out"
     assert softehl.main(["reproduce", "fig99", "--out", str(target)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "'fig99' (did you mean 'fig9'?); allowed: table1, table2, fig4" in line
+    assert "'fig99' (did you mean 'fig9'?); allowed: table1, table2, fig3" in line
     assert not target.exists()
 
 
@@ -316,3 +316,14 @@ def test_the_page_takes_its_tables_from_files(tmp_path: Path) -> None:
 def test_bad_input_is_one_line() -> None:
     with pytest.raises(BadInput, match="allowed: table1"):
         reproduce_items(["figure 7"], Scope(), Path("nowhere"), resume=False, jobs=1)
+
+
+def test_what_holds_no_tension_back_lets_the_pressure_fall(tmp_path: Path) -> None:
+    scope = Scope(density=2, speeds=(1600.0,), pressures=(1.0,))
+    assert reproduce_items(["cavitation"], scope, tmp_path, resume=False, jobs=1) == 0
+    with (tmp_path / "cavitation.csv").open(encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert -0.05 < float(row["least_p_MPa"]) < 0.0
+    assert float(row["least_p_without_MPa"]) < -0.3
+    assert abs(float(row["h_star_change_percent"])) < 0.1
+    assert float(row["friction_change_percent"]) > 1.0
