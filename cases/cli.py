@@ -4,6 +4,7 @@ What is heavy is imported when a command needs it.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -65,6 +66,13 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
     help="petsc: factors by MUMPS on all processes that mpirun started (the key linear).",
 )
 @click.option("--quiet", is_flag=True, help="No progress and no table.")
+@click.option(
+    "--pictures",
+    type=click.Choice(["png", "svg", "both", "none"]),
+    default="png",
+    show_default=True,
+    help="Files of the pictures; with --resume a finished run draws them again.",
+)
 @click.option("--report", is_flag=True, help="Write report.html, as `softehl report DIR` does.")
 def run(
     case: str,
@@ -77,12 +85,14 @@ def run(
     jobs: int,
     engine: str,
     quiet: bool,
+    pictures: str,
     report: bool,
 ) -> int:
     """Run a case."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.earlier import existing_of
     from softehl.cases.harness.engine import leading
+    from softehl.cases.harness.pictures import CHOICES
     from softehl.cases.harness.session import run_case
 
     options = {} if tolerance is None else {"tolerance": tolerance.strip().removesuffix("%")}
@@ -94,6 +104,7 @@ def run(
         if engine == "petsc":
             assignments = (*assignments, _by_petsc(case))
         read = read_case(case, SHIPPED, assignments, options)
+        read = replace(read, pictures=CHOICES[pictures])
         target = Path("results", read.case.name) if folder is None else folder
         existing = existing_of(resume=resume, overwrite=overwrite)
         code = run_case(read, target, existing, jobs=jobs, quiet=quiet)
@@ -180,6 +191,8 @@ def _write_report(folders: tuple[Path, ...], path: Path, *, xlsx: bool, quiet: b
     from softehl.cases.harness.errors import BadInput
     from softehl.cases.harness.report.page import parts_of, read_finished, write_page, write_xlsx
 
+    if path.suffix not in (".html", ".htm"):
+        raise BadInput(f'--out {str(path)!r}: a report is a page; allowed: a name with ".html"')
     runs = [read_finished(folder, SHIPPED) for folder in folders]
     try:
         parts = parts_of(runs)
@@ -228,15 +241,16 @@ def keys(case: str) -> int:
     As in `softehl design oring "friction -10%" --by rod_diameter`: by exact sensitivities, checked
     by a nonlinear solve. The film is that of the first speed, at outstroke unless stroke = in. Exit
     code: 0 done, 2 bad input or out of reach.
-    """
+    """,
+    context_settings={"ignore_unknown_options": True},  # a target that begins with a minus sign
 )
 @click.argument("case", metavar="CASE")
-@click.argument("target", metavar="TARGET")
+@click.argument("words", metavar="TARGET", nargs=-1, required=True)
 @click.option("--by", "key", metavar="KEY", required=True, help="The key that is to be changed.")
 @click.option(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
 )
-def design(case: str, target: str, key: str, assignments: tuple[str, ...]) -> int:
+def design(case: str, words: tuple[str, ...], key: str, assignments: tuple[str, ...]) -> int:
     """Find the value of a key."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.errors import BadInput
@@ -244,9 +258,9 @@ def design(case: str, target: str, key: str, assignments: tuple[str, ...]) -> in
     from softehl.cases.seal.parameters import ORing
 
     read = read_case(case, SHIPPED, assignments)
-    if not isinstance(read.parameters, ORing):
+    if type(read.parameters) is not ORing:
         raise BadInput(f"{read.case.name} has no sensitivities; allowed: a seal, such as oring")
-    return design_case(read.parameters, target, key)
+    return design_case(read.parameters, " ".join(words), key)
 
 
 @click.command()

@@ -43,6 +43,11 @@ SHIPPED = {
     "film_rough": Shipped(2, 4, fields=True),
     "film_upwind_rough": Shipped(2, 4),
     "film_void": Shipped(1, 2),
+    **{
+        f"{film}_{oil}": Shipped(2, 4, fields=True)
+        for film in ("film", "film_conserving")
+        for oil in ("eyring", "carreau")
+    },
     "film_squeeze": Shipped(2, 4, fields=True),
     "film_squeeze_rough": Shipped(2, 4, fields=True),
     "mean_rotation": Shipped(4, 9, energy=True),
@@ -89,5 +94,8 @@ VALUES = {
     "cavitation_pressure": 0.0,
     "pressure_scale": 1.0,
     "void_scale": 1e-3,
+    "critical_stress": 0.05,
+    "thinning_exponent": 0.5,
+    "thinning_plateau": 0.1,
 }
 """A value of every parameter (mm, MPa, N, s)."""

@@ -102,10 +102,18 @@ class Case(Generic[P, R]):
         """What is to be known of rows that are results, but not plain ones."""
         return []
 
-    def draw(self, parameters: P, folder: Path, rows: Sequence[R], rejected: Sequence[R]) -> None:
+    def draw(
+        self,
+        parameters: P,
+        folder: Path,
+        rows: Sequence[R],
+        rejected: Sequence[R],
+        kinds: Sequence[str],
+    ) -> None:
         """Write pictures of a run; the files of its rows can be read from the folder.
 
-        Raises OSError, and ValueError where a file cannot be read back.
+        kinds: of the files of each picture, png or svg; none if empty. Raises OSError, and
+        ValueError where a file cannot be read back.
         """
 
     def report(self, runs: Sequence[Any]) -> Sequence[Any]:
@@ -133,13 +141,14 @@ class Run:
     """A case with its checked parameters.
 
     shared: folder in which runs leave something for each other, None for none.  given: the keys
-    that a user gave.
+    that a user gave.  pictures: see `Case.draw`.
     """
 
     case: AnyCase
     parameters: Any
     shared: Path | None = None
     given: frozenset[str] = frozenset()
+    pictures: tuple[str, ...] = ("png",)
 
     def solve(self, parameters: Any, observer: Observer) -> Outcome:
         """Run the case with these parameters."""

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from softehl.cases.harness.case import Case, P, R
 from softehl.cases.harness.observer import Observer, Outcome, State
-from softehl.cases.harness.pictures import draw_columns
+from softehl.cases.harness.pictures import KINDS, draw_columns
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.io import read_table
 from softehl.runtime.solve.solution import Solution, Status
 
-PICTURE = "rows.png"
+PICTURE = "rows"
 
 
 class RowByRow(Case[P, R]):
@@ -19,7 +19,7 @@ class RowByRow(Case[P, R]):
     pictured: columns of the first file of each row that are drawn, over the first of them.
     """
 
-    files = (PICTURE,)
+    files = tuple(f"{PICTURE}.{kind}" for kind in KINDS)
     pictured: tuple[str, ...] = ()
 
     def solution(self, parameters: P, key: float) -> tuple[Problem, Solution]:
@@ -52,12 +52,19 @@ class RowByRow(Case[P, R]):
             observer.state(states[-1])
         return self._outcome(states, ended)
 
-    def draw(self, parameters: P, folder: Path, rows: Sequence[R], rejected: Sequence[R]) -> None:
+    def draw(
+        self,
+        parameters: P,
+        folder: Path,
+        rows: Sequence[R],
+        rejected: Sequence[R],
+        kinds: Sequence[str],
+    ) -> None:
         """See :class:`Case`."""
-        if self.pictured:
+        if self.pictured and kinds:
             first = {row.label(row.key): row.file_names()[0] for row in rows}
             tables = {label: read_table(folder / name) for label, name in first.items()}
-            draw_columns(folder / PICTURE, tables, self.pictured)
+            draw_columns(folder / PICTURE, tables, self.pictured, kinds)
 
     def _outcome(
         self, states: Sequence[State], ended: Sequence[tuple[float, Problem, Solution]]

@@ -170,7 +170,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
     """Draw and print the curve, and say what is missing."""
     case, rows, rejected = record.run.case, record.curve.rows, record.rejected.rows
     if rows:
-        case.draw(record.run.parameters, record.folder, rows, rejected)
+        case.draw(record.run.parameters, record.folder, rows, rejected, record.run.pictures)
     if not quiet and (rows or rejected):
         table.print_rows(case, rows, rejected)
         if words := case.assumed(record.run.parameters, record.run.given):

@@ -28,7 +28,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 standalone_mode=False,
             )
         except click.ClickException as error:
-            click.echo(f"softehl: {' '.join(error.format_message().split())}", err=True)
+            hint, words = _hint(error), error.format_message()
+            words = f"{words.removesuffix('.')}; {hint}" if hint else words
+            click.echo(f"softehl: {' '.join(words.split())}", err=True)
             return error.exit_code
         except SymPyNeededError as error:
             click.echo(f"softehl: {error}", err=True)
@@ -40,6 +42,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
             click.echo(f"softehl: ended by {end}; what was reached is saved", err=True)
             return 128 + end.number
         return code if isinstance(code, int) else 0
+
+
+def _hint(error: "click.ClickException") -> str:
+    """How keys are set, where a command that has some was given what looks like one."""
+    import click
+
+    if not isinstance(error, click.UsageError) or error.ctx is None:
+        return ""
+    if "assignments" not in [option.name for option in error.ctx.command.params]:
+        return ""
+    how = "a key of the case is set by --set KEY=VALUE"
+    if isinstance(error, click.NoSuchOption):
+        key = error.option_name.lstrip("-")
+        return "" if error.possibilities else f"{how}, as in --set {key}=..."
+    return how if "unexpected extra argument" in error.format_message() else ""
 
 
 def _commands() -> "click.Group":

@@ -52,7 +52,8 @@ HEADER = (
     "groove_pressure_MPa,h_min_sealed_um,h_min_air_um,flux_mismatch_percent,density,verdict"
 )
 FAST = ("--set", "speeds=[400, 100]")
-PLOTS = {f"{name}.{kind}" for name in PICTURES for kind in ("png", "svg")}
+PLOTS = {f"{name}.png" for name in PICTURES}
+SVG = {f"{name}.svg" for name in PICTURES}
 FILES = {
     *("run.json", "curve.csv", "leakage.csv"),
     *("contact_1.csv", "contact_1.vtu"),
@@ -278,6 +279,14 @@ BAD = {
     "no value": (["oring", "--set", "density"], "KEY=VALUE"),
     "geometry": (["oring", "--set", "rod_diameter=40"], "gap between rod and housing"),
     "unknown case": (["o-ring"], "did you mean 'oring'"),
+    "capitals": (["ORING"], "did you mean 'oring'"),
+    "key as an option": (
+        ["oring", "--ring", "AS568-210"],
+        "; a key of the case is set by --set KEY=VALUE, as in --set ring=...",
+    ),
+    "key without an option": (["oring", "ring=AS568-210"], "; a key of the case is set by --set"),
+    "option misspelt": (["oring", "--overwite"], "Did you mean '--overwrite'?"),
+    "pictures": (["oring", "--pictures", "pdf"], "'pdf' is not one of 'png', 'svg', 'both'"),
     "missing file": (["missing.toml"], "no case or file 'missing.toml'"),
     "folder for file": (["."], "cannot read the case file"),
     "broken file": (["broken.toml"], "broken.toml: not a TOML file"),
@@ -428,10 +437,20 @@ def test_quiet(here: Path, invoke: Invoke) -> None:
 
 
 def test_plots_are_the_same_every_time(here: Path, invoke: Invoke) -> None:
-    invoke("run", "oring", *FAST, "--out", "a", plots=True)
-    invoke("run", "oring", *FAST, "--out", "b", plots=True)
-    for name in PLOTS:
+    invoke("run", "oring", *FAST, "--out", "a", "--pictures", "both", plots=True)
+    invoke("run", "oring", *FAST, "--out", "b", "--pictures", "both", plots=True)
+    for name in PLOTS | SVG:
         assert (here / "a" / name).read_bytes() == (here / "b" / name).read_bytes()
+
+
+def test_pictures_of_the_kind_that_was_asked_for(here: Path, invoke: Invoke) -> None:
+    """Asked again of a finished run they are drawn again, and those of before do not stay."""
+    invoke("run", "oring", *FAST, "--out", "a", "--pictures", "none", plots=True)
+    assert names(here / "a") == FILES
+    invoke("run", "oring", *FAST, "--out", "a", "--resume", "--pictures", "svg", plots=True)
+    assert names(here / "a") == FILES | SVG
+    invoke("run", "oring", *FAST, "--out", "a", "--resume", plots=True)
+    assert names(here / "a") == FILES | PLOTS
 
 
 def test_strokes_side_by_side(here: Path, invoke: Invoke) -> None:

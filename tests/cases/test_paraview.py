@@ -81,9 +81,22 @@ def volumes(points: Array, cells: Integers) -> Array:
     return total
 
 
+def beside(x: Array, p: Array, at: Array) -> list[Array]:
+    """p (n,) known at x (n,), at places (m,): between two points and on the line of either side.
+
+    Behind the exit of a lobe pressure has a pit at a node, which no line across the node shows.
+    """
+    i = np.clip(np.searchsorted(x, at), 2, len(x) - 2)
+    sides = [p[j] + (at - x[j]) * (p[j + 1] - p[j]) / (x[j + 1] - x[j]) for j in (i - 2, i)]
+    return [np.interp(at, x, p), *sides]
+
+
 @pytest.mark.parametrize(
     "changes",
-    [{"density": 1}, pytest.param({"density": 1, **X_RING}, marks=pytest.mark.slow)],
+    [
+        {"density": 1},
+        pytest.param({"density": 2, **X_RING}, marks=pytest.mark.slow),
+    ],
     ids=["round", "x_ring"],
 )
 def test_what_a_run_writes_of_its_sections(changes: dict[str, Any], tmp_path: Path) -> None:
@@ -107,8 +120,8 @@ def test_what_a_run_writes_of_its_sections(changes: dict[str, Any], tmp_path: Pa
     np.testing.assert_allclose(found.prod(axis=1), ratio, rtol=0.02)
     nodes = np.flatnonzero(nodal["rod_pressure"])
     x, film = state.profile.x_mm, state.profile.p_MPa
-    near = np.interp(points[nodes, 0], x, film)
-    np.testing.assert_allclose(nodal["rod_pressure"][nodes], near, atol=0.02 * film.max())
+    away = [nodal["rod_pressure"][nodes] - near for near in beside(x, film, points[nodes, 0])]
+    assert np.abs(away).min(axis=0).max() < 0.02 * film.max()
     np.testing.assert_array_less(points[nodes, 1], 0.5 * p.rod_diameter + 0.5)  # beside the rod
 
 

@@ -100,6 +100,11 @@ def test_what_is_no_run_is_one_line(
     assert not (tmp_path / "report.html").exists()
 
 
+def test_a_report_is_no_pdf(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", str(tmp_path), "--out", str(tmp_path / "report.pdf")]) == 2
+    assert 'a report is a page; allowed: a name with ".html"' in capsys.readouterr().err
+
+
 # --- in a browser -------------------------------------------------------------------------------
 
 

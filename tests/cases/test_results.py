@@ -1,6 +1,7 @@
 """Verdicts on films, and the numbers of a film that is known in closed form."""
 
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.path import PathSettings
 from softehl.cases.seal.results import (
     contact_pressure,
+    end_gap,
     film_numbers,
     film_state,
     inlet_ratio,
@@ -34,8 +36,9 @@ HEALTHY = FilmNumbers(
     jump=0.0,
     oscillation=0.03,
     inlet_segments=5.0,
+    drag=5.0,
 )
-SLOWER = replace(HEALTHY, speed=200.0, h_star=1.36e-3 * 0.5**0.6, friction=3.7)
+SLOWER = replace(HEALTHY, speed=200.0, h_star=1.36e-3 * 0.5**0.6, friction=3.7, drag=3.7)
 
 
 def _verdict(*films: FilmNumbers) -> Verdict:
@@ -51,20 +54,25 @@ def test_a_film_that_follows_the_power_law_is_believed() -> None:
     assert verdict.advice == ""
 
 
+def test_friction_that_rises_by_the_slope_of_the_pressure_is_believed() -> None:
+    # under a thick film the pressure pushes the rod by h p' / 2, the less the thinner the film
+    assert _verdict(HEALTHY, replace(SLOWER, friction=5.2)).word == OK
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
         ({"p_max": 4.8}, "1.06 MPa above"),
-        ({"friction": 5.2}, "friction on the rod rises"),
+        ({"drag": 5.2}, "drag on the rod rises"),
         ({"h_star": 0.5e-3}, "thickness falls too fast"),
         ({"h_star": -1e-6}, "thickness falls too fast"),
     ],
 )
 def test_each_sign_of_collapse_is_seen(change: dict[str, Any], reason: str, sign: float) -> None:
     slower = replace(SLOWER, **change)
-    instroke = replace(slower, friction=sign * slower.friction)
-    verdict = _verdict(replace(HEALTHY, friction=sign * 5.0), instroke)
+    instroke = replace(slower, drag=sign * slower.drag)
+    verdict = _verdict(replace(HEALTHY, drag=sign * 5.0), instroke)
     assert verdict.word == COLLAPSED
     assert reason in verdict.advice
     assert "finer mesh" in verdict.advice
@@ -86,7 +94,7 @@ def test_doubtful_films_are_labelled_each_for_itself(
     assert verdict.word == word
     assert reason in verdict.advice
     assert "larger density" in verdict.advice
-    slower = replace(SLOWER, speed=100.0, h_star=0.6e-3, friction=2.7)
+    slower = replace(SLOWER, speed=100.0, h_star=0.6e-3, friction=2.7, drag=2.7)
     assert verdict.after(slower).word == (COLLAPSED if word == COLLAPSED else OK)
 
 
@@ -216,3 +224,13 @@ def test_the_inlet_of_an_exact_film_has_the_ratio_one(speed: float) -> None:
     stroke: Stroke = "out" if speed > 0 else "in"
     film = FilmLoads(1.0, stroke, abs(speed), np.empty(0), np.empty(0))
     assert inlet_ratio(at, film, h_star) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("z", "h", "gap"),
+    [((0.0, 1.0), (0.1, 0.2), 0.2), ((0.0, 0.0), (0.1, 0.2), inf), ((0.0, 0.01), (0.1, 0.2), inf)],
+)
+def test_a_film_that_ends_at_a_wall_has_no_exit(
+    z: tuple[float, float], h: tuple[float, float], gap: float
+) -> None:
+    assert end_gap(np.array(z), np.array(h)) == gap

@@ -5,20 +5,24 @@ Bounded to 15 minutes. The exit code is 1 if anything was lost or ended in a tra
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import random
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+from tests.mpi.test_engine import mpiexec
 from tests.torture.trials import (
     CASE,
     DAMAGES,
     PAGE,
     RUN,
     Clock,
+    Ended,
     Tally,
     begun,
     curve,
@@ -219,14 +223,47 @@ def _half_tables(folder: Path) -> str:
     return ""
 
 
+def engines(work: Path, clock: Clock, rng: random.Random, tally: Tally) -> None:
+    """The same study by one process, by two, by workers of Dask and by MPI: equal tables."""
+    (work / "study.toml").write_text(STUDY)
+    command = ("sweep", "study.toml", "--quiet", "--out")
+    tally.count(done(*command, "alone", cwd=work).fault)
+    expected = (work / "alone" / "sweep.csv").read_bytes()
+    ways: dict[str, Callable[[], Ended]] = {
+        "processes": lambda: done(*command, "processes", "--jobs", "2", cwd=work)
+    }
+    if importlib.util.find_spec("distributed"):
+        ways["Dask"] = lambda: _by_dask(work, *command, "Dask")
+    if importlib.util.find_spec("mpi4py"):
+        mpi = (*mpiexec(3), sys.executable, "-m", "mpi4py.futures")
+        ways["MPI"] = lambda: done(*command, "MPI", "--mpi", cwd=work, by=mpi)
+    tally.name = f"a study of 200 runs on {', '.join(ways)}"
+    for name, way in ways.items():
+        end = way()
+        path = work / name / "sweep.csv"
+        equal = path.exists() and path.read_bytes() == expected
+        tally.count(end.fault or ("" if equal else f"{name}: another table; {end.err[-200:]}"))
+
+
+def _by_dask(work: Path, *command: str) -> Ended:
+    """A study on two workers of a scheduler of its own."""
+    from distributed import LocalCluster
+
+    given: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}
+    cluster: Any = LocalCluster(2, **given)  # type: ignore[no-untyped-call]
+    with cluster:
+        return done(*command, "--dask", cluster.scheduler_address, cwd=work)
+
+
 GROUPS = (
-    (kills, 0.25, "kill -9 of a run", "no half file, nothing lost; resumed to the same curve"),
+    (kills, 0.2, "kill -9 of a run", "no half file, nothing lost; resumed to the same curve"),
     (sweeps, 0.1, "kill -9 of a sweep", "no half file; begun again it ends"),
-    (studies, 0.1, "kill -9 of a study of 200 runs", "resumed to the same table, byte by byte"),
+    (studies, 0.15, "kill -9 of a study of 200 runs", "resumed to the same table, byte by byte"),
+    (engines, 0.05, "a study of 200 runs on processes, Dask, MPI", "equal tables, byte by byte"),
     (pairs, 0.1, "two processes at once", "one of them, or both, right; the other says why not"),
     (
         damages,
-        0.2,
+        0.15,
         "a damaged file of a run",
         "computed again or refused in one line; never believed",
     ),

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -68,9 +69,15 @@ class Ended:
 
 
 def begun(
-    *arguments: str, cwd: Path, cache: Path | None = None, largest: int | None = None
+    *arguments: str,
+    cwd: Path,
+    cache: Path | None = None,
+    largest: int | None = None,
+    by: Sequence[str] = (),
 ) -> subprocess.Popen[str]:
-    """A command in a session of its own. largest: bytes that a file may have."""
+    """A command in a session of its own. largest: bytes that a file may have; by: what starts
+    softehl instead of Python alone.
+    """
     environment = dict(os.environ)
     if cache is not None:
         environment["SOFTEHL_CACHE"] = str(cache)
@@ -83,7 +90,7 @@ def begun(
             resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
 
     return subprocess.Popen(
-        [sys.executable, "-m", "softehl", *arguments],
+        [*(by or (sys.executable,)), "-m", "softehl", *arguments],
         cwd=cwd,
         env=environment,
         start_new_session=True,
@@ -101,10 +108,14 @@ def ended(process: subprocess.Popen[str]) -> Ended:
 
 
 def done(
-    *arguments: str, cwd: Path, cache: Path | None = None, largest: int | None = None
+    *arguments: str,
+    cwd: Path,
+    cache: Path | None = None,
+    largest: int | None = None,
+    by: Sequence[str] = (),
 ) -> Ended:
     """How a command ended."""
-    return ended(begun(*arguments, cwd=cwd, cache=cache, largest=largest))
+    return ended(begun(*arguments, cwd=cwd, cache=cache, largest=largest, by=by))
 
 
 def killed(process: subprocess.Popen[str], after: float) -> bool:

@@ -27,6 +27,8 @@ def read_finished(folder: Path, shipped: Mapping[str, str]) -> FinishedRun:
         raise BadInput(f"{folder} holds no run (there is no run.json); allowed: the DIR of a run")
     try:
         content = read_json(folder / "run.json")
+        if "points" in content:
+            raise BadInput(f"{folder} holds a sweep; allowed: its runs, as in {folder}/runs/00001")
         case = load_case(shipped[content["case"]])
         parameters = case.parameters(**content["parameters"])
         curve, rejected = (CurveFolder(f, case.row) for f in (folder, folder / "rejected"))
