@@ -19,6 +19,7 @@ from PIL import Image
 
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.sections.d_ring import DRing
+from softehl.cases.seal.sections.keys import capped
 from softehl.cases.seal.sections.rectangular import Rectangular
 from softehl.cases.seal.sections.trapezoid import Trapezoid
 from softehl.cases.seal.sections.u_cup import UCup
@@ -26,7 +27,10 @@ from softehl.cases.seal.sections.x_ring import XRing
 from softehl.runtime.mesh.outline import Point, Shape
 from softehl.runtime.mesh.outline_mesh import outline_mesh
 
-FILM, PRESSURE, BODY = "#1b6ca8", "#c8553d", "#f2e3c0"
+FILM, PRESSURE, BODY, CAP = "#1b6ca8", "#c8553d", "#f2e3c0", "#b9c4cf"
+CAP_THICKNESS = 0.6
+"""Of the drawing, mm: that of the command beside it."""
+
 _STYLE: Any = {"font.size": 7.5, "axes.linewidth": 0.6, "figure.dpi": 130}
 _ARROW = {"arrowstyle": "<->", "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0, "color": "#3b3f45"}
 _POINTER = {**_ARROW, "arrowstyle": "->"}
@@ -38,6 +42,7 @@ def main(folder: Path) -> None:
     with matplotlib.rc_context(_STYLE):
         for name in SECTIONS:
             save(drawing(name), folder / f"section_{name}.png")
+        save(cap(), folder / "section_capped.png")
         save(meshes(), folder / "section_meshes.png")
 
 
@@ -59,6 +64,27 @@ def drawing(name: str) -> Figure:
     axes.set_aspect("equal")
     axes.set_xlim(a - 1.0, c + 1.0)
     axes.set_ylim(b - 0.95, d + 0.95)
+    axes.set_axis_off()
+    return figure
+
+
+def cap() -> Figure:
+    """A square ring with a cap on the side of the rod."""
+    section = Rectangular()
+    shape = capped(section.shape(2.0 * section.height), CAP_THICKNESS)
+    figure = Figure(figsize=(3.4, 2.9))
+    axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
+    outline_of(axes, shape)
+    near = shape.parts[0]
+    axes.fill(*near.at(np.linspace(0.0, near.length, 800)).T, color=CAP, zorder=0.5)
+    a, b, c, d = shape.outline.box
+    axes.plot([a, c], [b + CAP_THICKNESS] * 2, color="#3b3f45", linewidth=0.9)
+    span(axes, (c + 0.2, b), (c + 0.2, b + CAP_THICKNESS), "cap_thickness", upright=True)
+    axes.text(0.0, b + 0.5 * CAP_THICKNESS, "materials.cap", ha="center", va="center")
+    axes.text(0.0, 0.5 * (b + d), "the material of the seal", ha="center", va="center")
+    axes.set_aspect("equal")
+    axes.set_xlim(a - 0.3, c + 0.7)
+    axes.set_ylim(b - 0.3, d + 0.3)
     axes.set_axis_off()
     return figure
 

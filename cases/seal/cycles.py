@@ -14,8 +14,8 @@ from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import build_system
 from softehl.cases.seal.failure import explained
 from softehl.cases.seal.film import FastFilm
+from softehl.cases.seal.film_path import BuiltFilm, FilmPath
 from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.method import BuiltFilm, FilmPath
 from softehl.cases.seal.motion import Motion
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
