@@ -219,6 +219,8 @@ def slowly(parameters: ORing, observer: Observer) -> Any:
 
 
 def run_slowly(folder: str) -> None:
+    # ignored where the tests themselves run in the background
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     oring.CASE = Fake(slowly)
     sys.exit(softehl.main(["run", "oring", *FAST, "--quiet", "--out", folder]))
 
