@@ -1,0 +1,242 @@
+"""The films of a stroke on one mesh: each is judged, and reported or held for a better one.
+
+What changes along a stroke on a mesh is a `StrokeState`, what is left of it for other meshes a
+`Wanted`; everything else is frozen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import nan
+from typing import TypeAlias
+
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.coarser_films import CoarserFilms
+from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.estimate import h_star_error
+from softehl.cases.seal.film_path import BuiltFilm, FilmPath, OnSpeed, below
+from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
+from softehl.cases.seal.overlap import overlap
+from softehl.cases.seal.path import StageFailed
+from softehl.cases.seal.results import (
+    contact_peaks,
+    contact_pressure,
+    film_numbers,
+    film_state,
+    unsealed,
+)
+from softehl.cases.seal.sensitivity import rates_of, sensitivities
+from softehl.cases.seal.sensitivity_table import resolved
+from softehl.cases.seal.state import FilmState, doubt
+from softehl.cases.seal.verdict import ANY_RATIO, INLET_RATIO, Verdict, fewest_inlet_segments
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.design import Inputs
+from softehl.runtime.solve.linear import SingularMatrix
+from softehl.runtime.solve.solution import Point
+
+MESHES = 2
+"""How many meshes may be made for the films of a stroke on a section that is not round, one after
+the other, where they are not `ok` on the one before."""
+
+
+@dataclass
+class Wanted:
+    """What is still to be reported of a stroke, on one mesh after the other.
+
+    report: takes a state for good. left: |U| without one, mm/s, in the order in which they are
+    solved. held: by |U|, the state least in doubt of those that another mesh may better. last: the
+    slowest film on the mesh in use, and its unknowns.
+    """
+
+    report: Callable[[FilmState], None]
+    left: tuple[float, ...]
+    held: dict[float, FilmState] = field(default_factory=dict)
+    last: BuiltFilm | None = None
+
+    def found(self, state: FilmState, *, final: bool) -> None:
+        """A state; it is held if it is not `ok`, unless it is final."""
+        speed = abs(state.rod_speed_mm_s)
+        if final or state.verdict == OK:
+            self.left = tuple(u for u in self.left if u != speed)
+            self.report(state)
+        else:
+            self.held[speed] = min(self.held.get(speed, state), state, key=doubt)
+
+    def close(self) -> None:
+        """No other mesh follows: what is held is reported."""
+        for speed in self.left:
+            if speed in self.held:
+                self.found(self.held[speed], final=True)
+
+
+@dataclass
+class StrokeState:
+    """What changes along a stroke on a mesh.
+
+    verdict: on the films so far. slowest: the slowest film that was solved, and its unknowns.
+    missing: speeds that are wanted and were not reached yet.
+    """
+
+    verdict: Verdict
+    missing: set[float]
+    slowest: BuiltFilm | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SealRun:
+    """A system whose contact state x is known, with what is needed for its films.
+
+    coarser: the films of a coarser mesh, which are no results, and its contact state. better: the
+    same on a mesh that is made for a film, None where there is none. meshes: how many such meshes
+    may follow. rates: of the inputs of the film by each parameter, once they were asked for.
+    """
+
+    path: FilmPath
+    x: Array
+    coarser: tuple[FilmPath, Array] | None = None
+    better: Better | None = None
+    meshes: int = 0
+    rates: dict[str, Inputs] = field(default_factory=dict)
+
+    @property
+    def system(self) -> SealSystem:
+        """The system that is solved."""
+        return self.path.system
+
+    def on_meshes(self, stroke: Stroke, wanted: Wanted) -> tuple[StageFailed | None, SealRun]:
+        """A stroke, and once more what is not `ok` on a mesh that is made for its film.
+
+        With the run on the last of these meshes: it is also the better one for the other stroke.
+        """
+        seal, failed = self, self.stroke(stroke, wanted)
+        while seal.better and seal.meshes and wanted.left and wanted.last:
+            seal = seal.better(seal, wanted.last) or replace(seal, meshes=0)
+            failed = seal.stroke(stroke, wanted)
+        wanted.close()
+        return failed if wanted.left else None, replace(seal, meshes=self.meshes)
+
+    def stroke(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
+        """Second and third stage of one stroke; why it ended early, if it did."""
+        wanted.last = None
+        p, path = self.system.parameters, self.path
+        reference = float(contact_pressure(self.system, p.sealed_pressure, self.x).max())
+        references = contact_peaks(self.system, p.sealed_pressure, self.x)
+        fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
+        ratios = ANY_RATIO if p.mesh == "uniform" else INLET_RATIO
+        known = _known(*self.coarser, stroke, self.system) if self.coarser else None
+        coarser = known.thicknesses if known else {}
+        verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
+        verdict = replace(
+            verdict,
+            unsealed=unsealed(self.system, self.x),
+            references=references,
+            overlap=overlap(self.system, self.x),
+        )
+        progress = StrokeState(verdict, set(wanted.left))
+
+        def on_speed(film: FilmLoads, point: Point) -> None:
+            self._judge(wanted, progress, coarser, film, point)
+
+        if p.rough:
+            return path.rise(stroke, self.x, on_speed)
+        if known:
+            path.carried(stroke, self.x, known, on_speed)
+        if progress.slowest and progress.missing:
+            path.onward(*progress.slowest, on_speed)
+        start = path.begun(stroke, self.x, on_speed) if progress.missing else None
+        if start is None or (self.meshes and progress.slowest):
+            return None
+        if self.better and self.meshes < MESHES and progress.slowest is None:
+            return path.without_film(*start)
+        built = progress.slowest or path.build(*start)
+        left = p.speeds if progress.slowest is None else below(p.speeds, progress.slowest[0].speed)
+        failed = path.slower(built, left, on_speed)
+        if failed is None:
+            return None
+        last = progress.verdict.last
+        self._from_higher_order(stroke, progress, on_speed)
+        return replace(failed, last=last) if progress.missing else None
+
+    def _judge(
+        self,
+        wanted: Wanted,
+        progress: StrokeState,
+        coarser: Mapping[float, float],
+        film: FilmLoads,
+        point: Point,
+    ) -> None:
+        """Look at a film of falling speed; one at a requested speed becomes a state."""
+        system, x = self.system, point.solution.x
+        falling = not system.parameters.rough
+        if falling and progress.slowest and not film.speed < progress.slowest[0].speed:
+            return  # a slower film is known already
+        progress.slowest = wanted.last = film, x
+        problem = system.film_problem(film)
+        progress.verdict = progress.verdict.after(film_numbers(system, problem, film, x))
+        if film.speed not in progress.missing:
+            return
+        progress.missing.discard(film.speed)
+        iterations = point.solution.iterations
+        p, last = system.parameters, progress.verdict.last
+        assert last is not None
+        error = h_star_error(p.density, last.h_star, coarser.get(film.speed, nan))
+        estimated = p.error_estimate and p.mesh == "graded"
+        verdict = replace(progress.verdict, error=error if estimated else None)
+        state = film_state(system, problem, film, x, verdict, iterations)
+        state = replace(state, h_star_error_percent=error)
+        if p.sensitivity and resolved(state):
+            state = replace(state, sensitivity=self._differentiated(film, x))
+        wanted.found(state, final=self.better is None)
+
+    def _differentiated(
+        self, film: FilmLoads, x: Array
+    ) -> Mapping[str, Mapping[str, float]] | None:
+        """Sensitivities of a film x (n,); none where its tangent has no usable factors."""
+        self.rates.update(rates_of(self.system, film, self.rates))
+        try:
+            linear = self.path.driver.newton.linear
+            return sensitivities(self.system, film, x, linear, self.rates)
+        except SingularMatrix:
+            return None
+
+    def _from_higher_order(self, stroke: Stroke, progress: StrokeState, on_speed: OnSpeed) -> None:
+        """The speeds that a low pressure order did not reach by itself, as far as possible."""
+        low, driver = self.system, self.path.driver
+        if low.parameters.pressure_order >= REFERENCE_ORDER or low.parameters.rubs:
+            return
+        pair, missing = OrderPair.of(low), tuple(sorted(progress.missing, reverse=True))
+        high = FilmPath(pair.high, self.path.settings, driver.named(f"order {REFERENCE_ORDER}: "))
+        found: dict[float, BuiltFilm] = {}
+
+        def keep(at: FilmLoads, point: Point) -> None:
+            if at.speed in missing:
+                found[at.speed] = at, point.solution.x
+
+        start = next(high.starts(stroke, transferred(self.x, low, pair.high)))
+        high.slower(high.build(*start), missing, keep)
+        for at, x in found.values():
+            both = driver.follow(pair.stage(self.path.settings, at), pair.start(x))
+            if isinstance(both, StageFailed):
+                continue
+            solution = driver.newton.solve(low.film_problem(at), pair.low_part(both))
+            if solution.converged:
+                on_speed(at, Point(1.0, solution))
+
+
+Better: TypeAlias = Callable[[SealRun, BuiltFilm], SealRun | None]
+
+
+def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> CoarserFilms:
+    """The films at the requested speeds, as far as they are reached; nothing is reported."""
+    known, speeds = CoarserFilms(path.system, finer, x), path.system.parameters.speeds
+
+    def keep(film: FilmLoads, point: Point) -> None:
+        if film.speed in speeds:
+            problem, y = path.system.film_problem(film), point.solution.x
+            known.films[film.speed] = y
+            known.thicknesses[film.speed] = film_numbers(path.system, problem, film, y).h_star
+
+    path.films(stroke, x, keep)
+    return known
