@@ -222,26 +222,21 @@ class FastFilm:
         """The stage of falling speed, to the full tolerance."""
         return replace(self._stage(stage, self.corrector, _SPEED_STEPS), predictor="parabola")
 
-    def carried(self, stage: Stage, known: CoarserFilms, x: Array) -> tuple[Stage, Array]:
-        """The stage of falling speed with the changes that a coarser mesh has seen, and its start.
+    def carried(
+        self, stage: Stage, known: CoarserFilms, before: float | None, x: Array
+    ) -> tuple[Stage, Array]:
+        """The stage of falling speed with the changes that another mesh has seen, and its start.
 
-        x: (n,) the contact state. The stage ends where these do not lead on. Raises SingularMatrix.
+        x: (n,) the film at the speed before, None: the contact state. The stage ends where these
+        do not lead on.
         """
-        begin = self.speed(stage)
-        corrector = self.corrector
-
-        def at(parameter: float, x: Array, change: Array) -> Array:
-            problem = begin.problem_at(parameter)
-            assert isinstance(problem, Layered)
-            return corrector.moved(problem, x, change)
 
         def guess(here: Point, parameter: float) -> Array:
-            before, speed = (abs(stage.shown(t)) for t in (here.parameter, parameter))
-            x = here.solution.x
-            return at(parameter, x, known.next(before, speed)) - x
+            return known.next(*(abs(stage.shown(t)) for t in (here.parameter, parameter)))
 
-        start = at(stage.start, x, known.built(abs(stage.shown(stage.start))))
-        return replace(begin, predictor=guess, steps=_FROM_SPEED_TO_SPEED), start
+        start = x + known.change(before, abs(stage.shown(stage.start)))
+        stage = replace(self.speed(stage), predictor=guess, steps=_FROM_SPEED_TO_SPEED)
+        return stage, start
 
     def rising(self, stage: Stage) -> Stage:
         """The stage of rising speed of a rough film, to the full tolerance, with its own steps."""

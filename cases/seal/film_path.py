@@ -31,7 +31,7 @@ from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.thinning import longer, thinned_film, thinning_stage
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import Condenser, SingularMatrix
+from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.solution import Branch, Point, Status
 
 _SOONER = 1e3
@@ -40,6 +40,10 @@ is as flat as the rod it is thicker than the gap that contact leaves, and fills 
 
 _POCKET = 5.0
 """Of `film_thickness`, above which oil is trapped rather than part of a thick film."""
+
+_PATIENT = 30
+"""Iterations of a film from another mesh where each has to reduce the residual: edges of contact in
+the corners of the groove may lie elsewhere."""
 
 OnSpeed = Callable[[FilmLoads, Point], None]
 BuiltFilm = tuple[FilmLoads, Array]
@@ -142,7 +146,7 @@ class FilmPath:
         y = self.driver.follow(fast.shear(replace(stage, start=stage.stop)), x)
         if isinstance(y, StageFailed):
             y = self.driver.follow(fast.shear(stage), x)
-        if isinstance(y, StageFailed) and y.branch.points:
+        if isinstance(y, StageFailed) and y.branch.points and self.tolerance is None:
             last = y.branch.points[-1]
             y = self.driver.follow(replace(stage, start=last.parameter), last.solution.x)
         return y
@@ -150,20 +154,60 @@ class FilmPath:
     def carried(
         self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
     ) -> StageFailed | None:
-        """The films that a coarser mesh has, as far as they lead from one to the next."""
-        fast, speeds = self._modified(x), tuple(sorted(known.films, reverse=True))
-        if not (fast and speeds):
-            return None
-        film = first_film(self.system, self.settings, stroke, x)
-        _, gap = self.system.arc_film(x + known.built(speeds[0]))
-        film = replace(film, speed=speeds[0], gap=gap)
-        stage = speed_stage(self.system, self.settings, film, speeds, on_speed)
-        try:
-            stage, start = fast.carried(stage, known, x)
-        except SingularMatrix:
-            return None
-        end = self.driver.follow(stage, start)
+        """The films that another mesh has, as far as they lead from one to the next.
+
+        By modified Newton iterations, and where these fail with pressures of the section that lag.
+        """
+        left = tuple(sorted(known.films, reverse=True))
+        reached: list[tuple[float | None, Array]] = [(None, x)]
+
+        def keep(at: FilmLoads, point: Point) -> None:
+            reached.append((at.speed, point.solution.x))
+            on_speed(at, point)
+
+        film = self._carried_film(stroke, x, known) if self.quick and left else None
+        while film and left and (fast := self._modified(reached[-1][1])):
+            here = replace(film, speed=left[0])
+            stage = speed_stage(self.system, self.settings, here, left, keep)
+            self.driver.follow(*fast.carried(stage, known, *reached[-1]))
+            left = tuple(u for u in left if reached[-1][0] is None or u < reached[-1][0])
+            if left:
+                failed = self.lagged(replace(film, speed=left[0]), known, reached[-1], keep)
+                if failed:
+                    return failed
+                left = left[1:]
+        return None
+
+    def lagged(
+        self,
+        film: FilmLoads,
+        known: CoarserFilms,
+        before: tuple[float | None, Array],
+        on_speed: OnSpeed,
+    ) -> StageFailed | None:
+        """A film that another mesh has from that at the speed before, see `CoarserFilms.lagged`."""
+        stage = speed_stage(self.system, self.settings, film, (film.speed,), on_speed)
+        end = self.driver.follow(*known.lagged(stage, self.driver.newton, *before))
         return end if isinstance(end, StageFailed) else None
+
+    def _carried_film(self, stroke: Stroke, x: Array, known: CoarserFilms) -> FilmLoads:
+        """The fastest film that another mesh has; x: the contact state."""
+        speed = max(known.films)
+        _, gap = self.system.arc_film(x + known.built(speed))
+        return replace(first_film(self.system, self.settings, stroke, x), speed=speed, gap=gap)
+
+    def from_finer(
+        self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """The film that a finer mesh has from the contact state x, where no path leads to it."""
+        film = self._carried_film(stroke, x, known)
+        failed = self.lagged(film, known, (None, x), on_speed)
+        if failed:
+            patient = replace(self.driver.newton, max_iterations=_PATIENT, line_search=True)
+            stage = replace(failed.stage, name="film of another mesh", corrector=patient)
+            end = self.driver.follow(stage, x + known.built(film.speed))
+            failed = end if isinstance(end, StageFailed) else None
+        return failed
 
     def onward(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> None:
         """The films that are slower than one that is known, x (n,), as far as they are reached."""
@@ -185,7 +229,7 @@ class FilmPath:
             failed = self.thinned(thick, x, on_speed)
             if failed is None:
                 return None
-            if "falling speed" in failed.stage.name:
+            if "falling speed" in failed.stage.name or self.tolerance is not None:
                 return first_film(self.system, self.settings, stroke, x), x
         first: BuiltFilm | None = None
         for way in (self._squeezed, self.fast) if grooved else (self._near,):
@@ -205,8 +249,8 @@ class FilmPath:
         if self.system.parameters.rough:
             return self.rise(stroke, x, on_speed)
         start = self.begun(stroke, x, on_speed)
-        if start is None:
-            return None
+        if start is None or (self.quick and self.tolerance is not None):
+            return None  # what is no result is not worth the slow way
         return self.slower(self.build(*start), self.system.parameters.speeds, on_speed)
 
     def settled(self, x: Array) -> Followed:

@@ -146,7 +146,7 @@ def carried_contact(
     carry = _carrier(old, new)
     p_s = new.parameters.sealed_pressure if sealed_pressure is None else sealed_pressure
     pressures = element_pressures(contact_problem(old, settings, p_s), old.solids, x)
-    y = _unknowns(old, new, carry, x)
+    y = _carried(old, new, carry, x)
     problem = LaggedPressure.of(
         contact_problem(new, settings, p_s).since(y),
         new.solids,
@@ -158,7 +158,17 @@ def carried_contact(
     return stage, y
 
 
-def _unknowns(old: SealSystem, new: SealSystem, carry: _Carrier, x: Array) -> Array:
+def carried_unknowns(old: SealSystem, new: SealSystem, x: Array) -> Array:
+    """Every field that contact knows, (n',), on another mesh; those of the film are zero."""
+    return _carried(old, new, _carrier(old, new), x)
+
+
+def carried_elements(old: SealSystem, new: SealSystem, values: Array) -> Array:
+    """Values (Q',) of the elements of another mesh from those, (Q,), of one."""
+    return _carrier(old, new).elements(values)
+
+
+def _carried(old: SealSystem, new: SealSystem, carry: _Carrier, x: Array) -> Array:
     """Every field that contact knows, by what its unknowns stand on."""
     y = new.at_rest()
     for field in old.contact_fields():

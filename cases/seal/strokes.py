@@ -126,7 +126,7 @@ class SealRun:
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
         ratios = ANY_RATIO if p.mesh == "uniform" else INLET_RATIO
         known = _known(*self.coarser, stroke, self.system) if self.coarser else None
-        coarser = known.thicknesses if known else {}
+        coarser = dict(known.thicknesses) if known else {}
         verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
         verdict = replace(
             verdict,
@@ -163,7 +163,7 @@ class SealRun:
         self,
         wanted: Wanted,
         progress: StrokeState,
-        coarser: Mapping[float, float],
+        coarser: dict[float, float],
         film: FilmLoads,
         point: Point,
     ) -> None:
@@ -181,6 +181,8 @@ class SealRun:
         iterations = point.solution.iterations
         p, last = system.parameters, progress.verdict.last
         assert last is not None
+        if self.coarser and film.speed not in coarser:
+            coarser |= _carried(*self.coarser, film, (system, self.x, x))
         error = h_star_error(p.density, last.h_star, coarser.get(film.speed, nan))
         estimated = p.error_estimate and p.mesh == "graded"
         verdict = replace(progress.verdict, error=error if estimated else None)
@@ -234,9 +236,31 @@ def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> Coars
 
     def keep(film: FilmLoads, point: Point) -> None:
         if film.speed in speeds:
-            problem, y = path.system.film_problem(film), point.solution.x
-            known.films[film.speed] = y
-            known.thicknesses[film.speed] = film_numbers(path.system, problem, film, y).h_star
+            known.films[film.speed] = point.solution.x
+            known.thicknesses[film.speed] = _h_star(path.system, film, point.solution.x)
 
     path.films(stroke, x, keep)
     return known
+
+
+def _carried(
+    path: FilmPath, x: Array, film: FilmLoads, finer: tuple[SealSystem, Array, Array]
+) -> dict[float, float]:
+    """h* (mm) by |U| of a film that no path led to, from that of a finer mesh; nothing is reported.
+
+    x: the contact state. finer: that mesh, its contact state and its film.
+    """
+    other, contact, y = finer
+    known = CoarserFilms(other, path.system, contact, {film.speed: y})
+
+    def keep(film: FilmLoads, point: Point) -> None:
+        known.thicknesses[film.speed] = _h_star(path.system, film, point.solution.x)
+
+    if path.quick and not path.system.parameters.rough:
+        path.from_finer(film.stroke, x, known, keep)
+    return known.thicknesses
+
+
+def _h_star(system: SealSystem, film: FilmLoads, x: Array) -> float:
+    """h* (mm) of a film x (n,)."""
+    return film_numbers(system, system.film_problem(film), film, x).h_star

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.condensed import LayeredProblem
 from softehl.runtime.solve.linear import Condensed, Condenser, SingularMatrix
@@ -70,21 +68,6 @@ class SchurCorrector:
     def with_tolerance(self, tolerance: float) -> SchurCorrector:
         """A corrector with another tolerance, far above rounding, and the same `tangent`."""
         return replace(self, iteration=replace(self.iteration, tolerance=tolerance, stagnation=1.0))
-
-    def moved(self, problem: LayeredProblem, x: Array, change: Array) -> Array:
-        """x (n,) with its layer changed, and the body following as its condensation has it.
-
-        change: (n,), of which the unknowns of the layer count. A first condensation is made at x.
-        Raises SingularMatrix.
-        """
-        tangent = self.tangent
-        if tangent.condensed is None:
-            tangent.accepted = problem.admissible(x)
-            tangent.renew(self.linear, problem, tangent.accepted)
-        assert tangent.condensed is not None
-        y = x + tangent.condensed.extend(np.zeros(len(x)), change[problem.shared])
-        y[problem.own] = x[problem.own] + change[problem.own]
-        return y
 
     def solve(self, problem: LayeredProblem, x0: Array) -> Solution:
         """Solve R(x) = 0 from x0, (n,); the body may have been condensed anywhere near by."""

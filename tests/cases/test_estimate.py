@@ -3,14 +3,20 @@
 import math
 from fractions import Fraction
 from math import isnan, nan
+from typing import Any
 
+import numpy as np
 import pytest
 
 from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.estimate import ORDER, coarser_density, h_star_error
+from softehl.cases.seal.film import FastFilm
+from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import DENSITIES, ORing
+from softehl.cases.seal.path import Stage, StageFailed
 from softehl.cases.seal.state import Outcome, Silent
+from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
@@ -83,6 +89,41 @@ def test_without_an_estimate_only_the_way_is_another(curve: Outcome) -> None:
     assert all(isnan(s.h_star_error_percent) for s in plain.states)
     assert not any(stage.name.startswith("coarser") for stage in plain.stages)
     assert isnan(h_star_error(2, 1.0, nan))
+
+
+def test_films_are_carried_by_pressures_that_lag(
+    curve: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def nowhere(*given: Any) -> tuple[Stage, Array]:
+        _, stage, _, _, x = given
+        return stage, np.full_like(x, np.nan)
+
+    monkeypatch.setattr(FastFilm, "carried", nowhere)
+    outcome = run(_case(), Silent())
+    names = [stage.name for stage in outcome.stages]
+    assert names.count("film of another mesh") == len(CONVERGED)
+    assert "contact to film" not in names
+    assert [s.h_star_um for s in outcome.states] == pytest.approx(
+        [s.h_star_um for s in curve.states], rel=1e-9
+    )
+
+
+def test_an_estimate_needs_no_path_on_the_coarser_mesh(
+    curve: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = FilmPath.films
+
+    def no_path(path: FilmPath, *given: Any) -> StageFailed | None:
+        return None if path.tolerance is not None else usual(path, *given)
+
+    monkeypatch.setattr(FilmPath, "films", no_path)
+    outcome = run(_case(), Silent())
+    names = [stage.name for stage in outcome.stages]
+    assert names.count("coarser mesh: film of another mesh") == len(CONVERGED)
+    assert "coarser mesh: contact to film" not in names
+    assert [s.h_star_error_percent for s in outcome.states] == pytest.approx(
+        [s.h_star_error_percent for s in curve.states], rel=1e-3
+    )
 
 
 @pytest.mark.parametrize(
