@@ -27,44 +27,13 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from benchmarks.clock import Clock
+
 VISCOSITIES, PRESSURES = (3e-8, 5e-8, 7e-8, 9e-8), (1.0, 2.0)
 RING = {"ring": "AS568-210", "rod": 19, "sealed_pressure": "30 bar"}
 PROCESSES = 2
 HOUR = 3600.0
 PARTS = ("contact", "coarser films", "films", "files", "pictures", "else")
-
-
-class Clock:
-    """Seconds of CPU by part; what is within another part counts there alone."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(PARTS, 0.0)
-        self.open = ["else"]
-        self.since = time.process_time()
-
-    def turn(self) -> None:
-        """What passed until now belongs to the part that is open."""
-        now = time.process_time()
-        self.seconds[self.open[-1]] += now - self.since
-        self.since = now
-
-    @contextmanager
-    def part(self, name: str) -> Iterator[None]:
-        """Within it time belongs to this part."""
-        self.turn()
-        self.open.append(name)
-        yield
-        self.turn()
-        self.open.pop()
-
-    def timed(self, function: Callable[..., Any], name: Callable[..., str]) -> Callable[..., Any]:
-        """The function, its time in the part that `name` makes of its arguments."""
-
-        def call(*arguments: Any, **options: Any) -> Any:
-            with self.part(name(*arguments)):
-                return function(*arguments, **options)
-
-        return call
 
 
 def part_of(driver: Any, stage: Any, *_: Any) -> str:
@@ -107,7 +76,7 @@ def watched(clock: Clock) -> Iterator[None]:
 
 def spent(work: Callable[[], None], repeats: int) -> dict[str, float]:
     """Seconds by part of some work, for one of the repeats."""
-    clock = Clock()
+    clock = Clock(PARTS)
     with watched(clock):
         clock.since = time.process_time()
         work()
@@ -171,8 +140,9 @@ def elsewhere(checkout: Path, name: str) -> dict[str, float]:
         "OMP_NUM_THREADS": "1",
         "PYTHONPATH": str(checkout / "src"),
     }
-    call = [sys.executable, str(Path(__file__).absolute()), "--measure", name]
-    done = subprocess.run(call, env=environment, cwd=checkout, capture_output=True, text=True)
+    call = [sys.executable, "-m", "benchmarks.curves", "--measure", name]
+    here = Path(__file__).absolute().parents[1]
+    done = subprocess.run(call, env=environment, cwd=here, capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(done.stderr)
     found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -16,36 +15,27 @@ from unittest.mock import patch
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded
 
-from softehl.cases.seal import method, sensitivity
+from benchmarks.clock import Clock
+from softehl.cases.seal import method, sensitivity, strokes
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.quantities import QUANTITIES
 from softehl.cases.seal.state import Silent
 
 
-class Clock:
-    """Seconds of CPU in a function that it stands for."""
-
-    def __init__(self, function: Any) -> None:
-        self.function, self.seconds = function, 0.0
-
-    def __call__(self, *arguments: Any) -> Any:
-        """The function."""
-        start = time.process_time()
-        found = self.function(*arguments)
-        self.seconds += time.process_time() - start
-        return found
-
-
 def measured(p: ORing, wanted: Sequence[str]) -> tuple[float, float, int]:
     """Seconds of a run without its sensitivities, those of these quantities, its states."""
-    rates = Clock(sensitivity.rates_of)
-    slopes = Clock(partial(sensitivity.sensitivities, wanted=wanted))
-    with patch.object(method, "rates_of", rates), patch.object(method, "sensitivities", slopes):
-        start = time.process_time()
+    clock = Clock(("sensitivities", "solving"))
+    works: dict[str, Any] = {
+        "rates_of": sensitivity.rates_of,
+        "sensitivities": partial(sensitivity.sensitivities, wanted=wanted),
+    }
+    timed: dict[str, Any] = {
+        name: clock.timed(work, lambda *_: "sensitivities") for name, work in works.items()
+    }
+    with patch.multiple(strokes, **timed):
         states = method.run(p, Silent()).states
-        whole = time.process_time() - start
-    spent = rates.seconds + slopes.seconds
-    return whole - spent, spent, len(states)
+    clock.turn()
+    return clock.seconds["solving"], clock.seconds["sensitivities"], len(states)
 
 
 def main(runs: int) -> None:
