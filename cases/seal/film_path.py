@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from math import log
 
 from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.contacts import contact_edges, traps
@@ -29,14 +28,10 @@ from softehl.cases.seal.grading import film_thickness
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
-from softehl.cases.seal.thinning import longer, thinned_film, thinning_stage
+from softehl.cases.seal.thinning import longer, sooner, thinned_film, thinning_stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.solution import Branch, Point, Status
-
-_SOONER = 1e3
-"""How much sooner a film begins that is not solved where the squeezing out begins: under a lip that
-is as flat as the rod it is thicker than the gap that contact leaves, and fills at once."""
 
 _POCKET = 5.0
 """Of `film_thickness`, above which oil is trapped rather than part of a thick film."""
@@ -97,7 +92,7 @@ class FilmPath:
         first, start = thinning_stage(fast, film, x)
         y = self.driver.follow(first, start)
         if isinstance(y, StageFailed) and not y.branch.points:
-            y = self.driver.follow(replace(first, start=first.start - log(_SOONER)), start)
+            y = self.driver.follow(sooner(self.system, first, film, x), start)
         thick = _POCKET * film_thickness(p, contact_edges(self.system, x), film.speed)
         if not isinstance(y, StageFailed) and traps(self.system, x, y, thick):
             y = StageFailed(first, Branch((), Status.DIVERGED, "oil is trapped"))

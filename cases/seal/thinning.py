@@ -22,6 +22,7 @@ from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film import FastFilm, film_on, start_speed, stays
 from softehl.cases.seal.grading import film_thickness, inlet_time
 from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
 from softehl.cases.seal.system import DISPLACEMENT
 from softehl.runtime.arrays import Array
@@ -36,7 +37,12 @@ _LONGER = 1e9
 """The same where the film is not steady by then: above three shear moduli the pressure hardly rises
 from the flatter edge, and what is held off there takes long to leave."""
 
+_SOONER = 1e3
+"""How much sooner, at least, a film begins that is not solved where squeezing out begins: under a
+lip that is as flat as the rod it is thicker than the gap that contact leaves, and fills at once."""
+
 _STEPS = StepRule(3.0, 0.05, 6.0, target_iterations=8)  # of log tau
+_CAREFUL = replace(_STEPS, largest=3.0)  # where one edge after the other lets its oil go
 
 
 def thinned_film(
@@ -61,12 +67,11 @@ def thinning_stage(fast: FastFilm, film: FilmLoads, x: Array) -> tuple[Stage, Ar
     assert edge is not None
     p = system.parameters
     unit = inlet_time(p, edge, film.speed)
-    thicker = film.rod_offset / (1.75 * film_thickness(p, [edge], film.speed))
     hold = gap_masses(system, x)
     stage = Stage(
         name="contact to film",
         problem_at=lambda _: system.film_problem(film),
-        start=log(_SHORT) - 3.0 * log(max(thicker, 1.0)),
+        start=log(_shortest(p, edge, film) / unit),
         stop=log(_LONG),
         steps=_STEPS,
         sealed_pressure=film.sealed_pressure,
@@ -75,6 +80,27 @@ def thinning_stage(fast: FastFilm, film: FilmLoads, x: Array) -> tuple[Stage, Ar
     )
     stage = fast.thinning(stage, hold, x, lambda t: -exp(-t) / unit)
     return stage, pressed_film(system, x, film.sealed_pressure)
+
+
+def sooner(system: SealSystem, stage: Stage, film: FilmLoads, x: Array) -> Stage:
+    """A stage of squeezing that begins sooner: at the time of the steepest edge of the contact x.
+
+    A lip that the pressure holds down lies flat on the rod, and its edge is so gentle that oil gets
+    below it. The film is that of a steep edge behind, on the heel, which is squeezed out first.
+    """
+    p, edge = system.parameters, _inlet(system, film.stroke, x)
+    assert edge is not None
+    steepest = max(
+        (e for e in contact_edges(system, x) if e.rise < inf), key=lambda other: other.rise
+    )
+    least = log(_shortest(p, steepest, film) / inlet_time(p, edge, film.speed))
+    return replace(stage, start=min(stage.start - log(_SOONER), least), steps=_CAREFUL)
+
+
+def _shortest(p: ORing, edge: Edge, film: FilmLoads) -> float:
+    """The first tau, s, by an edge of the contact."""
+    thicker = film.rod_offset / (1.75 * film_thickness(p, [edge], film.speed))
+    return _SHORT * inlet_time(p, edge, film.speed) / max(thicker, 1.0) ** 3
 
 
 def longer(stage: Stage) -> Stage:

@@ -24,6 +24,14 @@ def test_what_is_drawn_fits_its_groove() -> None:
 
 
 @pytest.mark.slow
+def test_oil_gets_below_a_lip_that_lies_flat() -> None:
+    found = solved(29, 150.0, drawn, stroke="out")  # a U-cup: 3 mm of lip under 0.3 MPa, and a heel
+    assert [s["verdict"] for s in found["states"]] == len(SPEEDS) * [OK]
+    h = [s["h_star_um"] for s in found["states"]]
+    assert h == pytest.approx([9.37, 2.73, 0.833], rel=0.02)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("section", WHOLE)
 def test_a_gland_of_the_sample_is_solved_whole(section: str) -> None:
     found = solved(WHOLE[section], 120.0, drawn)

@@ -20,7 +20,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.state import Silent
 from softehl.cases.seal.system import DISPLACEMENT
-from softehl.cases.seal.thinning import gap_masses, thinned_film, thinning_stage
+from softehl.cases.seal.thinning import gap_masses, sooner, thinned_film, thinning_stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.propped import Propped
 from softehl.runtime.fem.relaxed import Relaxed
@@ -51,6 +51,22 @@ def loads() -> FilmLoads:
     film = thinned_film(system, SETTINGS, "out", x)
     assert film is not None
     return film
+
+
+def test_a_film_that_is_not_solved_at_its_first_time_begins_sooner() -> None:
+    system, x = contact()
+    fast, film = thin(loads())
+    stage, _ = thinning_stage(fast, film, x)
+    earlier = sooner(system, stage, film, x)
+    assert earlier.start <= stage.start - log(1e3)
+    assert earlier.stop == stage.stop
+    # by the steepest edge: one on the sealed side that is hardly there asks for an earlier start
+    flat = system.rod_multipliers(x)
+    gentle = x.copy()
+    touching = np.flatnonzero(flat < 0.0)
+    system.rod_multipliers(gentle)[touching[:5]] *= 1e-3
+    stage, _ = thinning_stage(fast, film, gentle)
+    assert sooner(system, stage, film, gentle).start < stage.start - log(1e4)
 
 
 def relaxed(tau: float) -> tuple[Relaxed, Array]:
