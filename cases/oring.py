@@ -17,6 +17,7 @@ from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmRow
 from softehl.cases.seal.telling import Teller
+from softehl.cases.seal.verdict import LARGEST_ERROR
 
 
 class ORingCase(Case[ORing, FilmRow]):
@@ -97,6 +98,10 @@ class ORingCase(Case[ORing, FilmRow]):
             for word, some in chosen.items()
             if some
         ]
+        loose = [row for row in rows if abs(row.rod_friction_error_percent) > LARGEST_ERROR]
+        if loose:
+            words = f"friction not known to {LARGEST_ERROR:g} %"
+            doubts.append(f"{words}: {self.named(loose)}; use a finer mesh (larger density)")
         thin = [row for row in rows if not row.regime and row.h_min_um < plan.THIN]
         if not thin:
             return doubts

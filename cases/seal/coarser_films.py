@@ -22,6 +22,7 @@ from scipy.interpolate import PchipInterpolator, make_interp_spline
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.path import Stage
 from softehl.cases.seal.refinement import carried_elements, carried_unknowns
+from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.fem.problem import Problem
@@ -36,15 +37,15 @@ _ITERATIONS = 8  # a start that needs more leads nowhere
 class CoarserFilms:
     """Films of a stroke on another mesh of the same layout, and on their way to ours.
 
-    contact: unknowns (n,) that the films began at. films, thicknesses: |U| in mm/s -> unknowns (n,)
-    and h*, mm; they are filled as the films are found.
+    contact: unknowns (n,) that the films began at. films, numbers: |U| in mm/s -> unknowns (n,)
+    and what they mean; they are filled as the films are found.
     """
 
     other: SealSystem
     ours: SealSystem
     contact: Array
     films: dict[float, Array] = field(default_factory=dict)
-    thicknesses: dict[float, float] = field(default_factory=dict)
+    numbers: dict[float, FilmNumbers] = field(default_factory=dict)
 
     def built(self, speed: float) -> Array:
         """Change (n,) from contact to the film at a speed."""

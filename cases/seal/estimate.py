@@ -30,10 +30,10 @@ def coarser_system(system: SealSystem) -> SealSystem:
     return build_system(parameters, system.section.layout, coarser_density(parameters.density))
 
 
-def h_star_error(density: int, h_star: float, coarser: float) -> float:
-    """Estimated error of h* in per cent of it, + where it is too large.
+def estimated_error(density: int, value: float, coarser: float) -> float:
+    """Estimated error of h* or of friction in per cent of it, + where it is too large.
 
-    h_star: at `density`; coarser: at coarser_density(density), nan where it is not known.
+    value: at `density`; coarser: at coarser_density(density).
     """
     finer = density / float(coarser_density(density))
-    return 100.0 * (coarser / h_star - 1.0) / (math.pow(finer, ORDER) - 1.0)
+    return 100.0 * (coarser / value - 1.0) / (math.pow(finer, ORDER) - 1.0)

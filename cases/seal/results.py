@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import inf, pi, radians, tan
+from math import inf, nan, pi, radians, tan
 
 import numpy as np
 
@@ -47,6 +47,8 @@ EXIT_SLOPE = 40.0
 
 INLET = (10.0, 1.5)
 """Film thicknesses, in h*, between which the segments of the inlet are counted."""
+
+_TORN = 1e-6  # void fraction of a film that has ruptured
 
 MID_CONTACT = 0.1
 """Share of the contact that is left out at either end where oscillations are looked for."""
@@ -147,9 +149,28 @@ def _contacts(
                 start=start,
                 end=end,
                 p_before=float(at["p"][part.start, 0]),
+                inlet_ratio=filled_ratio({name: v[part] for name, v in at.items()}, film),
             )
         )
     return tuple(found)
+
+
+def filled_ratio(at: Mapping[str, Array], film: FilmLoads) -> float:
+    """`inlet_ratio` of a contact by its own flux; nan where the film ruptures within its inlet.
+
+    at: fields of its part of the film, (segments, points) each. nan too where they do not say
+    whether oil is missing.
+    """
+    void = at.get("v_out" if film.stroke == "out" else "v_in")
+    if void is None:
+        return nan
+    top = int(np.argmax(at["p"].max(axis=1)))
+    h_star = float(element_means(at["flux"], at["dx"])[top] / (0.5 * film.rod_speed))
+    before = slice(None, top + 1) if film.stroke == "out" else slice(top, None)
+    torn = at["h"][before][void[before] > _TORN]
+    if len(torn) and float(torn.min()) < INLET[0] * h_star:
+        return nan
+    return inlet_ratio(at, film, h_star)
 
 
 def rough_numbers(system: SealSystem, at: Mapping[str, Array]) -> dict[str, float]:

@@ -72,6 +72,11 @@ class FilmRow(Row):
     rod_friction_N: float = column(
         "N", "friction force of the film on the rod", head="friction", shown=".4g"
     )
+    rod_friction_error_percent: float = column(
+        "%",
+        "estimated error of the friction, + where it is too large; nan where not known",
+        default=nan,
+    )
     leak_rate_mm3_s: float = column(
         "mm3/s", "leak rate 2 pi R q, + = to the air side", head="leak", shown=".4g"
     )

@@ -14,7 +14,7 @@ from typing import TypeAlias
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.estimate import h_star_error
+from softehl.cases.seal.estimate import estimated_error
 from softehl.cases.seal.film_path import BuiltFilm, FilmPath, OnSpeed, below
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
@@ -29,8 +29,14 @@ from softehl.cases.seal.results import (
 )
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import resolved
-from softehl.cases.seal.state import FilmState, doubt
-from softehl.cases.seal.verdict import ANY_RATIO, INLET_RATIO, Verdict, fewest_inlet_segments
+from softehl.cases.seal.state import CLIPPED, FilmState, doubt
+from softehl.cases.seal.verdict import (
+    ANY_RATIO,
+    INLET_RATIO,
+    FilmNumbers,
+    Verdict,
+    fewest_inlet_segments,
+)
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
 from softehl.runtime.solve.linear import SingularMatrix
@@ -56,9 +62,12 @@ class Wanted:
     last: BuiltFilm | None = None
 
     def found(self, state: FilmState, *, final: bool) -> None:
-        """A state; it is held if it is not `ok`, unless it is final."""
+        """A state; it is held if another mesh may better it, unless it is final.
+
+        The arc of another mesh ends where that of the first does: what is clipped stays so.
+        """
         speed = abs(state.rod_speed_mm_s)
-        if final or state.verdict == OK:
+        if final or state.verdict in (OK, CLIPPED):
             self.left = tuple(u for u in self.left if u != speed)
             self.report(state)
         else:
@@ -126,7 +135,7 @@ class SealRun:
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
         ratios = ANY_RATIO if p.mesh == "uniform" else INLET_RATIO
         known = _known(*self.coarser, stroke, self.system) if self.coarser else None
-        coarser = dict(known.thicknesses) if known else {}
+        coarser = dict(known.numbers) if known else {}
         verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
         verdict = replace(
             verdict,
@@ -163,7 +172,7 @@ class SealRun:
         self,
         wanted: Wanted,
         progress: StrokeState,
-        coarser: dict[float, float],
+        coarser: dict[float, FilmNumbers],
         film: FilmLoads,
         point: Point,
     ) -> None:
@@ -183,11 +192,11 @@ class SealRun:
         assert last is not None
         if self.coarser and film.speed not in coarser:
             coarser |= _carried(*self.coarser, film, (system, self.x, x))
-        error = h_star_error(p.density, last.h_star, coarser.get(film.speed, nan))
+        error, of_friction = _errors(p.density, last, coarser.get(film.speed))
         estimated = p.error_estimate and p.mesh == "graded"
         verdict = replace(progress.verdict, error=error if estimated else None)
         state = film_state(system, problem, film, x, verdict, iterations)
-        state = replace(state, h_star_error_percent=error)
+        state = replace(state, h_star_error_percent=error, rod_friction_error_percent=of_friction)
         if p.sensitivity and resolved(state):
             state = replace(state, sensitivity=self._differentiated(film, x))
         wanted.found(state, final=self.better is None)
@@ -227,6 +236,16 @@ class SealRun:
                 on_speed(at, Point(1.0, solution))
 
 
+def _errors(density: int, film: FilmNumbers, coarser: FilmNumbers | None) -> tuple[float, float]:
+    """Estimated errors of h* and of friction, %, from the film of the coarser mesh."""
+    if coarser is None:
+        return nan, nan
+    return (
+        estimated_error(density, film.h_star, coarser.h_star),
+        estimated_error(density, film.friction, coarser.friction),
+    )
+
+
 Better: TypeAlias = Callable[[SealRun, BuiltFilm], SealRun | None]
 
 
@@ -237,7 +256,7 @@ def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> Coars
     def keep(film: FilmLoads, point: Point) -> None:
         if film.speed in speeds:
             known.films[film.speed] = point.solution.x
-            known.thicknesses[film.speed] = _h_star(path.system, film, point.solution.x)
+            known.numbers[film.speed] = _numbers(path.system, film, point.solution.x)
 
     path.films(stroke, x, keep)
     return known
@@ -245,8 +264,8 @@ def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> Coars
 
 def _carried(
     path: FilmPath, x: Array, film: FilmLoads, finer: tuple[SealSystem, Array, Array]
-) -> dict[float, float]:
-    """h* (mm) by |U| of a film that no path led to, from that of a finer mesh; nothing is reported.
+) -> dict[float, FilmNumbers]:
+    """By |U|, of a film that no path led to, from that of a finer mesh; nothing is reported.
 
     x: the contact state. finer: that mesh, its contact state and its film.
     """
@@ -254,13 +273,13 @@ def _carried(
     known = CoarserFilms(other, path.system, contact, {film.speed: y})
 
     def keep(film: FilmLoads, point: Point) -> None:
-        known.thicknesses[film.speed] = _h_star(path.system, film, point.solution.x)
+        known.numbers[film.speed] = _numbers(path.system, film, point.solution.x)
 
     if path.quick and not path.system.parameters.rough:
         path.from_finer(film.stroke, x, known, keep)
-    return known.thicknesses
+    return known.numbers
 
 
-def _h_star(system: SealSystem, film: FilmLoads, x: Array) -> float:
-    """h* (mm) of a film x (n,)."""
-    return film_numbers(system, system.film_problem(film), film, x).h_star
+def _numbers(system: SealSystem, film: FilmLoads, x: Array) -> FilmNumbers:
+    """What a film x (n,) means."""
+    return film_numbers(system, system.film_problem(film), film, x)

@@ -45,8 +45,8 @@ from tests.cases.oring_cases import film_values
 
 HEADER = (
     "sealed_pressure_MPa,rod_speed_mm_s,h_star_um,h_star_error_percent,h_min_um,p_max_MPa,"
-    "pressure_jump_max_MPa,rod_friction_N,leak_rate_mm3_s,contact_start_mm,contact_end_mm,"
-    "newton_iterations,flux_variation,moment_N_mm,contact_p_max_MPa,oscillation_index,"
+    "pressure_jump_max_MPa,rod_friction_N,rod_friction_error_percent,leak_rate_mm3_s,"
+    "contact_start_mm,contact_end_mm,newton_iterations,flux_variation,moment_N_mm,contact_p_max_MPa,oscillation_index,"
     "inlet_segments,inlet_ratio,mean_gap_um,lambda_ratio,regime,"
     "asperity_load_percent,boundary_friction_percent,groove_start_mm,groove_end_mm,"
     "groove_pressure_MPa,h_min_sealed_um,h_min_air_um,flux_mismatch_percent,density,verdict"

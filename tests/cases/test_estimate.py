@@ -3,22 +3,33 @@
 import math
 from fractions import Fraction
 from math import isnan, nan
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from softehl.cases.harness.row import OK
+from softehl.cases.oring import CASE
 from softehl.cases.seal.coarser_films import CoarserFilms
-from softehl.cases.seal.estimate import ORDER, coarser_density, h_star_error
+from softehl.cases.seal.estimate import ORDER, coarser_density, estimated_error
 from softehl.cases.seal.film import FastFilm
 from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import DENSITIES, ORing
 from softehl.cases.seal.path import Stage, StageFailed
-from softehl.cases.seal.state import Outcome, Silent
+from softehl.cases.seal.state import (
+    CLIPPED,
+    UNDER_RESOLVED,
+    FilmRow,
+    FilmState,
+    Outcome,
+    Silent,
+)
+from softehl.cases.seal.strokes import Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import Disc, disc_mesh
-from tests.cases.oring_cases import oring
+from tests.cases.oring_cases import film_values, oring
 
 CONVERGED = {1600.0: 3.1842, 100.0: 0.59552}
 """h* in um on graded meshes of density 8, p_s = 1 MPa, outstroke; 4 and 8 extrapolated."""
@@ -49,20 +60,22 @@ def test_an_error_of_that_order_is_found_exactly(density: int) -> None:
         return 0.7 - 0.02 / math.pow(d, ORDER)
 
     h = thickness(density)
-    estimate = h_star_error(density, h, thickness(float(coarser_density(density))))
+    estimate = estimated_error(density, h, thickness(float(coarser_density(density))))
     assert estimate == pytest.approx(100.0 * (h - 0.7) / h, rel=1e-9)
 
 
 def test_an_error_of_another_order_is_not() -> None:
     coarser = 0.7 - 0.02 / float(coarser_density(2)) ** 4
     error = 100.0 * (0.02 / 2**4) / 0.7
-    assert abs(h_star_error(2, 0.7 - 0.02 / 2**4, coarser)) > 1.5 * error
+    assert abs(estimated_error(2, 0.7 - 0.02 / 2**4, coarser)) > 1.5 * error
 
 
 def test_the_estimate_is_within_a_factor_of_two(curve: Outcome) -> None:
     for state in curve.states:
         error = 100.0 * (state.h_star_um / CONVERGED[state.rod_speed] - 1.0)
         assert 0.5 < state.h_star_error_percent / error < 2.0
+        # as thick a film as the mesh shows, as little friction: about h^-1
+        assert abs(state.rod_friction_error_percent) < 3.0 * abs(state.h_star_error_percent)
 
 
 def test_the_films_of_the_coarser_mesh_are_no_results(curve: Outcome) -> None:
@@ -88,7 +101,7 @@ def test_without_an_estimate_only_the_way_is_another(curve: Outcome) -> None:
     assert "contact to film" in [stage.name for stage in plain.stages]
     assert all(isnan(s.h_star_error_percent) for s in plain.states)
     assert not any(stage.name.startswith("coarser") for stage in plain.stages)
-    assert isnan(h_star_error(2, 1.0, nan))
+    assert isnan(estimated_error(2, 1.0, nan))
 
 
 def test_films_are_carried_by_pressures_that_lag(
@@ -142,3 +155,30 @@ def test_where_coarser_films_mislead_the_path_is_followed(
     assert [s.h_star_um for s in outcome.states] == pytest.approx(
         [s.h_star_um for s in curve.states], rel=1e-9
     )
+
+
+def test_friction_that_is_not_known_is_named() -> None:
+    errors = {800.0: 1.9, -200.0: -3.1}
+    rows = [
+        FilmRow(
+            **film_values(
+                rod_speed_mm_s=u, verdict=OK, h_min_um=1.0, rod_friction_error_percent=error
+            )
+        )
+        for u, error in errors.items()
+    ]
+    (note,) = CASE.notes(rows)
+    assert note.startswith("friction not known to 2 %: U = -200 mm/s")
+
+
+def test_what_another_mesh_cannot_better_is_reported() -> None:
+    reported = list[FilmState]()
+    wanted = Wanted(reported.append, (800.0, 200.0, 50.0))
+    for speed, verdict in ((800.0, CLIPPED), (200.0, UNDER_RESOLVED), (50.0, OK)):
+        made_up = SimpleNamespace(rod_speed_mm_s=speed, verdict=verdict, oscillation_index=0.0)
+        wanted.found(cast("FilmState", made_up), final=False)
+    assert [state.verdict for state in reported] == [CLIPPED, OK]
+    assert wanted.left == (200.0,)
+    wanted.close()
+    assert reported[-1].verdict == UNDER_RESOLVED
+    assert not wanted.left

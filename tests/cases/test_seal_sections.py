@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,15 @@ from softehl.cases.seal.contact_store import contact_key
 from softehl.cases.seal.contacts import contact_edges, contacts, groups, traps
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.layout import OutlineLayout, dam, uniform_layout
+from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.method import run
 from softehl.cases.seal.overlap import crossing, overlap
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.results import contact_peaks, contact_pressure, film_parts
+from softehl.cases.seal.results import contact_peaks, contact_pressure, filled_ratio, film_parts
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
-from softehl.cases.seal.verdict import ContactNumbers, FilmNumbers, Verdict
+from softehl.cases.seal.verdict import INLET_RATIO, ContactNumbers, FilmNumbers, Verdict
 from softehl.runtime.arrays import Array, Integers
 
 GROOVE: dict[str, Any] = {"housing_diameter": 56.4, "groove_width": 4.3}
@@ -202,6 +204,38 @@ def test_two_contacts_that_carry_different_fluxes_are_not_believed() -> None:
     assert apart.word == "uncertain"
     assert "differ by 11 %" in apart.advice
     assert 'cavitation = "mass-conserving"' in apart.advice
+
+
+def test_the_second_inlet_is_to_be_seen_too_where_it_is_filled() -> None:
+    verdict = Verdict(3.8, references=(2.1, 3.8), ratios=INLET_RATIO)
+    film = _numbers(0.27, 0.27)
+    sealed, air = film.contacts
+    rough = verdict.after(replace(film, contacts=(sealed, replace(air, inlet_ratio=0.74))))
+    assert rough.word == "under-resolved"
+    assert "0.74 of what the steepest slope of the next contact's inlet gives" in rough.advice
+    starved = verdict.after(replace(film, contacts=(sealed, replace(air, inlet_ratio=nan))))
+    assert starved.word == OK
+
+
+@pytest.mark.parametrize(("torn_at", "filled"), [(20.0, True), (5.0, False)])
+def test_an_inlet_is_filled_where_the_film_forms_again_outside_it(
+    torn_at: float, filled: bool
+) -> None:
+    h_star, eta, speed = 1e-3, 1e-7, 100.0
+    h = np.linspace(30.0, 1.0, 2000).reshape(-1, 2) * h_star
+    x = np.linspace(0.0, 1.0, 2000).reshape(-1, 2)
+    slope = 6.0 * eta * speed * (h - h_star) / h**3
+    p = np.cumsum(slope.ravel()).reshape(h.shape) * (x[0, 1] - x[0, 0])
+    at = {
+        **{"x": x, "h": h, "p": p, "eta": np.full_like(h, eta), "dx": np.full_like(h, 5e-4)},
+        **{"tau_rod": h * slope, "tau": np.zeros_like(h)},
+        "flux": np.full_like(h, 0.5 * speed * h_star),
+        "v_out": np.where(h > torn_at * h_star, 0.5, 0.0),
+    }
+    found = filled_ratio(at, FilmLoads(0.0, "out", speed, np.empty(0), np.empty(0)))
+    assert found == pytest.approx(1.0, rel=1e-3) if filled else isnan(found)
+    del at["v_out"]
+    assert isnan(filled_ratio(at, FilmLoads(0.0, "out", speed, np.empty(0), np.empty(0))))
 
 
 def test_every_contact_is_judged_against_its_own_pressure() -> None:
