@@ -23,7 +23,7 @@ from softehl.runtime.mesh.parted_mesh import parted_mesh
 from softehl.runtime.mesh.sections import LAYERS, SHORT, Disc, SectionMesh, disc_mesh
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 
-_LEVEL = 1e-6  # of the height of a section: what is level
+_LEVEL, _LOOKED_AT = 1e-6, 4001  # of the height: what is level; places of a film that are compared
 _DENSITY = 2  # for which the sizes are chosen; other densities divide or join its segments
 
 
@@ -264,13 +264,19 @@ class OutlineLayout:
         return int(np.argmin(np.abs(mesh.places[mesh.arc :] - crown)))
 
     def lowest(self, mesh: SectionMesh) -> int:
-        """See `Layout`: the middle of a flat, the first of two lobes."""
-        if self.dams[0] is not None:
-            return int(np.argmin(np.abs(mesh.arc_places - (self.dams[0] - self.film[0]))))
-        r = mesh.points[mesh.arc_nodes, 1]
-        level = np.flatnonzero(r <= r.min() + _LEVEL * float(np.ptp(mesh.points[:, 1])))
-        flat = level[: int(np.argmax(np.append(np.diff(level) > 1, True))) + 1]
-        return int(flat[len(flat) // 2])
+        """See `Layout`: the middle of a flat, the last of two lobes: a film fills the groove.
+
+        Of the outline, not of the mesh: nodes stand elsewhere on each of two lobes, so that one
+        mesh would have the pressure in the groove and the next one not.
+        """
+        place = self.dams[0]
+        if place is None:
+            places = np.linspace(*self.film, _LOOKED_AT)
+            r = self.shape.outline.at(places)[:, 1]
+            level = np.flatnonzero(r <= r.min() + _LEVEL * float(np.ptp(mesh.points[:, 1])))
+            flat = np.split(level, np.flatnonzero(np.diff(level) > 1) + 1)[-1]
+            place = float(places[flat[len(flat) // 2]])
+        return int(np.argmin(np.abs(mesh.arc_places - (place - self.film[0]))))
 
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> OutlineLayout:
         """See `Layout`: lips turn, and lie elsewhere than they were made to."""

@@ -152,6 +152,21 @@ def test_contact_is_looked_for_on_the_side_that_rolls_onto_the_rod(section: str)
     assert np.degrees(heading[0]) == pytest.approx(90.0, abs=0.1)
 
 
+@pytest.mark.parametrize("density", [1, 2])
+def test_the_sealed_pressure_ends_on_the_same_lobe_of_every_mesh(density: int) -> None:
+    """With nodes here and there on two equal lobes either may have the lowest one."""
+    p = ORing(**X_RING)
+    layout = uniform_layout(p)
+    assert isinstance(layout, OutlineLayout)
+    begin, end = layout.film
+    for shift in np.linspace(0.0, 0.2, 9):
+        moved = replace(layout, film=(begin + shift, end - 0.5 * shift))
+        mesh = moved.mesh(density)
+        z, r = mesh.points[mesh.arc_nodes[moved.lowest(mesh)]]
+        assert z == pytest.approx(0.5 * p.axial_width - 0.9, abs=0.07)
+        assert r - mesh.points[:, 1].min() < 2e-3
+
+
 def test_a_groove_that_grazes_the_rod_parts_two_contacts_and_films_may_trap_oil_in_it() -> None:
     system = build_system(ORing(section="rectangular", **GROOVE))
     x = system.at_rest()
