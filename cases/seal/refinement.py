@@ -24,8 +24,8 @@ from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.carrying import (
     carry_boundary,
     carry_chain,
+    carry_displacements,
     carry_elements,
-    carry_nodes,
 )
 from softehl.runtime.mesh.prolongation import (
     PARTS,
@@ -77,7 +77,7 @@ class _Transfer(NamedTuple):
 
 BY_ANGLE = _Transfer(transfer_nodes, transfer_elements, transfer_loop, transfer_chain)
 """Between meshes of a disc."""
-BY_PLACE = _Transfer(carry_nodes, carry_elements, carry_boundary, carry_chain)
+BY_PLACE = _Transfer(carry_displacements, carry_elements, carry_boundary, carry_chain)
 """Between meshes of any outline."""
 
 

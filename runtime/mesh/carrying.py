@@ -16,6 +16,7 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.location import interpolated, located
 from softehl.runtime.mesh.sections import SectionMesh
 
+_LEFT = 0.2  # of the area at a corner of an element, in a state that is any good
 _PATCH = 32  # nodes of a local spline, at most
 _AT_ONCE = 2000  # points, to bound the memory
 
@@ -35,6 +36,32 @@ def carry_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
         nodes = np.unique(new.quads[new.regions[name]])
         result[nodes] = _carried(part, new.points[nodes], values[used])
     return result
+
+
+def carry_displacements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
+    """Displacements (V', 2) on the new mesh from those, (V, 2), on the old.
+
+    As `carry_nodes` has them, unless that folds elements: a spline through the nodes of thin layers
+    may lead anywhere a little outside of them, where the new boundary lies between old nodes. Then
+    bilinear in the old cells.
+    """
+    moved = carry_nodes(old, new, values)
+    if not _folded(new, moved):
+        return moved
+    plain = interpolated(old.points, old.quads, values, new.points)
+    return moved if _folded(new, plain) else plain
+
+
+def _folded(mesh: SectionMesh, moved: Array) -> bool:
+    """Whether displacements (V, 2) leave less than `_LEFT` of the area at any corner of a cell."""
+    before, after = (_corners(points[mesh.quads]) for points in (mesh.points, mesh.points + moved))
+    return bool((after < _LEFT * before).any())
+
+
+def _corners(x: Array) -> Array:
+    """Areas (Q, 4) that the sides at each corner of cells (Q, 4, 2) span."""
+    a, b = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _region(mesh: SectionMesh, name: str) -> tuple[SectionMesh, Integers]:

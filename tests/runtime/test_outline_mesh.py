@@ -5,9 +5,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from softehl.runtime.mesh import carrying
 from softehl.runtime.mesh.carrying import (
     carry_boundary,
     carry_chain,
+    carry_displacements,
     carry_elements,
     carry_nodes,
     places_of,
@@ -133,6 +135,23 @@ def test_quadratic_fields_are_carried_over_exactly(name: str) -> None:
     assert carry_nodes(old, old, np.sin(old.points)) == pytest.approx(np.sin(old.points), abs=1e-12)
     constant = carry_elements(old, new, np.full(len(old.quads), 7.0))
     assert constant == pytest.approx(np.full(len(new.quads), 7.0))
+
+
+def test_displacements_that_a_spline_would_fold_are_carried_bilinearly(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    old, shape = mesh_of(SHAPES["horn"], 2), SHAPES["horn"]
+    new = outline_mesh(shape, (shape.film[0] + 0.1, shape.film[1] - 0.2), None, 42, 2)
+    sheared = 0.1 * quadratic(old.points)
+    smooth = carry_nodes(old, new, sheared)
+    assert (carry_displacements(old, new, sheared) == smooth).all()
+    folded = smooth.copy()
+    layer = np.linalg.norm(np.diff(new.points[new.quads[0]], axis=0), axis=1).max()
+    folded[new.quads[0, 0]] += 2.0 * layer
+    monkeypatch.setattr(carrying, "carry_nodes", lambda *_: folded)
+    plain = carry_displacements(old, new, sheared)
+    assert np.abs(plain - smooth).max() < 1e-2
+    assert not (plain == smooth).all()
 
 
 def test_nothing_is_carried_across_a_mouth() -> None:
