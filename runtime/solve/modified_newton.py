@@ -27,6 +27,8 @@ from softehl.runtime.solve.solution import Solution, Status
 
 _CUTS = (1.0, 0.3, 0.1, 0.03)  # of a step, one after the other
 _MUCH = 1.5  # times the residual before
+_WILD, _WILD_STEPS = 1e3, 5
+"""Times the least residual, and how many inner iterations in a row above that are in vain."""
 
 
 @dataclass(frozen=True)
@@ -118,14 +120,15 @@ class ModifiedNewton:
         cautious: whether its steps are shortened where they make the residual larger, which
         hinders as often as it helps.
         """
-        best, least, before = x, math.inf, math.inf
+        best, least, before, wild = x, math.inf, math.inf, 0
         for _ in range(self.max_inner):
             r, L = inner.linearise(x)
             norm = inner.norm(r)
             if norm < least:
                 best, least = x, norm
-            exhausted = self._exhausted(before, norm)
-            if norm <= target or exhausted or not math.isfinite(norm):
+            wild = wild + 1 if norm > _WILD * least and not cautious else 0
+            ended = self._exhausted(before, norm) or wild == _WILD_STEPS
+            if norm <= target or ended or not math.isfinite(norm):
                 break
             try:
                 step = inner.step(r, L)
