@@ -196,6 +196,27 @@ def load_stage(
     )
 
 
+def emptying_stage(system: SealSystem, settings: PathSettings) -> Stage:
+    """Between contact and the film of an instroke: the pressure leaves the groove of two lobes.
+
+    The rod draws the oil out of it. The path parameter is the share that is gone.
+    """
+    p_s = system.parameters.sealed_pressure
+
+    def at(gone: float) -> Problem:
+        return contact_problem(replace(system, groove=1.0 - gone), settings, p_s)
+
+    return Stage(
+        name="groove emptied",
+        problem_at=at,
+        start=0.0,
+        stop=1.0,
+        steps=StepRule(0.25, 0.01),
+        sealed_pressure=p_s,
+        stroke="in",
+    )
+
+
 def approach_stage(system: SealSystem, settings: PathSettings, offset: float) -> Stage:
     """Between contact and film: the rod moves from where contact holds it to another offset, mm.
 

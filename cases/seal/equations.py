@@ -56,7 +56,8 @@ class SealSystem:
 
     blocks: those that the case has. obstacles: by block name. problem: the contact problem at
     p_s = 0 with the film switched off and its pressures prescribed to be zero; mean rotation is
-    held in it, even if a later stage lets it go.
+    held in it, even if a later stage lets it go. groove: share of the sealed pressure that contact
+    has in the groove between two lobes.
     """
 
     parameters: ORing
@@ -65,6 +66,7 @@ class SealSystem:
     blocks: tuple[Block, ...]
     obstacles: Mapping[str, Obstacle]
     problem: Problem
+    groove: float = 1.0
 
     @classmethod
     def of(
@@ -115,6 +117,12 @@ class SealSystem:
             self, parameters=p, section=section, obstacles=obstacles_of(p), problem=problem
         )
         return replace(system, problem=system._at_rest())
+
+    @property
+    def dam(self) -> int:
+        """Index of the arc node at which the sealed pressure of the contact ends."""
+        section = self.section
+        return section.lowest if self.groove else section.layout.before_groove(section.mesh)
 
     # --- the section ----------------------------------------------------------------------------
 
@@ -257,7 +265,8 @@ class SealSystem:
 
     def contact_problem(self, loads: ContactLoads) -> Problem:
         """Frictionless contact (9)-(10) under a sealed pressure (8)."""
-        problem = self.problem.with_parameters(**contact_values(loads))
+        values = self._present(contact_values(loads, self.groove))
+        problem = self.problem.with_parameters(**values)
         if loads.moment is not None:
             problem = problem.also_fixed(self.layout.dofs(ROTATION), loads.moment)
         if loads.place is not None:
@@ -274,7 +283,8 @@ class SealSystem:
         p_s, fields = film.sealed_pressure, shares or {PRESSURE: 1.0}
         contact = self.contact_problem(ContactLoads(p_s, {ROD: film.rod_offset}, film.place))
         problem = contact.with_parameters(
-            **faded_values(film), **self._film_parameters(film, fields)
+            **self._present(faded_values(film, self.groove)),
+            **self._film_parameters(film, fields),
         )
         fixed = [*map(self._ends, fields), self.layout.dofs(ROD)]
         values: list[Array | float] = [np.array([p_s, 0.0]) for _ in fields]
@@ -354,7 +364,8 @@ class SealSystem:
         start, nodes = self.layout.part(DISPLACEMENT).start, self.mesh.arc_nodes
         others = self.layout.dofs(ROTATION), self.layout.dofs(ROD), self._walls_of_arc(x)
         shared = np.concatenate([start + 2 * nodes, start + 2 * nodes + 1, *others])
-        return Layer.of(self.problem.assembler, [ROD, "sealed_arc"], shared, np.empty(0, np.int64))
+        loads = [block.name for block in self.blocks if block.group == "load" and block.layer]
+        return Layer.of(self.problem.assembler, [ROD, *loads], shared, np.empty(0, np.int64))
 
     def with_pressure(self, name: str, order: int) -> SealSystem:
         """The system with another pressure of this order on the same film thickness, last of all
@@ -400,6 +411,11 @@ class SealSystem:
             (share,) = [shares[name] for name in block.fields if name in shares]
             found[block.name] = self._chosen(block, film_values(self.parameters, film, share))
         return found
+
+    def _present(self, values: Mapping[str, Values | None]) -> dict[str, Values | None]:
+        """Those of the values by block whose block there is."""
+        names = {block.name for block in self.blocks}
+        return {name: value for name, value in values.items() if name in names}
 
     def _chosen(self, block: Block, values: Values) -> Values:
         """Those of the values that the kernel of a block asks for."""

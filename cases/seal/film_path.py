@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from softehl.cases.seal.coarser_films import CoarserFilms
+from softehl.cases.seal.contact import along, emptying_stage
 from softehl.cases.seal.contacts import contact_edges, traps
 from softehl.cases.seal.dry import (
     dry_film,
@@ -32,6 +33,9 @@ from softehl.cases.seal.thinning import longer, sooner, thinned_film, thinning_s
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.solution import Branch, Point, Status
+
+_ROUGHLY = 1e-3
+"""Residual of states on the way to an empty groove."""
 
 _POCKET = 5.0
 """Of `film_thickness`, above which oil is trapped rather than part of a thick film."""
@@ -227,7 +231,10 @@ class FilmPath:
             if "falling speed" in failed.stage.name or self.tolerance is not None:
                 return first_film(self.system, self.settings, stroke, x), x
         first: BuiltFilm | None = None
-        for way in (self._squeezed, self.fast) if grooved else (self._near,):
+        ways = (self._squeezed, self.fast) if grooved else (self._near,)
+        if not self.system.groove:  # a groove of ruptured oil has nothing to squeeze out
+            ways = (self.fast, self._squeezed)
+        for way in ways:
             for film, y in self.starts(stroke, x):
                 first = first or (film, y)
                 if not self.quick:
@@ -247,6 +254,23 @@ class FilmPath:
         if start is None or (self.quick and self.tolerance is not None):
             return None  # what is no result is not worth the slow way
         return self.slower(self.build(*start), self.system.parameters.speeds, on_speed)
+
+    def emptied(self, x: Array) -> tuple[FilmPath, Array] | None:
+        """From the contact state x with oil under pressure between two lobes to that without it.
+
+        None where there is no such groove, or no such state.
+        """
+        system, p = self.system, self.system.parameters
+        if p.lobes < 2 or p.sealed_pressure == 0.0 or p.rough or not system.groove:
+            return None
+        stage = emptying_stage(system, self.settings)
+        rough = along(system, replace(self.driver.newton, tolerance=_ROUGHLY))
+        y = self.driver.follow(replace(stage, corrector=rough), x)
+        if not isinstance(y, StageFailed):
+            y = self.driver.follow(replace(stage, start=stage.stop), y)
+        if isinstance(y, StageFailed):
+            return None
+        return replace(self, system=replace(system, groove=0.0)), y
 
     def settled(self, x: Array) -> Followed:
         """The contact state x where the rod is as near as asperities let it; x itself if smooth."""

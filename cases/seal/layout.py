@@ -54,6 +54,9 @@ class Layout(Protocol):
         or where the section was seen to touch it.
         """
 
+    def before_groove(self, mesh: SectionMesh) -> int:
+        """The arc node on the first of two lobes; that of `lowest` where there is no groove."""
+
     def pressed(self, mesh: SectionMesh) -> int:
         """The first outer segment that the sealed pressure acts on, which it does up to the arc."""
 
@@ -143,6 +146,10 @@ class RoundLayout:
         if self.dams[0] is not None:
             return _closest(self._angles(mesh.points[mesh.arc_nodes]), self.dams[0])
         return int(np.argmin(mesh.points[mesh.arc_nodes, 1]))
+
+    def before_groove(self, mesh: SectionMesh) -> int:
+        """See `Layout`."""
+        return self.lowest(mesh)
 
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> RoundLayout:
         """See `Layout`: by its lowest point and its crown as long as these do."""
@@ -270,13 +277,23 @@ class OutlineLayout:
         mesh would have the pressure in the groove and the next one not.
         """
         place = self.dams[0]
-        if place is None:
-            places = np.linspace(*self.film, _LOOKED_AT)
-            r = self.shape.outline.at(places)[:, 1]
-            level = np.flatnonzero(r <= r.min() + _LEVEL * float(np.ptp(mesh.points[:, 1])))
-            flat = np.split(level, np.flatnonzero(np.diff(level) > 1) + 1)[-1]
-            place = float(places[flat[len(flat) // 2]])
+        return self._node(mesh, self._lobes(mesh)[-1] if place is None else place)
+
+    def before_groove(self, mesh: SectionMesh) -> int:
+        """See `Layout`: as `lowest`, of the first lobe."""
+        return min(self._node(mesh, self._lobes(mesh)[0]), self.lowest(mesh))
+
+    def _node(self, mesh: SectionMesh, place: float) -> int:
+        """The arc node nearest to a place, mm."""
         return int(np.argmin(np.abs(mesh.arc_places - (place - self.film[0]))))
+
+    def _lobes(self, mesh: SectionMesh) -> list[float]:
+        """Places (mm) of the lowest points of the film, each the middle of a flat."""
+        places = np.linspace(*self.film, _LOOKED_AT)
+        r = self.shape.outline.at(places)[:, 1]
+        level = np.flatnonzero(r <= r.min() + _LEVEL * float(np.ptp(mesh.points[:, 1])))
+        flats = np.split(level, np.flatnonzero(np.diff(level) > 1) + 1)
+        return [float(places[flat[len(flat) // 2]]) for flat in flats]
 
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> OutlineLayout:
         """See `Layout`: lips turn, and lie elsewhere than they were made to."""

@@ -291,8 +291,8 @@ def contact_pressure(system: SealSystem, sealed_pressure: float, x: Array) -> Ar
     current = tributary_areas(system.deformed(x), mesh.arc_segments, mesh.arc_nodes)
     multipliers = np.minimum(system.rod_multipliers(x), 0.0)
     pressure = -multipliers * system.rod_areas / current
-    pressure[: system.section.lowest] += sealed_pressure
-    pressure[system.section.lowest] += 0.5 * sealed_pressure  # the pressure ends at this node
+    pressure[: system.dam] += sealed_pressure
+    pressure[system.dam] += 0.5 * sealed_pressure  # the pressure ends at this node
     return np.asarray(pressure)
 
 
@@ -300,7 +300,7 @@ def unsealed(system: SealSystem, x: Array) -> str:
     """Where the sealed pressure ends outside the contact of the state x; empty if nowhere."""
     if system.parameters.sealed_pressure == 0.0:
         return ""
-    if not system.pressing(ROD, x)[system.section.lowest] > 0.0:
+    if not system.pressing(ROD, x)[system.dam] > 0.0:
         return "at the lowest point of the section"
     crown = system.section.chains[WALLS[BORE]][0] == system.section.pressed_ends[1]
     return "" if (system.pressing(BORE, x)[crown] > 0.0).all() else "at its crown"

@@ -119,12 +119,32 @@ class SealRun:
 
         With the run on the last of these meshes: it is also the better one for the other stroke.
         """
-        seal, failed = self, self.stroke(stroke, wanted)
+        seal, failed = self, self.either(stroke, wanted)
         while seal.better and seal.meshes and wanted.left and wanted.last:
             seal = seal.better(seal, wanted.last) or replace(seal, meshes=0)
-            failed = seal.stroke(stroke, wanted)
+            failed = seal.either(stroke, wanted)
         wanted.close()
         return failed if wanted.left else None, replace(seal, meshes=self.meshes)
+
+    def either(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
+        """A stroke: an instroke first without pressure in the groove between two lobes.
+
+        The rod draws the oil out of it, or fills it as the film is squeezed out.
+        """
+        empty = self._emptied() if stroke == "in" else None
+        if empty:
+            empty.stroke(stroke, wanted)
+            if not wanted.left or wanted.last:
+                return None
+        return self.stroke(stroke, wanted)
+
+    def _emptied(self) -> SealRun | None:
+        """The same with an empty groove, None where there is no such state."""
+        found = self.path.emptied(self.x)
+        if found is None:
+            return None
+        coarser = self.coarser[0].emptied(self.coarser[1]) if self.coarser else None
+        return replace(self, path=found[0], x=found[1], coarser=coarser)
 
     def stroke(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
         """Second and third stage of one stroke; why it ended early, if it did."""

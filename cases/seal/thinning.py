@@ -110,12 +110,12 @@ def longer(stage: Stage) -> Stage:
 
 def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
     """The contact state x (n,) with a film that has the pressures of the contact."""
-    y, section, nodes = x.copy(), system.section, system.mesh.arc_nodes
+    y, nodes = x.copy(), system.mesh.arc_nodes
     z, r = system.deformed(x)[nodes].T
     dz = np.diff(z)
     width = 0.5 * (np.append(dz, 0.0) + np.append(0.0, dz))
     force = np.maximum(-system.rod_multipliers(x), 0.0) * system.rod_areas
-    low, sealed = section.lowest, np.zeros(len(nodes))
+    low, sealed = system.dam, np.zeros(len(nodes))
     sealed[:low] = p_s
     if 0 < low < len(dz):
         sealed[low] = p_s * dz[low - 1] / (dz[low - 1] + dz[low])

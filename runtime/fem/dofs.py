@@ -60,7 +60,7 @@ class DofLayout:
 def displacement_dofs(nodes: Integers) -> Integers:
     """Displacement unknowns u_z, u_r of nodes (n, k), node by node: (n, 2 k)."""
     pairs = np.stack([2 * nodes, 2 * nodes + 1], axis=-1)
-    return pairs.reshape(len(nodes), -1)
+    return pairs.reshape(len(nodes), 2 * nodes.shape[-1])
 
 
 def chain_dofs(segments: int, order: int, first: int) -> Integers:

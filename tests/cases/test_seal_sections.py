@@ -15,6 +15,7 @@ from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import contact_key
 from softehl.cases.seal.contacts import contact_edges, contacts, groups, traps
 from softehl.cases.seal.equations import SealSystem, build_system
+from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.layout import OutlineLayout, dam, uniform_layout
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.method import run
@@ -165,6 +166,35 @@ def test_the_sealed_pressure_ends_on_the_same_lobe_of_every_mesh(density: int) -
         z, r = mesh.points[mesh.arc_nodes[moved.lowest(mesh)]]
         assert z == pytest.approx(0.5 * p.axial_width - 0.9, abs=0.07)
         assert r - mesh.points[:, 1].min() < 2e-3
+
+
+def test_an_instroke_begins_without_pressure_in_the_groove() -> None:
+    """The pressure then ends on the first lobe, and the oil of the film ruptures in the groove."""
+    system, x = _contact(**X_RING, density=1)
+    path = FilmPath(system, PathSettings(), PathDriver(Silent()))
+    found = path.emptied(x)
+    assert found
+    (emptied, y), p_s = (found[0].system, found[1]), system.parameters.sealed_pressure
+    z = system.mesh.points[system.mesh.arc_nodes, 0]
+    assert z[emptied.dam] == pytest.approx(-z[system.dam], abs=0.1)
+    groove = slice(emptied.dam + 1, system.dam)
+    full, empty = (contact_pressure(s, p_s, u)[groove] for s, u in ((system, x), (emptied, y)))
+    assert full.min() == pytest.approx(p_s)
+    assert empty.min() == 0.0
+    left = contact_problem(replace(emptied, groove=0.5), PathSettings(), p_s)
+    assert left.parameters["sealed_groove"] == pytest.approx([0.5 * p_s])
+    outcome = _curve(**X_RING, density=1, stroke="in", speeds=(800.0,))
+    assert outcome.converged
+    assert "groove emptied" in {stage.name for stage in outcome.stages}
+    assert path.emptied(y) is not None
+    assert found[0].emptied(y) is None
+
+
+def test_a_round_ring_has_no_groove_to_empty() -> None:
+    system = build_system(ORing(density=1))
+    assert system.dam == system.section.lowest
+    path = FilmPath(system, PathSettings(), PathDriver(Silent()))
+    assert path.emptied(system.at_rest()) is None
 
 
 def test_a_groove_that_grazes_the_rod_parts_two_contacts_and_films_may_trap_oil_in_it() -> None:
