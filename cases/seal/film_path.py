@@ -231,9 +231,8 @@ class FilmPath:
             if "falling speed" in failed.stage.name or self.tolerance is not None:
                 return first_film(self.system, self.settings, stroke, x), x
         first: BuiltFilm | None = None
-        ways = (self._squeezed, self.fast) if grooved else (self._near,)
-        if not self.system.groove:  # a groove of ruptured oil has nothing to squeeze out
-            ways = (self.fast, self._squeezed)
+        # a groove holds more oil than is squeezed out soon
+        ways = (self.fast, self._squeezed) if grooved else (self._near,)
         for way in ways:
             for film, y in self.starts(stroke, x):
                 first = first or (film, y)
