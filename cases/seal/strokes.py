@@ -133,9 +133,9 @@ class SealRun:
         """
         empty = self._emptied() if stroke == "in" else None
         if empty:
-            empty.stroke(stroke, wanted)
+            failed = empty.stroke(stroke, wanted)
             if not wanted.left or wanted.last:
-                return None
+                return failed
         return self.stroke(stroke, wanted)
 
     def _emptied(self) -> SealRun | None:
