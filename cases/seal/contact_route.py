@@ -19,6 +19,7 @@ from softehl.cases.seal.contact import (
     squeeze_stage,
     wedged,
 )
+from softehl.cases.seal.contact_results import unsealed
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
 from softehl.cases.seal.contacts import Edge, contact_edges
 from softehl.cases.seal.equations import SealSystem, build_system
@@ -37,7 +38,6 @@ from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import finer
-from softehl.cases.seal.results import unsealed
 from softehl.cases.seal.trail import Trail
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton

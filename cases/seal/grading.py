@@ -16,9 +16,10 @@ import numpy as np
 
 from softehl.cases.seal.contacts import Edge, contact_edges
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.layout import Layout, uniform_layout
+from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.system import BORE, ROD
+from softehl.cases.seal.uniform_layout import uniform_layout
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG
 from softehl.runtime.mesh.spacing import Spot, graded

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from softehl.cases.seal.contact import assembly, contact_problem
+from softehl.cases.seal.contact_results import contact_numbers, contact_state
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
 from softehl.cases.seal.equations import SealSystem, build_system
@@ -17,7 +18,7 @@ from softehl.cases.seal.film_path import BuiltFilm, FilmPath
 from softehl.cases.seal.loads import Stroke
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.results import contact_numbers, contact_state, film_numbers
+from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.state import FilmState, Observer, Outcome
 from softehl.cases.seal.strokes import MESHES, SealRun, Wanted
 from softehl.runtime.arrays import Array

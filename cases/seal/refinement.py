@@ -15,9 +15,9 @@ from typing import NamedTuple, TypeAlias
 
 from softehl.cases.seal.contact import contact_problem, contact_stage
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.round_layout import RoundLayout
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.kernels import load_kernel

@@ -1,38 +1,36 @@
-"""What a converged state of a seal means: h*, pressure, friction, leakage, limits, resolution."""
+"""What a converged film of a seal means: h*, pressure, friction, leakage, limits."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import inf, nan, pi, radians, tan
+from math import nan, pi
 
 import numpy as np
 
-from softehl.cases.seal.catalogue import fill, squeeze, stretch
-from softehl.cases.seal.contacts import CONTACT_FILM, contacts, groups
+from softehl.cases.seal.contacts import CONTACT_FILM, groups
 from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.film_signs import (
+    INLET,
+    end_gap,
+    inlet_ratio,
+    inlet_segments,
+    lacking,
+    oscillation,
+)
 from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.section_view import film_pressure, section_view
-from softehl.cases.seal.state import ContactState, FilmState, Profile
+from softehl.cases.seal.state import FilmState, Profile
 from softehl.cases.seal.surfaces import regime
 from softehl.cases.seal.system import (
-    AIR_WALL,
-    BORE,
     FACET,
     FILM,
-    ROD,
-    SEALED_WALL,
-    WALLS,
 )
 from softehl.cases.seal.verdict import ContactNumbers, FilmNumbers, Verdict
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.postprocess import (
-    alternating_difference,
     element_means,
-    first_below,
     interval_below,
     relative_spread,
     run_around,
@@ -42,16 +40,7 @@ from softehl.runtime.fem.rules import trace_rule
 
 MICROMETRE = 1e-3  # mm
 
-EXIT_SLOPE = 40.0
-"""Slope beyond which a film has ended, degrees: the corner of a flat, the heel of a cup."""
-
-INLET = (10.0, 1.5)
-"""Film thicknesses, in h*, between which the segments of the inlet are counted."""
-
 _TORN = 1e-6  # void fraction of a film that has ruptured
-
-MID_CONTACT = 0.1
-"""Share of the contact that is left out at either end where oscillations are looked for."""
 
 
 def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array) -> FilmNumbers:
@@ -102,15 +91,6 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         contacts=_contacts(at, (z, h), parts, film) if len(parts) > 1 else (),
         drag=drag,
     )
-
-
-def end_gap(z: Array, h: Array) -> float:
-    """Film thickness at the exit of the arc, mm; inf where the surface is too steep for a film.
-
-    z, h: (nodes,) towards the exit.
-    """
-    steep = h[-1] - h[-2] > tan(radians(EXIT_SLOPE)) * (z[-1] - z[-2])  # also straight up
-    return inf if steep else float(h[-1])
 
 
 def film_parts(h: Array) -> list[slice]:
@@ -189,171 +169,6 @@ def rough_numbers(system: SealSystem, at: Mapping[str, Array]) -> dict[str, floa
         "lambda_ratio": gap / sigma,
         "asperity_load": float(asperities / (load + asperities)),
         "boundary_friction": float(boundary / drag),
-    }
-
-
-def lacking(at: Mapping[str, Array], film: FilmLoads, z: Array, h: Array) -> float:
-    """Pressure that a film builds up before the arc begins, relative to that of its inlet.
-
-    at: fields of the film; z, h: (nodes,) its nodes. Beyond its end the gap goes on as a wedge, in
-    which (14) gives 6 eta U / (slope h) at most; the pressure of an inlet is that at its steepest
-    rise, in excess of the pressure outside.
-    """
-    first, second = (0, 1) if film.stroke == "out" else (-1, -2)
-    rise, width = h[first] - h[second], abs(z[first] - z[second])
-    steepest = _steepest(at, film)
-    if steepest is None or not rise > 0.0:
-        return np.inf
-    outside, eta = (at[name].ravel()[0 if film.stroke == "out" else -1] for name in ("p", "eta"))
-    inlet = float(at["p"].ravel()[steepest] - outside)
-    if not inlet > 0.0:
-        return np.inf
-    return float(6.0 * eta * film.speed * width / (rise * h[first]) / inlet)
-
-
-def _steepest(at: Mapping[str, Array], film: FilmLoads) -> int | None:
-    """Where in the inlet the pressure rises most steeply, None if it does not rise."""
-    x, p, slope = at["x"].ravel(), at["p"].ravel(), _slope(at).ravel()
-    top = x[np.argmax(p)]
-    inlet = x < top if film.rod_speed > 0.0 else x > top
-    rise = np.where(inlet, np.copysign(1.0, film.rod_speed) * slope, -np.inf)
-    steepest = int(np.argmax(rise))
-    return steepest if rise[steepest] > 0.0 else None
-
-
-def _slope(at: Mapping[str, Array]) -> Array:
-    """p' at the points, MPa/mm; of an oil that thins that of a Newtonian one of the same flux."""
-    return at["driving"] if "driving" in at else (at["tau_rod"] - at["tau"]) / at["h"]
-
-
-def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> float:
-    """h* over sqrt(8 eta |U| / (9 p')), p' the steepest rise of the pressure in the inlet.
-
-    at: fields of the film, (segments, points) each. By (14) p' = 6 eta U (h - h*) / h^3, which is
-    largest at h = 3/2 h*: the ratio is 1 for a film that fulfils (14), on a mesh that shows it.
-    """
-    steepest = _steepest(at, film)
-    if steepest is None:
-        return np.nan
-    eta = at["eta"].ravel()[steepest]
-    rise = abs(_slope(at).ravel()[steepest])
-    return float(h_star / np.sqrt(8.0 * eta * film.speed / (9.0 * rise)))
-
-
-def oscillation(x: Array, h: Array) -> float:
-    """Oscillation index of the nodal film thickness h (nodes,) at x (nodes,), dimensionless.
-
-    The largest alternating second difference over the mid contact relative to the median of h
-    there: D_i = h_(i-1) - 2 h_i + h_(i+1), and a pair of neighbours of opposite sign counts with
-    the smaller of |D_i|, |D_(i+1)|. A zigzag of amplitude a about h has the index 4 a / h, a
-    smooth film next to none. The mid contact is the middle four fifths of where h < 20 um.
-    """
-    start, end = interval_below(x, h, CONTACT_FILM)
-    margin = MID_CONTACT * (end - start)
-    inside = h[(x >= start + margin) & (x <= end - margin)]
-    return alternating_difference(inside) / float(np.median(inside)) if len(inside) else 0.0
-
-
-def inlet_segments(h: Array, h_star: float) -> float:
-    """Length of the inlet in segments; h (nodes,) from the inlet on.
-
-    From where h, coming from outside, first falls below ten times h* to where it first falls below
-    one and a half times h*: there the pressure rises that makes the film.
-    """
-    outer, inner = (first_below(h, level * h_star) for level in INLET)
-    return inner - outer
-
-
-def contact_state(
-    system: SealSystem, problem: Problem, sealed_pressure: float, x: Array
-) -> ContactState:
-    """The frictionless contact state with the unknowns x."""
-    mesh = system.mesh
-    deformed = system.deformed(x)
-    arc = deformed[mesh.arc_nodes]
-    pressure = contact_pressure(system, sealed_pressure, x)
-    touching = np.flatnonzero(system.rod_multipliers(x) < 0.0)
-    ends = arc[touching[[0, -1]], 0] if len(touching) else np.full(2, np.nan)
-    return ContactState(
-        sealed_pressure=sealed_pressure,
-        p_max_MPa=float(pressure.max()),
-        contact_start_mm=float(ends[0]),
-        contact_end_mm=float(ends[1]),
-        x_mm=arc[:, 0].copy(),
-        p_MPa=pressure,
-        section=section_view(system, problem, x, pressure),
-    )
-
-
-def contact_pressure(system: SealSystem, sealed_pressure: float, x: Array) -> Array:
-    """True pressure (arc nodes,): multipliers per current area, plus p_s where it acts, MPa."""
-    mesh = system.mesh
-    current = tributary_areas(system.deformed(x), mesh.arc_segments, mesh.arc_nodes)
-    multipliers = np.minimum(system.rod_multipliers(x), 0.0)
-    pressure = -multipliers * system.rod_areas / current
-    pressure[: system.dam] += sealed_pressure
-    pressure[system.dam] += 0.5 * sealed_pressure  # the pressure ends at this node
-    return np.asarray(pressure)
-
-
-def unsealed(system: SealSystem, x: Array) -> str:
-    """Where the sealed pressure ends outside the contact of the state x; empty if nowhere."""
-    if system.parameters.sealed_pressure == 0.0:
-        return ""
-    if not system.pressing(ROD, x)[system.dam] > 0.0:
-        return "at the lowest point of the section"
-    crown = system.section.chains[WALLS[BORE]][0] == system.section.pressed_ends[1]
-    return "" if (system.pressing(BORE, x)[crown] > 0.0).all() else "at its crown"
-
-
-def contact_peaks(system: SealSystem, sealed_pressure: float, x: Array) -> tuple[float, ...]:
-    """The largest pressure of each contact of the state x, from the sealed side on, MPa."""
-    pressure = contact_pressure(system, sealed_pressure, x)
-    return tuple(float(pressure[nodes].max()) for nodes in contacts(system, x))
-
-
-def fit_percent(p: ORing) -> dict[str, float]:
-    """How the free ring fits its gland."""
-    depth = 0.5 * (p.housing_diameter - p.rod_diameter)
-    return {
-        "stretch_percent": stretch(p.inner_diameter, p.rod_diameter),
-        "squeeze_percent": squeeze(p.section_diameter, depth),
-        "fill_percent": fill(p.free_ring, p.rod_diameter, p.housing_diameter, p.groove_width),
-    }
-
-
-def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
-    """Fit of the ring in its gland; axial forces on it in the contact state x, + to the air side.
-
-    The sealed pressure acts on what lies between its two ends; forces of the walls are in excess of
-    it. Their sum with that of the hold is zero in equilibrium.
-    """
-    p, section = system.parameters, system.section
-    bottom, crown = system.deformed(x)[list(section.pressed_ends), 1]
-    forces = {
-        "air_wall_N": -system.reaction(AIR_WALL, x),
-        "sealed_wall_N": system.reaction(SEALED_WALL, x),
-        "hold_N": system.axial_force(x),
-        "housing_friction_N": system.housing_friction(x),
-        "sealed_pressure_N": p.sealed_pressure * pi * float(crown**2 - bottom**2),
-    }
-    return {
-        **fit_percent(p),
-        **forces,
-        "axial_sum_N": sum(forces.values()),
-        **mean_motion(system, x),
-    }
-
-
-def mean_motion(system: SealSystem, x: Array) -> dict[str, float]:
-    """Mean rotation of the section, from z towards r, and mean axial displacement."""
-    residuals = {}
-    for name in ("rotation", "hold"):
-        block, given = system.problem.assembler.block(name), system.problem.parameters[name]
-        residuals[name] = float(block.residual(x, given)[:, -1].sum())
-    return {
-        "mean_rotation_degrees": float(np.degrees(residuals["rotation"])),
-        "mean_place_mm": residuals["hold"],
     }
 
 

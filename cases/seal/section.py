@@ -13,8 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from softehl.cases.seal.layout import Layout, uniform_layout
+from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.uniform_layout import uniform_layout
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.sections import SectionMesh
 

@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.coarser_films import CoarserFilms
+from softehl.cases.seal.contact_results import contact_peaks, contact_pressure, unsealed
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.estimate import estimated_error
 from softehl.cases.seal.film_path import BuiltFilm, FilmPath, OnSpeed, below
@@ -20,13 +21,7 @@ from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
 from softehl.cases.seal.overlap import overlap
 from softehl.cases.seal.path import StageFailed
-from softehl.cases.seal.results import (
-    contact_peaks,
-    contact_pressure,
-    film_numbers,
-    film_state,
-    unsealed,
-)
+from softehl.cases.seal.results import film_numbers, film_state
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import CLIPPED, FilmState, doubt

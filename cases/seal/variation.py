@@ -16,10 +16,12 @@ import numpy as np
 from softehl.cases.seal import materials, shear_thinning
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.given import number, times
-from softehl.cases.seal.layout import OutlineLayout, RoundLayout, uniform_layout
 from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.outline_layout import OutlineLayout
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.round_layout import RoundLayout
 from softehl.cases.seal.section import SealSection
+from softehl.cases.seal.uniform_layout import uniform_layout
 from softehl.runtime.fem.design import Inputs, rate_of
 from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.contact import load_stage
+from softehl.cases.seal.contact_results import contact_numbers
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.failure import explained
 from softehl.cases.seal.loading import State
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.results import contact_numbers
 from softehl.cases.seal.state import Silent
 from softehl.runtime.solve.solution import Branch, Status
 

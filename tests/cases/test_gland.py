@@ -10,6 +10,7 @@ import pytest
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
 from softehl.cases.seal.contact import along, lean_stage, load_stage, squeeze_stage
+from softehl.cases.seal.contact_results import unsealed
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import build_system
@@ -18,7 +19,6 @@ from softehl.cases.seal.grading import film_thickness
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.results import unsealed
 from softehl.cases.seal.state import CLIPPED, COLLAPSED, UNDER_RESOLVED, Outcome, Silent
 from softehl.cases.seal.system import BORE, ROD
 from softehl.runtime.solve.solution import Branch, Status

@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from softehl.cases.seal.contact_results import contact_pressure, unsealed
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.grading import placed_layout
-from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.loading import State
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.results import contact_pressure, unsealed
+from softehl.cases.seal.round_layout import RoundLayout
 from softehl.cases.seal.state import Silent
 from softehl.cases.seal.system import BORE, ROD
 from softehl.runtime.mesh.sections import Disc

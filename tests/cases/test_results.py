@@ -9,18 +9,12 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.contact_results import contact_pressure
 from softehl.cases.seal.equations import build_system
+from softehl.cases.seal.film_signs import end_gap, inlet_ratio, inlet_segments, oscillation
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.path import PathSettings
-from softehl.cases.seal.results import (
-    contact_pressure,
-    end_gap,
-    film_numbers,
-    film_state,
-    inlet_ratio,
-    inlet_segments,
-    oscillation,
-)
+from softehl.cases.seal.results import film_numbers, film_state
 from softehl.cases.seal.state import CLIPPED, COLLAPSED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED
 from softehl.cases.seal.verdict import INLET_RATIO, FilmNumbers, Verdict, fewest_inlet_segments
 from tests.cases.oring_cases import oring

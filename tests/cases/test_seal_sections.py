@@ -11,20 +11,23 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.contact import contact_problem
+from softehl.cases.seal.contact_results import contact_peaks, contact_pressure
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import contact_key
 from softehl.cases.seal.contacts import contact_edges, contacts, groups, traps
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.film_path import FilmPath
-from softehl.cases.seal.layout import OutlineLayout, dam, uniform_layout
+from softehl.cases.seal.layout import dam
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.method import run
+from softehl.cases.seal.outline_layout import OutlineLayout
 from softehl.cases.seal.overlap import crossing, overlap
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.results import contact_peaks, contact_pressure, filled_ratio, film_parts
+from softehl.cases.seal.results import filled_ratio, film_parts
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
+from softehl.cases.seal.uniform_layout import uniform_layout
 from softehl.cases.seal.verdict import INLET_RATIO, ContactNumbers, FilmNumbers, Verdict
 from softehl.runtime.arrays import Array, Integers
 

@@ -8,8 +8,8 @@ import pytest
 
 from softehl.cases.seal.declared import Block, Numbering
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.layout import RoundLayout
 from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.round_layout import RoundLayout
 from softehl.cases.seal.scales import film_flux
 from softehl.cases.seal.section import SealSection
 from softehl.cases.seal.system import BLOCKS, DISPLACEMENT, FIELDS, PRESSURE

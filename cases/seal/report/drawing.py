@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from softehl.cases.seal.layout import uniform_layout
+from softehl.cases.seal.contact_results import fit_percent
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
-from softehl.cases.seal.results import fit_percent
+from softehl.cases.seal.uniform_layout import uniform_layout
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
