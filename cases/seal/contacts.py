@@ -50,21 +50,6 @@ def contacts(system: SealSystem, x: Array) -> list[Integers]:
     return groups(h - h.min(), system.rod_multipliers(x) < 0.0, GRAZED)
 
 
-def traps(system: SealSystem, x: Array, y: Array, apart: float) -> bool:
-    """Whether the film y (n,) holds oil between what is one contact in the contact state x (n,).
-
-    apart: film thickness that parts two contacts, mm, or more than `CONTACT_FILM` of thick films.
-
-    Squeezing a film out leaves some where contact presses less than on both sides, as under a
-    groove that is pressed flat. It stays there, steadily, at a pressure of its own: there are two
-    films then, and the mesh is that of the other one.
-    """
-    _, h = system.arc_film(y)
-    found = contacts(system, x)
-    apart = max(apart, CONTACT_FILM)
-    return 0 < len(found) < len(groups(h, h < apart, apart))
-
-
 def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
     """Where and how steeply each contact of the state x begins and ends along the arc.
 

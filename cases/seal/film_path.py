@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.contact import along, emptying_stage
-from softehl.cases.seal.contacts import contact_edges, traps
+from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.dry import (
     dry_film,
     rising_stage,
@@ -29,6 +29,8 @@ from softehl.cases.seal.grading import film_thickness
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
+from softehl.cases.seal.pockets import fed, traps
+from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.thinning import longer, sooner, thinned_film, thinning_stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
@@ -98,7 +100,7 @@ class FilmPath:
         if isinstance(y, StageFailed) and not y.branch.points:
             y = self.driver.follow(sooner(self.system, first, film, x), start)
         thick = _POCKET * film_thickness(p, contact_edges(self.system, x), film.speed)
-        if not isinstance(y, StageFailed) and traps(self.system, x, y, thick):
+        if not isinstance(y, StageFailed) and self._traps(film, x, y, thick):
             y = StageFailed(first, Branch((), Status.DIVERGED, "oil is trapped"))
         if p.shear_traction:
             film = replace(film, shear=1.0)
@@ -107,6 +109,13 @@ class FilmPath:
             return failed
         y = self.driver.follow(longer(first), y)  # it was not steady yet
         return self._falling(fast, film, y, on_speed)
+
+    def _traps(self, film: FilmLoads, x: Array, y: Array, apart: float) -> bool:
+        """Whether the film y (n,) holds oil that is not on the way of its flux; see `fed`."""
+        if not traps(self.system, x, y, apart):
+            return False
+        h_star = film_numbers(self.system, self.system.film_problem(film), film, y).h_star
+        return not fed(self.system, film, x, y, apart, h_star)
 
     def _near(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
         """All films of a stroke from the contact state x with the rod near: squeezed out, or else

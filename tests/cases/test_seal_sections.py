@@ -14,16 +14,17 @@ from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.contact_results import contact_peaks, contact_pressure
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import contact_key
-from softehl.cases.seal.contacts import contact_edges, contacts, groups, traps
+from softehl.cases.seal.contacts import contact_edges, contacts, groups
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.layout import dam
-from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.method import run
 from softehl.cases.seal.outline_layout import OutlineLayout
 from softehl.cases.seal.overlap import crossing, overlap
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.pockets import fed, traps
 from softehl.cases.seal.results import filled_ratio, film_parts
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
@@ -220,6 +221,26 @@ def test_a_groove_that_grazes_the_rod_parts_two_contacts_and_films_may_trap_oil_
     system.displacements(x)[nodes[30:40], 1] += 0.0022
     assert len(contact_edges(system, x)) == 4
     assert not traps(system, x, film, 0.0)
+
+
+@pytest.mark.parametrize(("stroke", "rise"), [("out", 2.0), ("in", 0.5)])
+def test_a_pocket_is_fed_where_contact_would_not_let_the_flux_pass(
+    stroke: Stroke, rise: float
+) -> None:
+    system = build_system(ORing(section="rectangular", sealed_pressure=0.0, **GROOVE))
+    nodes, x = system.mesh.arc_nodes, system.at_rest()
+    s = system.section.places - system.section.places[34]
+    pressure = np.where(s < 0.0, -0.5 * s, 2.0 * s) + 1.0  # on both sides of the pocket
+    pressure[:20] = pressure[50:] = 0.0
+    system.rod_multipliers(x)[:] = -pressure
+    system.displacements(x)[nodes, 1] = -system.mesh.points[nodes, 1] + system.rod_radius + 0.01
+    film, speed = x.copy(), 800.0
+    system.displacements(film)[nodes[28:41], 1] += 0.03
+    loads = FilmLoads(0.0, stroke, speed, multipliers=-pressure, gap=np.full(len(nodes), 0.01))
+    metering = np.sqrt(8.0 * system.parameters.viscosity * speed / (9.0 * rise))
+    assert traps(system, x, film, 0.0)
+    assert fed(system, loads, x, film, 0.0, 1.1 * metering)
+    assert not fed(system, loads, x, film, 0.0, 0.9 * metering)
 
 
 def test_corner_peaks_do_not_place_an_edge() -> None:
