@@ -287,7 +287,7 @@ class SealSystem:
             **self._film_parameters(film, fields),
         )
         fixed = [*map(self._ends, fields), self.layout.dofs(ROD)]
-        values: list[Array | float] = [np.array([p_s, 0.0]) for _ in fields]
+        values: list[Array | float] = [film.ends for _ in fields]
         values.append(film.multipliers)
         if self.parameters.conserving:
             fixed.append(self._ends(VOID))

@@ -224,6 +224,20 @@ class FilmPath:
             stage = speed_stage(self.system, self.settings, film, speeds, on_speed)
             self.driver.follow(fast.speed(stage), x)
 
+    def entered(self, film: FilmLoads, x: Array) -> BuiltFilm:
+        """The film x (n,) with the pressure of the wedge before its arc where it lacks much of it.
+
+        Without it where that leads to no film.
+        """
+        numbers = film_numbers(self.system, self.system.film_problem(film), film, x)
+        if not numbers.enters:
+            return film, x
+        more, fast = replace(film, entrance=numbers.entrance), self._modified(x)
+        one = speed_stage(self.system, self.settings, more, (film.speed,), lambda at, point: None)
+        stage = replace(one, name="wedge before the arc")
+        y = self.driver.follow(fast.speed(stage) if fast else stage, x)
+        return (film, x) if isinstance(y, StageFailed) else (more, y)
+
     def begun(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> tuple[FilmLoads, Array] | None:
         """The start to go on from by Newton's method, None if the films of a stroke are all solved.
 

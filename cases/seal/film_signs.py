@@ -35,23 +35,18 @@ def end_gap(z: Array, h: Array) -> float:
     return inf if steep else float(h[-1])
 
 
-def lacking(at: Mapping[str, Array], film: FilmLoads, z: Array, h: Array) -> float:
-    """Pressure that a film builds up before the arc begins, relative to that of its inlet.
+def lacking(at: Mapping[str, Array], film: FilmLoads, entrance: float) -> float:
+    """Share of an inlet's pressure that its film lacks, as it is built up before the arc begins.
 
-    at: fields of the film; z, h: (nodes,) its nodes. Beyond its end the gap goes on as a wedge, in
-    which (14) gives 6 eta U / (slope h) at most; the pressure of an inlet is that at its steepest
-    rise, in excess of the pressure outside.
+    at: fields of the film. entrance: what the wedge there builds up, MPa. The pressure of an inlet
+    is that at its steepest rise, in excess of the pressure outside.
     """
-    first, second = (0, 1) if film.stroke == "out" else (-1, -2)
-    rise, width = h[first] - h[second], abs(z[first] - z[second])
     steepest = _steepest(at, film)
-    if steepest is None or not rise > 0.0:
-        return np.inf
-    outside, eta = (at[name].ravel()[0 if film.stroke == "out" else -1] for name in ("p", "eta"))
+    if steepest is None:
+        return inf
+    outside = at["p"].ravel()[0 if film.stroke == "out" else -1] - film.entrance
     inlet = float(at["p"].ravel()[steepest] - outside)
-    if not inlet > 0.0:
-        return np.inf
-    return float(6.0 * eta * film.speed * width / (rise * h[first]) / inlet)
+    return abs(entrance - film.entrance) / inlet if inlet > 0.0 else inf
 
 
 def _steepest(at: Mapping[str, Array], film: FilmLoads) -> int | None:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from softehl.cases.seal.surfaces import SLIP
 from softehl.runtime.arrays import Array
 
@@ -39,8 +41,9 @@ class FilmLoads:
     the rod in it, mm. moment: moment on the section (N mm) if it is free to roll, None if its
     rotation is held. place: as of the contact state. rate: coefficient of time derivatives, 1/s, 0
     where nothing changes. inflow: void fractions at the sealed and the air end, where oil comes in.
-    slip: speed at which the friction of asperities has 0.7 of its value, mm/s. least_speed: that
-    the sizes of fluxes are taken at, mm/s.
+    entrance: pressure that oil has built up before the arc, MPa. slip: speed at which the friction
+    of asperities has 0.7 of its value, mm/s. least_speed: that the sizes of fluxes are taken at,
+    mm/s.
     """
 
     sealed_pressure: float
@@ -55,8 +58,15 @@ class FilmLoads:
     place: float | None = None
     rate: float = 0.0
     inflow: tuple[float, float] = (0.0, 0.0)
+    entrance: float = 0.0
     slip: float = SLIP
     least_speed: float = 0.0
+
+    @property
+    def ends(self) -> Array:
+        """Pressures (2,) at the sealed and the air end of the film, MPa, (15)."""
+        out, here = self.stroke == "out", self.entrance
+        return np.array([self.sealed_pressure + here, 0.0] if out else [self.sealed_pressure, here])
 
     @property
     def rod_speed(self) -> float:

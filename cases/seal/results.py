@@ -10,6 +10,7 @@ from math import nan, pi
 import numpy as np
 
 from softehl.cases.seal.contacts import CONTACT_FILM, groups
+from softehl.cases.seal.entrance import built_up, wedge, wedge_friction
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film_signs import (
     INLET,
@@ -73,6 +74,13 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         float(2.0 * pi * system.rod_radius * (tau * at["dx"]).sum())
         for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
     )
+    end = 0 if film.stroke == "out" else -1
+    before, flow = wedge(system, film, x), float(at["eta"].ravel()[end]) * film.speed
+    entrance = built_up(*before, flow, h_star)
+    if film.entrance:
+        sliding, rubbed = wedge_friction(system, *before, flow, h_star)
+        drag += np.copysign(sliding, film.rod_speed)
+        friction += np.copysign(rubbed, film.rod_speed)
     return FilmNumbers(
         speed=film.speed,
         flux=q,
@@ -86,7 +94,8 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
         inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(inlet, film, h_star),
         end_gap=end_gap(*((z, h) if film.stroke == "out" else (-z[::-1], h[::-1]))),
-        lacking=0.0 if system.parameters.rough else lacking(inlet, film, z, h),
+        entrance=entrance,
+        lacking=0.0 if system.parameters.rough else lacking(inlet, film, entrance),
         **rough_numbers(system, at),
         contacts=_contacts(at, (z, h), parts, film) if len(parts) > 1 else (),
         drag=drag,

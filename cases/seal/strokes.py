@@ -203,16 +203,17 @@ class SealRun:
             return
         progress.missing.discard(film.speed)
         iterations = point.solution.iterations
-        p, last = system.parameters, progress.verdict.last
-        assert last is not None
+        film, x = self.path.entered(film, x)
+        p, problem = system.parameters, system.film_problem(film)
+        last = film_numbers(system, problem, film, x)
         if self.coarser and film.speed not in coarser:
             coarser |= _carried(*self.coarser, film, (system, self.x, x))
         error, of_friction = _errors(p.density, last, coarser.get(film.speed))
         estimated = p.error_estimate and p.mesh == "graded"
-        verdict = replace(progress.verdict, error=error if estimated else None)
+        verdict = replace(progress.verdict, last=last, error=error if estimated else None)
         state = film_state(system, problem, film, x, verdict, iterations)
         state = replace(state, h_star_error_percent=error, rod_friction_error_percent=of_friction)
-        if p.sensitivity and resolved(state):
+        if p.sensitivity and resolved(state) and not film.entrance:
             state = replace(state, sensitivity=self._differentiated(film, x))
         wanted.found(state, final=self.better is None)
 
@@ -271,7 +272,7 @@ def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> Coars
     def keep(film: FilmLoads, point: Point) -> None:
         if film.speed in speeds:
             known.films[film.speed] = point.solution.x
-            known.numbers[film.speed] = _numbers(path.system, film, point.solution.x)
+            known.numbers[film.speed] = _numbers(path, film, point.solution.x)
 
     path.films(stroke, x, keep)
     return known
@@ -288,13 +289,14 @@ def _carried(
     known = CoarserFilms(other, path.system, contact, {film.speed: y})
 
     def keep(film: FilmLoads, point: Point) -> None:
-        known.numbers[film.speed] = _numbers(path.system, film, point.solution.x)
+        known.numbers[film.speed] = _numbers(path, film, point.solution.x)
 
     if path.quick and not path.system.parameters.rough:
         path.from_finer(film.stroke, x, known, keep)
     return known.numbers
 
 
-def _numbers(system: SealSystem, film: FilmLoads, x: Array) -> FilmNumbers:
+def _numbers(path: FilmPath, film: FilmLoads, x: Array) -> FilmNumbers:
     """What a film x (n,) means."""
-    return film_numbers(system, system.film_problem(film), film, x)
+    film, y = path.entered(replace(film, entrance=0.0), x)
+    return film_numbers(path.system, path.system.film_problem(film), film, y)
