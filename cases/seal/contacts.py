@@ -14,6 +14,9 @@ from softehl.runtime.arrays import Array, Flags, Integers
 CONTACT_FILM = 0.02
 """Film thickness that counts as contact, mm; a gap above it parts two contacts of a film."""
 
+GROOVE = 2.0
+"""Of the thinnest film: what parts two lobes whose groove is not as deep as `CONTACT_FILM`."""
+
 GRAZED = 1e-3
 """Gap that parts two dry contacts, mm: a film opens a groove whose ground is so near to the rod."""
 
@@ -42,6 +45,17 @@ def groups(h: Array, inside: Flags, apart: float = CONTACT_FILM) -> list[Integer
         if b > a + 1 and h[a + 1 : b].max() > apart
     ]
     return [part for part in np.split(nodes, cuts) if len(part)]
+
+
+def contact_film(h: Array, lobes: int = 1) -> float:
+    """Film thickness that counts as contact, mm, of a film h (nodes,) of a section with lobes.
+
+    Less than `CONTACT_FILM` where a thick film fills a shallow groove: else both of its contacts
+    would be one, with an inlet and an exit in its middle.
+    """
+    thin = GROOVE * float(h.min())
+    whole, parted = (len(groups(h, h < level, level)) for level in (CONTACT_FILM, thin))
+    return min(thin, CONTACT_FILM) if whole < lobes == parted else CONTACT_FILM
 
 
 def contacts(system: SealSystem, x: Array) -> list[Integers]:

@@ -78,15 +78,16 @@ def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> floa
     return float(h_star / np.sqrt(8.0 * eta * film.speed / (9.0 * rise)))
 
 
-def oscillation(x: Array, h: Array) -> float:
+def oscillation(x: Array, h: Array, level: float = CONTACT_FILM) -> float:
     """Oscillation index of the nodal film thickness h (nodes,) at x (nodes,), dimensionless.
 
     The largest alternating second difference over the mid contact relative to the median of h
     there: D_i = h_(i-1) - 2 h_i + h_(i+1), and a pair of neighbours of opposite sign counts with
     the smaller of |D_i|, |D_(i+1)|. A zigzag of amplitude a about h has the index 4 a / h, a
-    smooth film next to none. The mid contact is the middle four fifths of where h < 20 um.
+    smooth film next to none. The mid contact is the middle four fifths of where h is below the
+    level of `contact_film`, 20 um.
     """
-    start, end = interval_below(x, h, CONTACT_FILM)
+    start, end = interval_below(x, h, level)
     margin = MID_CONTACT * (end - start)
     inside = h[(x >= start + margin) & (x <= end - margin)]
     return alternating_difference(inside) / float(np.median(inside)) if len(inside) else 0.0

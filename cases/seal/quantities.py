@@ -12,8 +12,8 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.contacts import CONTACT_FILM
-from softehl.cases.seal.results import film_parts
+from softehl.cases.seal.contacts import CONTACT_FILM, contact_film
+from softehl.cases.seal.results import film_parts, metering
 from softehl.cases.seal.system import DISPLACEMENT, FACET, FILM
 from softehl.cases.seal.variation import SPEED, FilmCase
 from softehl.runtime.arrays import Array
@@ -64,8 +64,9 @@ def _flux(
     case: FilmCase, problem: Problem, at: Mapping[str, Array], x: Array
 ) -> tuple[float, dict[str, dict[str, Array]]]:
     """The flux at the largest pressure and the weights of its logarithm; see `film_numbers`."""
-    parts = film_parts(case.system.arc_film(x)[1])
-    first = parts[0 if case.film.stroke == "out" else -1]  # which the oil reaches first
+    h = case.system.arc_film(x)[1]
+    parts = film_parts(h, contact_film(h, case.system.parameters.lobes))
+    first = metering(at, parts, case.film.stroke)
     top = int(first.start + np.argmax(at["p"][first].max(axis=1)))
     if case.system.parameters.reynolds == "dg":
         flux = problem.fields(FACET, x)["flux"]

@@ -9,7 +9,7 @@ from math import nan, pi
 
 import numpy as np
 
-from softehl.cases.seal.contacts import CONTACT_FILM, groups
+from softehl.cases.seal.contacts import CONTACT_FILM, contact_film, groups
 from softehl.cases.seal.entrance import built_up, wedge, wedge_friction
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film_signs import (
@@ -20,7 +20,7 @@ from softehl.cases.seal.film_signs import (
     lacking,
     oscillation,
 )
-from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.section_view import film_pressure, section_view
 from softehl.cases.seal.state import FilmState, Profile
 from softehl.cases.seal.surfaces import regime
@@ -47,19 +47,19 @@ _TORN = 1e-6  # void fraction of a film that has ruptured
 def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array) -> FilmNumbers:
     """Scalars of a converged film with the unknowns x.
 
-    The flux is that at the largest pressure, of several contacts in that which the oil reaches
-    first: the mean over the segment for continuous, the mean
+    The flux is that at the largest pressure, of several contacts in the first on the way of the
+    oil that is not lifted (see `metering`): the mean over the segment for continuous, the mean
     of (23) at the facets of the segment for discontinuous pressures, which (21) and (22) make
     constant. Its relative spread is taken over the neighbours on both sides up to where the film
     cavitates, eqs. (16) and (25).
     """
     at = problem.fields(FILM, x)
     z, h = system.arc_film(x)
-    parts = film_parts(h)
-    first = parts[0 if film.stroke == "out" else -1]
-    peaks = [_top(at, part) for part in parts]
-    top = peaks[0 if film.stroke == "out" else -1]
-    inlet = {name: values[first] for name, values in at.items()}
+    level = contact_film(h, system.parameters.lobes)
+    parts = film_parts(h, level)
+    first = metering(at, parts, film.stroke)
+    top, inlet = _top(at, first), {name: values[first] for name, values in at.items()}
+    narrows = h[_nodes(first)][:: 1 if film.stroke == "out" else -1]
     whole = run_around(at["p"].min(axis=1) >= 0.0, top)
     jump = 0.0
     if system.parameters.reynolds == "dg":
@@ -90,24 +90,25 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         friction=friction,
         flux_variation=relative_spread(flux[whole]),
         jump=jump,
-        oscillation=max(oscillation(*(v[_nodes(k)] for v in (z, h))) for k in parts),
-        inlet_segments=inlet_segments(h if film.stroke == "out" else h[::-1], h_star),
+        oscillation=max(oscillation(*(v[_nodes(k)] for v in (z, h)), level) for k in parts),
+        inlet_segments=inlet_segments(narrows, h_star),
         inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(inlet, film, h_star),
         end_gap=end_gap(*((z, h) if film.stroke == "out" else (-z[::-1], h[::-1]))),
         entrance=entrance,
         lacking=0.0 if system.parameters.rough else lacking(inlet, film, entrance),
         **rough_numbers(system, at),
-        contacts=_contacts(at, (z, h), parts, film) if len(parts) > 1 else (),
+        contacts=_contacts(at, (z, h), parts, film, level) if len(parts) > 1 else (),
         drag=drag,
     )
 
 
-def film_parts(h: Array) -> list[slice]:
+def film_parts(h: Array, level: float = CONTACT_FILM) -> list[slice]:
     """The segments of each contact, from the sealed side on; together they are the whole film.
 
-    h: (nodes,). Contacts are parted where the film between them is thickest.
+    h: (nodes,). level: of `contact_film`. Contacts are parted where the film between them is
+    thickest.
     """
-    found = groups(h, h < CONTACT_FILM)
+    found = groups(h, h < level, level)
     between = [(a[-1], b[0]) for a, b in pairwise(found)]
     cuts = [0, *(int(a + np.argmax(h[a : b + 1])) for a, b in between), len(h) - 1]
     return [slice(a, b) for a, b in pairwise(cuts)]
@@ -117,19 +118,40 @@ def _nodes(part: slice) -> slice:
     return slice(part.start, part.stop + 1)
 
 
+def metering(at: Mapping[str, Array], parts: Sequence[slice], stroke: Stroke) -> slice:
+    """The part of the film that meters the flux: of the first contact with a peak of its own.
+
+    at: fields of the film; parts: of `film_parts`. Over a lobe that the oil lifts pressure rises
+    all the way into the groove behind it.
+    """
+    for part in parts if stroke == "out" else reversed(parts):
+        if not _lifted(at, part, stroke):
+            return part
+    return parts[0 if stroke == "out" else -1]
+
+
+def _lifted(at: Mapping[str, Array], part: slice, stroke: Stroke) -> bool:
+    """Whether pressure rises all the way through a part of the film, where the oil goes."""
+    return _top(at, part) == (part.stop - 1 if stroke == "out" else part.start)
+
+
 def _top(at: Mapping[str, Array], part: slice) -> int:
     """The segment of the largest pressure of a part of the film."""
     return int(part.start + np.argmax(at["p"][part].max(axis=1)))
 
 
 def _contacts(
-    at: Mapping[str, Array], nodes: tuple[Array, Array], parts: Sequence[slice], film: FilmLoads
+    at: Mapping[str, Array],
+    nodes: tuple[Array, Array],
+    parts: Sequence[slice],
+    film: FilmLoads,
+    level: float,
 ) -> tuple[ContactNumbers, ...]:
-    """Each contact of a film that has several; nodes: z and h at them."""
+    """Each contact of a film that has several; nodes: z and h at them, level: of `contact_film`."""
     flux, found = element_means(at["flux"], at["dx"]), []
     for part in parts:
         z, h = (values[_nodes(part)] for values in nodes)
-        start, end = interval_below(z, h, CONTACT_FILM)
+        start, end = interval_below(z, h, level)
         found.append(
             ContactNumbers(
                 flux=float(flux[_top(at, part)]),
@@ -148,8 +170,10 @@ def filled_ratio(at: Mapping[str, Array], film: FilmLoads) -> float:
     """`inlet_ratio` of a contact by its own flux; nan where the film ruptures within its inlet.
 
     at: fields of its part of the film, (segments, points) each. nan too where they do not say
-    whether oil is missing.
+    whether oil is missing, and over a lobe that is lifted.
     """
+    if _lifted(at, slice(0, len(at["p"])), film.stroke):
+        return nan
     void = at.get("v_out" if film.stroke == "out" else "v_in")
     if void is None:
         return nan

@@ -59,9 +59,9 @@ FINER_MESH = "the film collapsed on this mesh; use a finer mesh (larger density)
 class ContactNumbers:
     """One contact of a film that has several: mm, MPa, flux per circumference in mm^2/s.
 
-    start, end: where h is 20 um. p_before: pressure where its part of the film begins, in the
-    groove between it and the one before. inlet_ratio: as of the film, nan where too little oil
-    reaches its inlet to fill it.
+    start, end: where h is 20 um, or less over a shallow groove. p_before: pressure where its part
+    of the film begins, in the groove between it and the one before. inlet_ratio: as of the film,
+    nan where too little oil reaches its inlet to fill it.
     """
 
     flux: float
@@ -86,7 +86,8 @@ class FilmNumbers:
     mean_gap: least h_T, mm. lambda_ratio: that
     over sigma, nan between smooth surfaces. asperity_load, boundary_friction: shares of asperities.
     contacts: from the sealed side on, where there are several; h_star is then that of the first one
-    that the oil reaches. drag: the part of the friction that is not of the slope of the pressure.
+    on the way of the oil that has a peak of its own. drag: the part of the friction that is not of
+    the slope of the pressure.
     """
 
     speed: float

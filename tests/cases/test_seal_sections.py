@@ -14,7 +14,13 @@ from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.contact_results import contact_peaks, contact_pressure
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import contact_key
-from softehl.cases.seal.contacts import contact_edges, contacts, groups
+from softehl.cases.seal.contacts import (
+    CONTACT_FILM,
+    contact_edges,
+    contact_film,
+    contacts,
+    groups,
+)
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.layout import dam
@@ -25,7 +31,7 @@ from softehl.cases.seal.overlap import crossing, overlap
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.pockets import fed, traps
-from softehl.cases.seal.results import filled_ratio, film_parts
+from softehl.cases.seal.results import filled_ratio, film_parts, metering
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
 from softehl.cases.seal.uniform_layout import uniform_layout
@@ -106,6 +112,33 @@ def test_contacts_are_parted_where_the_gap_is_wide() -> None:
     assert groups(h, h < -1.0) == []
     assert film_parts(h) == [slice(0, 5), slice(5, 8)]
     assert film_parts(np.full(4, 0.5)) == [slice(0, 3)]
+
+
+def test_a_thick_film_over_a_shallow_groove_has_two_contacts() -> None:
+    x = np.linspace(-3.0, 3.0, 601)
+    lobes = 0.004 + 0.2 * np.maximum(np.abs(np.abs(x) - 1.5) - 1.3, 0.0) ** 1.5
+    h = np.where(np.abs(x) < 1.0, np.minimum(lobes, 0.015 - 0.01 * x**2), lobes)
+    assert h[300] < CONTACT_FILM
+    assert contact_film(h) == CONTACT_FILM
+    assert contact_film(h, lobes=2) == pytest.approx(0.008)
+    whole, parted = film_parts(h), film_parts(h, contact_film(h, lobes=2))
+    assert [(k.start, k.stop) for k in whole] == [(0, 600)]
+    assert [(k.start, k.stop) for k in parted] == [(0, 300), (300, 600)]
+    # what is deeper than 20 um, and one contact with a wave in it, are as before
+    deep = np.where(np.abs(x) < 0.1, 0.03, h)
+    assert contact_film(deep, lobes=2) == CONTACT_FILM
+    assert contact_film(np.minimum(h, 0.007), lobes=2) == CONTACT_FILM
+
+
+def test_a_lobe_that_oil_lifts_does_not_meter_it() -> None:
+    parts = [slice(0, 4), slice(4, 9)]
+    lifted = {"p": np.array([[1.0, 1.1, 1.3, 1.4, 1.5, 2.0, 3.0, 1.0, 0.0]]).T}
+    pressed = {"p": np.array([[1.0, 1.5, 2.0, 1.4, 1.5, 2.0, 3.0, 1.0, 0.0]]).T}
+    assert metering(lifted, parts, "out") == parts[1]
+    assert metering(pressed, parts, "out") == parts[0]
+    assert metering(lifted, parts, "in") == parts[1]
+    back = {"p": lifted["p"][::-1]}
+    assert metering(back, [slice(0, 5), slice(5, 9)], "in") == slice(0, 5)
 
 
 def test_a_pressure_goes_on_to_where_contact_holds_it_back() -> None:
@@ -291,7 +324,7 @@ def test_an_inlet_is_filled_where_the_film_forms_again_outside_it(
     torn_at: float, filled: bool
 ) -> None:
     h_star, eta, speed = 1e-3, 1e-7, 100.0
-    h = np.linspace(30.0, 1.0, 2000).reshape(-1, 2) * h_star
+    h = np.linspace(30.0, 0.9, 2000).reshape(-1, 2) * h_star
     x = np.linspace(0.0, 1.0, 2000).reshape(-1, 2)
     slope = 6.0 * eta * speed * (h - h_star) / h**3
     p = np.cumsum(slope.ravel()).reshape(h.shape) * (x[0, 1] - x[0, 0])
