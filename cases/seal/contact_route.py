@@ -295,6 +295,13 @@ class ContactRoute:
                 self.contacts.keep(*state)
         return state
 
+    def emptied(self, before: State, new: SealSystem) -> State | StageFailed:
+        """A contact state with an empty groove on another mesh, from that of one, at once."""
+        loading = replace(self._loading, trail=Trail())
+        return loading.carried(
+            *before, replace(new, groove=before[0].groove), "groove emptied before"
+        )
+
     def elsewhere(self, old: SealSystem, x: Array, new: SealSystem) -> Followed:
         """Unknowns in contact on a mesh of its own, from the contact state x of another one."""
         state = self._loading.carried(old, x, new, "contact")

@@ -98,7 +98,14 @@ def _for_film(seal: SealRun, last: BuiltFilm, route: ContactRoute) -> SealRun | 
     if isinstance(found, StageFailed):
         return None
     other = _begun(replace(seal.path, system=found[0]), found[1], route)
-    return None if isinstance(other, StageFailed) else replace(other, meshes=seal.meshes - 1)
+    if isinstance(other, StageFailed):
+        return None
+    other = replace(other, meshes=seal.meshes - 1)
+    if seal.empty:
+        emptied = route.emptied((seal.empty.system, seal.empty.x), found[0])
+        if not isinstance(emptied, StageFailed):
+            other = other.emptied(replace(other.path, system=emptied[0]), emptied[1])
+    return other
 
 
 def _outcome(

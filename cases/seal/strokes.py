@@ -94,7 +94,8 @@ class SealRun:
 
     coarser: the films of a coarser mesh, which are no results, and its contact state. better: the
     same on a mesh that is made for a film, None where there is none. meshes: how many such meshes
-    may follow. rates: of the inputs of the film by each parameter, once they were asked for.
+    may follow. empty: the same without pressure in the groove, for an instroke. rates: of the
+    inputs of the film by each parameter, once they were asked for.
     """
 
     path: FilmPath
@@ -102,6 +103,7 @@ class SealRun:
     coarser: tuple[FilmPath, Array] | None = None
     better: Better | None = None
     meshes: int = 0
+    empty: SealRun | None = None
     rates: dict[str, Inputs] = field(default_factory=dict)
 
     @property
@@ -114,32 +116,36 @@ class SealRun:
 
         With the run on the last of these meshes: it is also the better one for the other stroke.
         """
-        seal, failed = self, self.either(stroke, wanted)
+        seal = self._ready(stroke)
+        failed = seal.either(stroke, wanted)
         while seal.better and seal.meshes and wanted.left and wanted.last:
-            seal = seal.better(seal, wanted.last) or replace(seal, meshes=0)
+            seal = (seal.better(seal, wanted.last) or replace(seal, meshes=0))._ready(stroke)
             failed = seal.either(stroke, wanted)
         wanted.close()
-        return failed if wanted.left else None, replace(seal, meshes=self.meshes)
+        return failed if wanted.left else None, replace(seal, meshes=self.meshes, empty=None)
 
     def either(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
         """A stroke: an instroke first without pressure in the groove between two lobes.
 
         The rod draws the oil out of it, or fills it as the film is squeezed out.
         """
-        empty = self._emptied() if stroke == "in" else None
-        if empty:
-            failed = empty.stroke(stroke, wanted)
+        if self.empty:
+            failed = replace(self.empty, meshes=self.meshes).stroke(stroke, wanted)
             if not wanted.left or wanted.last:
                 return failed
         return self.stroke(stroke, wanted)
 
-    def _emptied(self) -> SealRun | None:
-        """The same with an empty groove, None where there is no such state."""
+    def _ready(self, stroke: Stroke) -> SealRun:
+        """With its empty groove, if the stroke needs one and it is not known from another mesh."""
+        if stroke == "out" or self.empty:
+            return self
         found = self.path.emptied(self.x)
-        if found is None:
-            return None
+        return self.emptied(*found) if found else self
+
+    def emptied(self, path: FilmPath, x: Array) -> SealRun:
+        """With the contact state x (n,) of an empty groove."""
         coarser = self.coarser[0].emptied(self.coarser[1]) if self.coarser else None
-        return replace(self, path=found[0], x=found[1], coarser=coarser)
+        return replace(self, empty=replace(self, path=path, x=x, coarser=coarser))
 
     def stroke(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
         """Second and third stage of one stroke; why it ended early, if it did."""

@@ -227,6 +227,26 @@ def test_an_instroke_begins_without_pressure_in_the_groove() -> None:
     assert found[0].emptied(y) is None
 
 
+def test_an_empty_groove_is_carried_to_another_mesh() -> None:
+    system, x = _contact(**X_RING, density=1)
+    driver = PathDriver(Silent())
+    route = ContactRoute(PathSettings(), driver.follow)
+    path = FilmPath(system, PathSettings(), driver)
+    found = path.emptied(x)
+    assert found
+    empty = found[0].system, found[1]
+    other = route.for_film((system, x), contact_edges(*empty))
+    assert not isinstance(other, StageFailed)
+    carried = route.emptied(empty, other[0])
+    assert not isinstance(carried, StageFailed)
+    assert carried[0].groove == 0.0
+    own = replace(path, system=other[0]).emptied(other[1])
+    assert own
+    there, here = (s.displacements(y) for s, y in (carried, (own[0].system, own[1])))
+    assert there == pytest.approx(here, abs=1e-7)
+    assert "groove emptied before" in {record.name for record in driver.records}
+
+
 def test_a_round_ring_has_no_groove_to_empty() -> None:
     system = build_system(ORing(density=1))
     assert system.dam == system.section.lowest
