@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome
@@ -90,18 +91,16 @@ class ORingCase(Case[ORing, FilmRow]):
         ring = p.free_ring
         return list(catalogue.warnings(ring, p.rod_diameter, p.housing_diameter, p.groove_width))
 
-    def notes(self, rows: Sequence[FilmRow]) -> list[str]:
+    def notes(
+        self, rows: Sequence[FilmRow], advice: Mapping[float, str] = MappingProxyType({})
+    ) -> list[str]:
         """See :class:`Case`."""
-        chosen = {word: [row for row in rows if row.verdict == word] for word in plan.DOUBTS}
-        doubts = [
-            f"{word}: {plan.DOUBTS[word]}: {self.named(some)}; use a finer mesh (larger density)"
-            for word, some in chosen.items()
-            if some
-        ]
+        found = plan.doubts(rows, advice)
+        doubts = [f"{words}: {self.named(some)}" for words, some in found.items()]
         loose = [row for row in rows if abs(row.rod_friction_error_percent) > LARGEST_ERROR]
         if loose:
             words = f"friction not known to {LARGEST_ERROR:g} %"
-            doubts.append(f"{words}: {self.named(loose)}; use a finer mesh (larger density)")
+            doubts.append(f"{words}: {self.named(loose)}; {plan.FINER}")
         thin = [row for row in rows if not row.regime and row.h_min_um < plan.THIN]
         if not thin:
             return doubts

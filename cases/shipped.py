@@ -54,7 +54,8 @@ def solve_cases(
     all that is not at its default, such as `density=4-sealed_pressure=2`. executor: any
     `concurrent.futures.Executor` (its workers must see the same file system), None to run one after
     the other in this process. resume: keep the rows that the folders have;
-    overwrite: begin anew there; without both a folder that holds a run is refused.
+    overwrite: begin anew there; without both a folder that holds a run is refused, or other
+        files.
 
     What runs leave for each other is shared (the contact states of an O-ring in `folder/contacts`).
     A run that does not reach everything is no error: see `Curve.complaints`. Raises BadInput, also

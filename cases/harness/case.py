@@ -8,6 +8,7 @@ import importlib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from softehl.cases.harness.observer import Observer, Outcome
@@ -98,8 +99,13 @@ class Case(Generic[P, R]):
         """What is unusual about a run before it begins; it runs all the same."""
         return []
 
-    def notes(self, rows: Sequence[R]) -> list[str]:
-        """What is to be known of rows that are results, but not plain ones."""
+    def notes(
+        self, rows: Sequence[R], advice: Mapping[float, str] = MappingProxyType({})
+    ) -> list[str]:
+        """What is to be known of rows that are results, but not plain ones.
+
+        advice: what they came with, by their keys.
+        """
         return []
 
     def draw(

@@ -48,10 +48,26 @@ class Earlier:
         return float(seconds) if isinstance(seconds, int | float) else 0.0
 
     @property
+    def advice(self) -> dict[float, str]:
+        """What run.json says of rows that are kept, by their keys."""
+        return advice_of(self.content, self.rows)
+
+    @property
     def stages(self) -> tuple[Any, ...]:
         """What run.json says of its stages."""
         stages = self.content.get("stages", ())
         return tuple(stages) if isinstance(stages, list) else ()
+
+
+def advice_of(content: Mapping[str, Any], rows: Sequence[Row]) -> dict[float, str]:
+    """What run.json says of rows that are no plain results, by their keys."""
+    found = {}
+    for row in rows:
+        name = row.key_column().name
+        for state in content.get("states", ()):
+            if isinstance(state, dict) and state.get(name) == row.key:
+                found[row.key] = str(state.get("advice") or "")
+    return found
 
 
 def holds_a_run(folder: Path) -> bool:

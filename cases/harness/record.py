@@ -93,7 +93,7 @@ class RunRecord:
         self.run = run
         self.curve = CurveFolder(folder, run.case.row)
         self.rejected = CurveFolder(folder / "rejected", run.case.row)
-        self.advice: set[str] = set()
+        self.advice: dict[float, str] = {}
         self._began: float | None = None
         self._earlier = Earlier()
         self._existing = existing
@@ -104,6 +104,8 @@ class RunRecord:
         require_folder(folder)
         if holds_a_run(folder):
             self._take(existing)
+        elif existing != "overwrite":
+            require_empty(folder)
 
     def __enter__(self) -> Self:
         """The folder is locked as soon as it is there."""
@@ -159,8 +161,7 @@ class RunRecord:
         if row.usable:
             self.rejected.drop(row.key)
             (self.folder / _DRAFT).unlink(missing_ok=True)
-        else:
-            self.advice.add(state.advice)
+        self.advice[row.key] = state.advice
         self.save("running", "")
         return row
 
@@ -208,8 +209,8 @@ class RunRecord:
             "seconds": seconds + self._earlier.seconds,
             "stages": [*self._earlier.stages, *map(_stage_json, stages)],
             **{name: [record.as_dict() for record in some] for name, some in tables.items()},
-            "states": [_row_json(row, self.curve, ".") for row in self.curve.rows],
-            "rejected": [_row_json(r, self.rejected, "rejected") for r in self.rejected.rows],
+            "states": [self._row_json(row, self.curve, ".") for row in self.curve.rows],
+            "rejected": [self._row_json(r, self.rejected, "rejected") for r in self.rejected.rows],
         }
         write_json(self.folder / "run.json", content)
 
@@ -236,6 +237,14 @@ class RunRecord:
             content = self._earlier.content
             self._size = {key: content.get(key) for key in self._size}
             self.curve.keep(self._earlier.rows)
+            self.advice.update(self._earlier.advice)
+
+    def _row_json(self, row: Row, curve: CurveFolder[Any], folder: str) -> dict[str, Any]:
+        names = row.file_names()
+        digests = {name: curve.digests.get(name) for name in names}
+        files = [str(Path(folder, name)) for name in names]
+        words = {"advice": self.advice.get(row.key, "")}
+        return row.as_dict() | words | {"files": files, "digests": digests}
 
 
 def refusal(folder: Path, kept: str) -> BadInput:
@@ -258,6 +267,22 @@ def require_folder(folder: Path) -> None:
         raise BadInput(f"--out {str(folder)!r}: no permission to write to {nearest}")
 
 
+def require_empty(folder: Path) -> None:
+    """Raise BadInput if there is anything in a folder but hidden files: it is somebody else's."""
+    try:
+        names = sorted(path.name for path in folder.iterdir() if path.name[0] != ".")
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise BadInput(f"--out {str(folder)!r}: {error.strerror}; allowed: a folder") from None
+    if names:
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        raise BadInput(
+            f"--out {str(folder)!r} holds {names[0]!r}{more} and no run; allowed: a new or empty "
+            "folder; --overwrite writes into it and replaces files of the same names"
+        )
+
+
 def _remove_earlier(folder: Path, case: AnyCase) -> None:
     """Remove the files of an earlier run by their names, and nothing else."""
     if not (folder / "curve.csv").exists() and not (folder / "run.json").exists():
@@ -265,12 +290,6 @@ def _remove_earlier(folder: Path, case: AnyCase) -> None:
     for pattern in (*_OURS, *case.row.file_patterns(), *case.files):
         for path in folder.glob(pattern):
             path.unlink()
-
-
-def _row_json(row: Row, curve: CurveFolder[Any], folder: str) -> dict[str, Any]:
-    names = row.file_names()
-    digests = {name: curve.digests.get(name) for name in names}
-    return row.as_dict() | {"files": [str(Path(folder, n)) for n in names], "digests": digests}
 
 
 def _stage_json(stage: StageRecord) -> dict[str, Any]:

@@ -175,7 +175,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
         table.print_rows(case, rows, rejected)
         if words := case.assumed(record.run.parameters, record.run.given):
             click.echo(f"assumed: {', '.join(words)}")
-        for note in case.notes(rows):
+        for note in case.notes(rows, record.advice):
             click.echo(note)
     if not quiet:
         click.echo(f"written to {record.folder}")
@@ -201,5 +201,5 @@ def _gaps(record: RunRecord) -> list[str]:
     there = {row.key for row in [*rows, *rejected]}
     missed = [run.case.row.label(k) for k in run.case.requested(run.parameters) if k not in there]
     gaps = [f"not reached: {', '.join(missed)}"] if missed else []
-    advice = " ".join(sorted(record.advice))
+    advice = " ".join(sorted({record.advice.get(row.key, "") for row in rejected}))
     return [*gaps, *run.case.complaints(run.parameters, rows, rejected, advice)]

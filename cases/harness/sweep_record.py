@@ -17,7 +17,12 @@ from softehl.cases.harness.case import Run
 from softehl.cases.harness.earlier import Existing, holds_a_run, read_earlier
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.lock import FolderLock
-from softehl.cases.harness.record import package_versions, refusal, require_folder
+from softehl.cases.harness.record import (
+    package_versions,
+    refusal,
+    require_empty,
+    require_folder,
+)
 from softehl.cases.harness.study_file import Study
 from softehl.cases.harness.sweep import Curve, Task, shared_folder
 from softehl.runtime.io import Cell, read_json, write_csv, write_json
@@ -38,7 +43,11 @@ class SweepRecord:
         self._lock = FolderLock(folder)
         self._before, self._began, self._saved = 0.0, time.monotonic(), 0.0
         require_folder(folder)
-        self._earlier = self._read() if self._holds() else {}
+        self._earlier: Mapping[str, Any] = {}
+        if self._holds():
+            self._earlier = self._read()
+        elif existing != "overwrite":
+            require_empty(folder)
 
     def __enter__(self) -> Self:
         """Take the folder, and look what is there; a sweep that is not resumed is removed."""

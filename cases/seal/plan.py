@@ -1,10 +1,11 @@
 """What a run of a seal consists of: its strokes and speeds, finer meshes, what is missing."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from softehl.cases.seal.parameters import DENSITIES, ORing
 from softehl.cases.seal.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
 from softehl.cases.seal.surfaces import FULL
+from softehl.cases.seal.verdict import DOUBTFUL
 
 SIGNS = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
@@ -15,13 +16,29 @@ USUAL = 0.2
 THIN = FULL * USUAL
 """Film thickness below which these would touch, um."""
 
+FINER = "use a finer mesh (larger density)"
+
 DOUBTS = {
-    UNDER_RESOLVED: "the inlet is too short for this mesh, h* may be far off",
+    UNDER_RESOLVED: f"the inlet is too short for this mesh, h* may be far off; {FINER}",
     CLIPPED: "the arc ends within the film, h* may be far off",
-    UNCERTAIN: "the estimated error of h* is large or not known",
-    OSCILLATING: "the film zigzags from node to node; h* holds, the profile does not",
+    UNCERTAIN: DOUBTFUL,
+    OSCILLATING: f"the film zigzags from node to node; h* holds, the profile does not; {FINER}",
 }
 """Verdict of a state that is kept but is no plain result -> what is to be known of it."""
+
+
+def doubts(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, list[FilmRow]]:
+    """What is wrong with states that are no plain results -> these states, worst first.
+
+    advice: what states came with, by U: why one is clipped or uncertain, other than by its error.
+    """
+    found: dict[str, list[FilmRow]] = {}
+    for word in DOUBTS:
+        for row in rows:
+            if row.verdict == word:
+                own = advice.get(row.key) if word in (CLIPPED, UNCERTAIN) else None
+                found.setdefault(f"{word}: {own or DOUBTS[word]}", []).append(row)
+    return found
 
 
 def strokes_of(parameters: ORing) -> tuple[str, ...]:

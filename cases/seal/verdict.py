@@ -52,6 +52,8 @@ LARGEST_ERROR = 2.0
 STRONG_OSCILLATION = 0.2
 """Oscillation index from which on a profile is not to be taken at face value: about 5 % of h."""
 
+DOUBTFUL = "the estimated error of h* is large or not known; use a finer mesh (larger density)"
+
 FINER_MESH = "the film collapsed on this mesh; use a finer mesh (larger density)"
 
 
@@ -217,7 +219,10 @@ class Verdict:
                 where = f"the arc ends where the film is only {1e3 * last.end_gap:.3g} um thick"
             else:
                 where = f"the arc cuts off {100.0 * last.lacking:.2g} % of the inlet's pressure"
-            return f"{where}; leave arc_start and arc_end out, or move them outwards"
+            return (
+                f"{where}; leave arc_start and arc_end out, or move them outwards; where they are "
+                "left out, the section has no room for so thick a film"
+            )
         if word == UNCERTAIN and self.unsealed:
             return (
                 f"the sealed pressure is taken to end {self.unsealed}, where the ring touches "
@@ -234,9 +239,7 @@ class Verdict:
                 'the groove between them; use cavitation = "mass-conserving"'
             )
         if word == UNCERTAIN:
-            known = self.error is not None and isfinite(self.error)
-            size = f"is {self.error:+.2g} %" if known else "is not known"
-            return f"the error of h* {size}; use a finer mesh (larger density)"
+            return DOUBTFUL
         if word == UNDER_RESOLVED and last.inlet_segments >= self.fewest:
             seen = self.ratios[0] <= last.inlet_ratio <= self.ratios[1]
             next_one = "the next contact's", last.next_ratio

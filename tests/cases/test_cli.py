@@ -18,8 +18,9 @@ import pytest
 import softehl
 from softehl.cases import oring
 from softehl.cases.harness import observer as harness
-from softehl.cases.harness.earlier import kernel_signatures
+from softehl.cases.harness.earlier import advice_of, kernel_signatures
 from softehl.cases.harness.record import RunRecord
+from softehl.cases.harness.report.page import read_finished
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import NOT_CONVERGED
 from softehl.cases.oring import ORingCase
@@ -28,6 +29,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import PICTURES
 from softehl.cases.seal.state import (
     COLLAPSED,
+    UNCERTAIN,
     ContactState,
     FilmState,
     Observer,
@@ -38,6 +40,7 @@ from softehl.cases.seal.state import (
     place,
 )
 from softehl.cases.seal.telling import Teller
+from softehl.cases.shipped import SHIPPED
 from softehl.runtime.kernels import MissingKernelsError
 from softehl.runtime.library import library_of
 from softehl.runtime.solve.solution import Status
@@ -167,6 +170,16 @@ def solve_and_collapse(parameters: ORing, observer: Observer) -> Outcome:
     states = [film_state(parameters, fast), film_state(parameters, slow, COLLAPSED)]
     for state in states:
         observer.film_state(state)
+    return outcome(*states)
+
+
+def solve_unsealed(parameters: ORing, observer: Observer) -> Outcome:
+    """States that are uncertain for a reason of their own."""
+    states = []
+    for speed in parameters.speeds:
+        state = replace(film_state(parameters, speed, UNCERTAIN), advice="It ends at its crown.")
+        observer.film_state(state)
+        states.append(state)
     return outcome(*states)
 
 
@@ -488,6 +501,18 @@ def test_not_converged(here: Path, invoke: Invoke) -> None:
     assert any("+400" in line for line in out)
 
 
+def test_a_doubt_is_told_with_its_own_reason(here: Path, invoke: Invoke) -> None:
+    """The sealed pressure that ends at nothing is no error of the mesh; a resumed run knows it."""
+    arguments = ("run", "oring", *FAST, "--set", "stroke=out")
+    told = "uncertain: It ends at its crown.: U = +400 mm/s, U = +100 mm/s"
+    assert told in invoke(*arguments, solver=solve_unsealed)[1]
+    folder = here / "results" / "oring"
+    assert {s["advice"] for s in run_json(folder)["states"]} == {"It ends at its crown."}
+    assert told in invoke(*arguments, "--resume")[1]
+    finished = read_finished(folder, SHIPPED)
+    assert set(advice_of(finished.content, finished.rows).values()) == {"It ends at its crown."}
+
+
 def test_a_missing_state_is_noticed(here: Path, invoke: Invoke) -> None:
     code, _, err = invoke("run", "oring", *FAST, "--set", "stroke=out", solver=solve_and_forget)
     assert code == 3
@@ -606,11 +631,34 @@ def test_a_new_run_replaces_the_earlier_one_only_where_it_may(here: Path, invoke
     assert names(here / "a") == {*FILES, "notes.txt"}
 
 
+@pytest.mark.parametrize("options", [(), ("--resume",)])
+def test_a_foreign_folder_is_refused(options: tuple[str, ...], here: Path, invoke: Invoke) -> None:
+    (here / "a").mkdir()
+    (here / "a" / "curve.png").write_text("mine")
+    for command in (("run", "oring", *FAST), ("sweep", _study(here))):
+        code, _, err = invoke(*command, "--out", "a", *options)
+        assert (code, len(err)) == (2, 1)
+        assert "'a' holds 'curve.png' and no run; allowed: a new or empty folder" in err[0]
+        assert names(here / "a") == {"curve.png"}
+
+
 def test_a_foreign_folder_keeps_its_files(here: Path, invoke: Invoke) -> None:
     (here / "a").mkdir()
     (here / "a" / "profile_of_mine.csv").write_text("mine")
-    assert invoke("run", "oring", *FAST, "--out", "a")[0] == 0
+    assert invoke("run", "oring", *FAST, "--out", "a", "--overwrite")[0] == 0
     assert (here / "a" / "profile_of_mine.csv").read_text() == "mine"
+
+
+def test_hidden_files_make_no_folder_foreign(here: Path, invoke: Invoke) -> None:
+    (here / "a").mkdir()
+    (here / "a" / ".directory").write_text("mine")
+    assert invoke("run", "oring", *FAST, "--out", "a")[0] == 0
+
+
+def _study(here: Path) -> str:
+    """A sweep of two runs."""
+    (here / "two.toml").write_text('case = "oring"\n[grid]\nsealed_pressure = [1, 2]\n')
+    return "two.toml"
 
 
 def test_a_full_disk_is_one_line(

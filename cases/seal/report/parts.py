@@ -7,6 +7,7 @@ from io import BytesIO
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
 from softehl.cases.seal import catalogue
 from softehl.cases.seal.leakage import LeakageRow, net_leakage
@@ -91,7 +92,8 @@ def _film(runs: Sequence[FinishedRun]) -> Part:
 
 
 def _curve(runs: Sequence[FinishedRun]) -> Part:
-    lines = [f"{run.name}: {note}" for run in runs for note in run.case.notes(run.rows)]
+    notes = {run.name: run.case.notes(run.rows, advice_of(run.content, run.rows)) for run in runs}
+    lines = [f"{name}: {note}" for name, some in notes.items() for note in some]
     lines += [
         f"{run.name}: rejected, no result: {run.case.named(run.rejected)}"
         for run in runs
