@@ -16,6 +16,7 @@ from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.seal.assumed import assumed
+from softehl.cases.seal.idle import idle
 from softehl.cases.seal.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.parameters import ORing
 from softehl.runtime.arrays import Array
@@ -90,6 +91,19 @@ class Cycle(ORing):
             *(self.travel, self.frequency),
             self.ramp if self.shape == "trapezoidal" else None,
         )
+
+
+_OF_STEADY_FILMS = (
+    *("speeds", "stroke", "error_estimate", "tolerance", "sensitivity", "tolerances"),
+)
+"""Keys of the seal that a cycle has no use for."""
+
+
+def unused(p: Cycle) -> list[str]:
+    """Which of these were given, in words."""
+    fields = type(p).model_fields
+    given = [key for key in _OF_STEADY_FILMS if getattr(p, key) != fields[key].default]
+    return [f"{key} has no effect on a cycle, only on steady films" for key in given]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,11 +199,13 @@ class CycleCase(Case[Cycle, CycleRow]):
 
     def warnings(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
+        words = [*idle(parameters), *unused(parameters)]
         if parameters.rough:
-            return []
+            return words
         return [
+            *words,
             "between smooth surfaces a reversal squeezes the film to nanometres; give a roughness "
-            "(rms of the seal in um, 0.2 to 0.4 is usual)"
+            "(rms of the seal in um, 0.2 to 0.4 is usual)",
         ]
 
     def requested(self, parameters: Cycle) -> list[float]:

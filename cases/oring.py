@@ -11,6 +11,7 @@ from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
 from softehl.cases.seal import catalogue, plan
 from softehl.cases.seal.assumed import assumed
+from softehl.cases.seal.idle import idle
 from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
@@ -88,8 +89,8 @@ class ORingCase(Case[ORing, FilmRow]):
     def warnings(self, parameters: ORing) -> list[str]:
         """See :class:`Case`."""
         p = parameters
-        ring = p.free_ring
-        return list(catalogue.warnings(ring, p.rod_diameter, p.housing_diameter, p.groove_width))
+        gland = p.rod_diameter, p.housing_diameter, p.groove_width
+        return [*idle(p), *catalogue.warnings(p.free_ring, *gland)]
 
     def notes(
         self, rows: Sequence[FilmRow], advice: Mapping[float, str] = MappingProxyType({})

@@ -13,7 +13,7 @@ from softehl.cases.seal.held import HeldFilm
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.state import FilmState, Silent
-from softehl.cases.seal.variation import NUMBERS, PRESSURE_KEY
+from softehl.cases.seal.varied import NUMBERS, PRESSURE_KEY
 from softehl.runtime.names import meant
 
 SAME = {"rod": "rod_diameter"}

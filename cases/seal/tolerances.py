@@ -8,14 +8,19 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from softehl.cases.harness.row import Record, column
 from softehl.cases.seal.catalogue import UnknownRingError, ring
+from softehl.cases.seal.varied import LENGTHS, MEASURES, NUMBERS, PRESSURE_KEY
 
-MODULUS = {"modulus": ("mu_1", "mu_2")}
-"""Names for several parameters that are off by the same share."""
+_ALIASES = {"modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"), "rod": ("rod_diameter",)}
+"""Names for other keys: all that a rubber has are off by the same share."""
+
+_IN_MM = frozenset((*LENGTHS, *MEASURES))
+_VARIED = _IN_MM.union(NUMBERS, [PRESSURE_KEY])
 
 _ITEM = re.compile(
     r"(?P<name>\w+)\s+(?:\+-\s*)?(?P<size>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(?P<unit>%|mm|)"
@@ -47,22 +52,33 @@ def read_tolerances(
     given: texts such as "viscosity 10 %" or "rod_diameter 0.05 mm". values: those of the case's
     keys. Raises ValueError.
     """
-    shares = {}
-    for text in (*_of_ring(ring_name), *given):
-        found = _ITEM.fullmatch(text.strip())
-        names = MODULUS.get(found["name"], (found["name"],)) if found else ()
-        known = [values.get(name) for name in names]
-        if not found or not all(isinstance(v, float) and v != 0.0 for v in known):
-            raise ValueError(
-                f'tolerances: "{text}" is not understood; allowed: a key of the case that is a '
-                'number other than 0, or modulus, and +- its tolerance, as in "viscosity 10 %" '
-                'or "rod_diameter 0.05 mm"'
-            )
-        value, size = known[0], float(found["size"])
-        assert isinstance(value, float)
-        relative = 0.01 * size if found["unit"] == "%" else size / abs(value)
-        shares[found["name"]] = relative, names
-    return shares
+    typed = [_share(text, values) for text in given]
+    twice = [name for name, times in Counter(name for name, _ in typed).items() if times > 1]
+    if twice:
+        raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
+    return dict([*(_share(text, values) for text in _of_ring(ring_name)), *typed])
+
+
+def _share(text: str, values: Mapping[str, object]) -> tuple[str, tuple[float, tuple[str, ...]]]:
+    """The name of a tolerance, its relative size and the parameters that it moves.  ValueError."""
+    found = _ITEM.fullmatch(text.strip())
+    names = _moved(found["name"], values) if found else ()
+    known = [value for value in map(values.get, names) if isinstance(value, float)]
+    metric = found is None or found["unit"] != "mm" or _IN_MM.issuperset(names)
+    if not found or not known or len(known) < len(names) or not metric:
+        raise ValueError(
+            f'tolerances: "{text}" is not understood; allowed: a key of the case that is a '
+            "number other than 0 and has a sensitivity, or modulus, and +- its tolerance, as "
+            'in "viscosity 10 %" or "rod_diameter 0.05 mm"'
+        )
+    size = float(found["size"])
+    return found["name"], (0.01 * size if found["unit"] == "%" else size / abs(known[0]), names)
+
+
+def _moved(name: str, values: Mapping[str, object]) -> tuple[str, ...]:
+    """The keys that a tolerance moves: those of its name that have a value and a sensitivity."""
+    names = _ALIASES.get(name, (name,))
+    return tuple(key for key in names if key in _VARIED and values.get(key))
 
 
 def _of_ring(name: str | None) -> list[str]:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.seal import materials, shear_thinning
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.given import number, times
 from softehl.cases.seal.loads import FilmLoads
@@ -22,25 +21,12 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.round_layout import RoundLayout
 from softehl.cases.seal.section import SealSection
 from softehl.cases.seal.uniform_layout import uniform_layout
+from softehl.cases.seal.varied import LENGTHS, NUMBERS, PRESSURE_KEY
 from softehl.runtime.fem.design import Inputs, rate_of
 from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
 
-SPEED, PRESSURE_KEY = "U", "sealed_pressure"
-"""Parameters of a film that are no numbers of the case alone: the rod speed, as it is named in
-tables, and the sealed pressure."""
-
-LENGTHS = (
-    *("section_diameter", "inner_diameter", "rod_diameter", "housing_diameter"),
-    *("groove_width", "groove_centre"),
-)
-"""Keys of a case that are lengths."""
-
-NUMBERS = (
-    *LENGTHS,
-    *(*materials.KEYS, "bulk_modulus"),
-    *("viscosity", "pressure_viscosity", "cavitation_penalty", *shear_thinning.NUMBERS),
-)
-"""Physical and geometric keys of a case; the terms of an Ogden rubber count as one."""
+SPEED = "U"
+"""The rod speed as it is named in tables: a parameter of a film that is no key of a case."""
 
 _WIDE = 0.01  # relative step: what follows from a key is a polynomial of low degree
 

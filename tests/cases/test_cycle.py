@@ -15,7 +15,7 @@ from PIL import Image
 from pydantic import ValidationError
 
 import softehl
-from softehl.cases.cycle import Cycle
+from softehl.cases.cycle import CASE, Cycle
 from softehl.cases.seal import cycles
 from softehl.cases.seal.motion import Motion, RodFilm, Table, differences
 from softehl.cases.seal.parameters import ORing
@@ -195,6 +195,13 @@ def test_a_cycle_balances_and_becomes_periodic(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_keys_of_steady_films_are_named() -> None:
+    words = CASE.warnings(Cycle(roughness=(0.0, 0.2), speeds=(100.0,), tolerance=0.2))
+    assert words == [
+        f"{k} has no effect on a cycle, only on steady films" for k in ("speeds", "tolerance")
+    ]
+
+
 def test_long_periods_give_the_steady_curve(tmp_path: Path) -> None:
     """The mean leak over the period tends to that of steady strokes as one over it."""
     leaks = []

@@ -88,6 +88,26 @@ def test_a_ring_that_overfills_its_gland_is_warned_of() -> None:
     assert CASE.warnings(ORing(ring="AS568-210", rod=19.0)) == []
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"temperature": 80.0}, "temperature = 80 has no effect without an oil or a fit"),
+        ({"corner_fillet": 0.2}, "corner_fillet = 0.2 has no effect without an extrusion_gap"),
+        ({"boundary_friction": 0.2}, "boundary_friction = 0.2 has no effect without a roughness"),
+        ({"asperity_stiffness": 5.0}, "asperity_stiffness = 5 has no effect without a roughness"),
+    ],
+)
+def test_a_key_that_changes_nothing_is_named(given: dict[str, Any], words: str) -> None:
+    assert CASE.warnings(ORing(**given)) == [words]
+    with_them: dict[str, Any] = {
+        "oil": "ISO VG 46",
+        "temperature": 80.0,
+        "extrusion_gap": 0.1,
+        "roughness": 0.2,
+    }
+    assert CASE.warnings(ORing(**{**with_them, **given})) == []
+
+
 def test_a_path_from_rest_takes_few_steps_however_incompressible_the_rubber() -> None:
     """Gland 0 of the sample, kappa 1280 mu: Newton's own tangent takes minutes there."""
     p = drawn(0)

@@ -30,7 +30,8 @@ from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import SensitivityRow, resolved
 from softehl.cases.seal.state import FilmRow, Silent
 from softehl.cases.seal.tolerances import band, read_tolerances
-from softehl.cases.seal.variation import LENGTHS, SPEED, FilmCase
+from softehl.cases.seal.variation import SPEED, FilmCase
+from softehl.cases.seal.varied import LENGTHS
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
 from softehl.runtime.fem.postprocess import interval_below
@@ -265,14 +266,35 @@ def test_only_states_that_the_mesh_shows_are_differentiated() -> None:
 
 def test_tolerances_of_a_catalogue_ring_and_given_ones() -> None:
     p = ORing(
-        ring="AS568-226", rod=50.0, sensitivity=True, tolerances=("viscosity 20 %", "modulus 10 %")
+        ring="AS568-226",
+        rod=50.0,
+        sensitivity=True,
+        tolerances=("viscosity 20 %", "modulus 10 %", "inner_diameter 0.1 mm"),
     )
     shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
     assert shares["viscosity"] == (0.2, ("viscosity",))
+    assert shares["inner_diameter"][0] == pytest.approx(0.1 / p.inner_diameter)
     assert shares["modulus"] == (0.1, ("mu_1", "mu_2"))
     # AS568-226: section 0.139 +- 0.004 in
     assert shares["section_diameter"][0] == pytest.approx(0.004 / 0.139, rel=1e-3)
     assert set(shares) == {"section_diameter", "inner_diameter", "viscosity", "modulus"}
+
+
+def test_the_modulus_is_that_of_the_rubber() -> None:
+    """A hardness gives a neo-Hookean one, whose modulus is mu."""
+    rubbers: list[tuple[dict[str, Any], tuple[str, ...]]]
+    rubbers = [({"shore_A": 70.0}, ("mu",)), ({"mu_2": 0.0}, ("mu_1",))]
+    for given, names in rubbers:
+        p = ORing(sensitivity=True, tolerances=("modulus 25 %",), **given)
+        shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
+        assert shares["modulus"] == (0.25, names)
+
+
+def test_the_rod_is_its_diameter() -> None:
+    p = ORing(rod=50.0, sensitivity=True, tolerances=("rod 0.05 mm",))
+    shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
+    assert shares["rod"][0] == pytest.approx(0.001)
+    assert shares["rod"][1] == ("rod_diameter",)
 
 
 def test_a_band_adds_up() -> None:
@@ -290,6 +312,11 @@ def test_a_band_adds_up() -> None:
         ({"tolerances": ["viscosity"]}, '"viscosity" is not understood'),
         ({"tolerances": ["colour 3 %"]}, '"colour 3 %" is not understood'),
         ({"tolerances": ["groove_centre 3 %"]}, "a number other than 0"),
+        ({"tolerances": [""]}, "is not understood"),
+        ({"tolerances": ["shore_A 7 %"], "shore_A": 70.0}, "shore_A 7 %.* is not understood"),
+        ({"tolerances": ["boundary_friction 20 %"]}, "is not understood"),
+        ({"tolerances": ["sealed_pressure 0.1 mm"]}, "is not understood"),
+        ({"tolerances": ["viscosity 3 %", "viscosity 5 %"]}, "viscosity is given twice"),
         ({"tolerances": ["viscosity 3 %"], "sensitivity": False}, "need the sensitivities"),
         ({"housing_friction": 0.1}, "depends on how it was reached"),
     ],

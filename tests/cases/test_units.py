@@ -21,6 +21,8 @@ from softehl.cases.seal.parameters import ORing
         ("-30 deg", "degrees", -30.0),
         ("1e3 kPa", "MPa", 1.0),
         ("20 1/GPa", "1/MPa", 0.02),
+        ("2 Hz", "1/s", 2.0),
+        ("200 nm", "um", 0.2),
     ],
 )
 def test_quantities(text: str, unit: str, value: float) -> None:
