@@ -90,7 +90,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         friction=friction,
         flux_variation=relative_spread(flux[whole]),
         jump=jump,
-        oscillation=max(oscillation(*(v[_nodes(k)] for v in (z, h)), level) for k in parts),
+        oscillation=max(oscillation(z[_nodes(k)], h[_nodes(k)], level) for k in parts),
         inlet_segments=inlet_segments(narrows, h_star),
         inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(inlet, film, h_star),
         end_gap=end_gap(*((z, h) if film.stroke == "out" else (-z[::-1], h[::-1]))),
@@ -132,7 +132,8 @@ def metering(at: Mapping[str, Array], parts: Sequence[slice], stroke: Stroke) ->
 
 def _lifted(at: Mapping[str, Array], part: slice, stroke: Stroke) -> bool:
     """Whether pressure rises all the way through a part of the film, where the oil goes."""
-    return _top(at, part) == (part.stop - 1 if stroke == "out" else part.start)
+    last: int = part.stop - 1 if stroke == "out" else part.start
+    return _top(at, part) == last
 
 
 def _top(at: Mapping[str, Array], part: slice) -> int:
