@@ -235,13 +235,13 @@ class ContactRoute:
                 break
         return found
 
-    def _finer(self, state: State, density: int) -> State | StageFailed:
-        """From a contact state to that of the same mesh at `density`, if need be from rest."""
-        found = self._refined(*state, density)
-        if not isinstance(found, StageFailed):
-            return found
-        system = build_system(_at(state[0].parameters, density), state[0].section.layout)
-        return self._refined(system, self._loaded(system), density)
+    def _finer(self, state: State, density: int) -> State:
+        """A contact state at `density` where it can be carried to it, else as it is.
+
+        All that it is for is the next mesh: a path of its own would cost as much as one on that.
+        """
+        found = self._refined(*state, density, alone=True)
+        return state if isinstance(found, StageFailed) else found
 
     def _guided(self, p: ORing, density: int) -> State | StageFailed:
         """Seen on a wide uniform arc of low density, then on all but the last of graded meshes."""
@@ -283,13 +283,18 @@ class ContactRoute:
             state = self._loading.carried(*state, graded, name)
         return state
 
-    def _refined(self, system: SealSystem, x: Followed, density: int) -> State | StageFailed:
-        """From a contact state to that of the same mesh at `density`, doubling by doubling."""
+    def _refined(
+        self, system: SealSystem, x: Followed, density: int, *, alone: bool = False
+    ) -> State | StageFailed:
+        """From a contact state to that of the same mesh at `density`, doubling by doubling.
+
+        alone: see `Loading.carried`.
+        """
         state = x if isinstance(x, StageFailed) else (system, x)
         while not isinstance(state, StageFailed) and state[0].parameters.density < density:
             coarse = state[0]
             state = self._loading.carried(
-                *state, build_system(finer(coarse.parameters), coarse.section.layout)
+                *state, build_system(finer(coarse.parameters), coarse.section.layout), alone=alone
             )
             if not isinstance(state, StageFailed) and coarse.parameters.mesh != "graded":
                 self.contacts.keep(*state)

@@ -30,6 +30,7 @@ from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.pockets import fed, traps
+from softehl.cases.seal.pressure_newton import patient
 from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.thinning import longer, sooner, thinned_film, thinning_stage
 from softehl.runtime.arrays import Array
@@ -41,10 +42,6 @@ _ROUGHLY = 1e-3
 
 _POCKET = 5.0
 """Of `film_thickness`, above which oil is trapped rather than part of a thick film."""
-
-_PATIENT = 30
-"""Iterations of a film from another mesh where each has to reduce the residual: edges of contact in
-the corners of the groove may lie elsewhere."""
 
 OnSpeed = Callable[[FilmLoads, Point], None]
 BuiltFilm = tuple[FilmLoads, Array]
@@ -211,8 +208,8 @@ class FilmPath:
         film = self._carried_film(stroke, x, known)
         failed = self.lagged(film, known, (None, x), on_speed)
         if failed:
-            patient = replace(self.driver.newton, max_iterations=_PATIENT, line_search=True)
-            stage = replace(failed.stage, name="film of another mesh", corrector=patient)
+            careful = patient(self.driver.newton)
+            stage = replace(failed.stage, name="film of another mesh", corrector=careful)
             end = self.driver.follow(stage, x + known.built(film.speed))
             failed = end if isinstance(end, StageFailed) else None
         return failed

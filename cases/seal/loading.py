@@ -12,6 +12,7 @@ from typing import TypeAlias
 from softehl.cases.seal.contact import along, load_stage, released
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
+from softehl.cases.seal.pressure_newton import patient, roughly
 from softehl.cases.seal.refinement import carried_contact
 from softehl.cases.seal.trail import Trail
 from softehl.runtime.arrays import Array
@@ -22,10 +23,6 @@ State: TypeAlias = tuple[SealSystem, Array]
 
 _CARRIED, _EASED = 14, 10
 """Iterations that a state may need that was carried to another mesh; one under less pressure."""
-
-_PATIENT = 30
-"""The same where each has to reduce the residual: that helps where the ring is squeezed into the
-corners of its groove."""
 
 _JUMPS = (0.003, 0.006, 0.015, 0.04)
 """Steps of the pressure over a kink of the path, one after the other, in shear moduli."""
@@ -55,8 +52,12 @@ class Loading:
                 self.trail.keep(system, point)
 
         stage = load_stage(system, self.settings, force=force, begin=begin)
-        stage = replace(stage, corrector=along(system, self.newton), on_point=keep)
-        return self._over_kinks(system, stage, x)
+        rough = along(system, roughly(self.newton))
+        end = self._over_kinks(system, replace(stage, corrector=rough, on_point=keep), x)
+        if rough is None or isinstance(end, StageFailed):
+            return end
+        last = along(system, self.newton)
+        return self.follow(replace(stage, start=stage.stop, corrector=last), end)
 
     def _over_kinks(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
         """To the end of a stage in which nodes slide round the edge of an open gap.
@@ -76,20 +77,22 @@ class Loading:
         return found
 
     def carried(
-        self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
+        self, old: SealSystem, x: Array, new: SealSystem, name: str = "", *, alone: bool = False
     ) -> State | StageFailed:
-        """The contact state x of one mesh on another."""
+        """The contact state x of one mesh on another.
+
+        alone: the state itself, not by way of one under less pressure.
+        """
         stage, start = carried_contact(old, new, self.settings, x, name)
         if not new.section.placed:
             found = self.follow(stage, start)
             return found if isinstance(found, StageFailed) else (new, found)
         quick = replace(self.newton, max_iterations=_CARRIED)
         found = self.follow(replace(stage, corrector=quick), start)
-        if isinstance(found, StageFailed):
+        if isinstance(found, StageFailed) and not alone:
             found = self._reloaded(new, found)
-        if isinstance(found, StageFailed):
-            patient = replace(self.newton, max_iterations=_PATIENT, line_search=True)
-            found = self.follow(replace(stage, corrector=patient), start)
+        if isinstance(found, StageFailed) and not alone:
+            found = self.follow(replace(stage, corrector=patient(self.newton)), start)
         return found if isinstance(found, StageFailed) else (new, found)
 
     def _reloaded(self, new: SealSystem, failed: StageFailed) -> Followed:
@@ -98,7 +101,7 @@ class Loading:
         failed: what is said where there is no such state.
         """
         found: Followed = failed
-        quick = replace(self.newton, max_iterations=_EASED)
+        quick = replace(roughly(self.newton), max_iterations=_EASED)
         for old, p_s, x in self.trail.eased(new.parameters):
             name = f"contact at {p_s:.4g} MPa"
             stage, start = carried_contact(old, new, self.settings, x, name, p_s)

@@ -11,6 +11,27 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution
 
+_ROUGH = 1e-3
+_PATIENT = 30
+
+
+def roughly(newton: Newton) -> Newton:
+    """Newton's method for states on the way, which are no results.
+
+    On a fine mesh half of the iterations go from there to what rounding leaves. A residual that is
+    above that and does not fall is no rounding.
+    """
+    return replace(newton, tolerance=_ROUGH, stagnation=1.0)
+
+
+def patient(newton: Newton) -> Newton:
+    """Newton's method for a state of another mesh where fewer iterations lead nowhere.
+
+    Each has to reduce the residual: that helps where the ring is squeezed into the corners of its
+    groove, and the edges of contact there lie elsewhere.
+    """
+    return replace(newton, max_iterations=_PATIENT, line_search=True)
+
 
 @dataclass(eq=False)
 class PressureNewton:

@@ -28,6 +28,9 @@ from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.solve.newton import Newton
 
 Damage = Callable[[Path, np.random.Generator], None]
+LOADED = ["sealed pressure"] * 2
+"""Stages of the path of the pressure: roughly on the way, then at its end."""
+
 STORED = "newton, from a stored contact state"
 OTHER = {
     "upwinding": 0.3,
@@ -171,7 +174,7 @@ def test_every_parameter_either_matters_or_does_not() -> None:
 
 def test_a_second_curve_has_no_contact_path(solved: tuple[Path, Outcome], contacts: Path) -> None:
     first = solved[1]
-    assert names(first) == ["squeeze", "sealed pressure"]
+    assert names(first) == ["squeeze", *LOADED]
     second = run(case(stroke="both"), Silent(), contacts=contacts)
     assert second.converged, second.message
     assert names(second) == ["contact at density 1"]
@@ -256,7 +259,7 @@ def test_a_damaged_state_costs_little_and_is_replaced(
     before = path.read_bytes()
     damage(path, rng)
     outcome = run(case(), Silent(), contacts=contacts)
-    assert names(outcome) == ["contact at density 1", "squeeze", "sealed pressure"]
+    assert names(outcome) == ["contact at density 1", "squeeze", *LOADED]
     refused = outcome.stages[0]
     assert refused.method.startswith(f"{STORED}; ended: ")
     assert (refused.factorisations or 0) <= 10

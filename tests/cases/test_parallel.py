@@ -201,9 +201,9 @@ def test_a_sweep_here(serial: list[Curve]) -> None:
     assert len(list((folder / "contacts").iterdir())) == 2
     assert len(list(folder.iterdir())) == 5
     assert [contact_stages(curve) for curve in serial] == [
-        ["squeeze", "sealed pressure"],
+        ["squeeze", "sealed pressure", "sealed pressure"],
         ["contact at density 1"],
-        ["squeeze", "sealed pressure"],
+        ["squeeze", "sealed pressure", "sealed pressure"],
         ["contact at density 1"],
     ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.parameters import ORing
@@ -55,6 +56,7 @@ def test_nothing_is_known_before_a_path_and_nothing_gained_at_the_pressure_itsel
 
 
 def test_contact_above_three_shear_moduli_is_not_walked_from_rest_on_every_mesh() -> None:
+    """And states on the way are rough, the last one is not."""
     p = ORing(
         inner_diameter=69.215,
         section_diameter=5.334,
@@ -72,3 +74,10 @@ def test_contact_above_three_shear_moduli_is_not_walked_from_rest_on_every_mesh(
     found = ContactRoute(PathSettings(), driver.follow).contact(p)
     assert not isinstance(found, StageFailed)
     assert sum(record.name == "squeeze" for record in driver.records) == 1
+    system, x = found
+    problem = contact_problem(system, PathSettings(), p.sealed_pressure)
+    assert problem.norm(problem.residual(x)) < 1e-8
+    ways = [record for record in driver.records if record.name == "sealed pressure"]
+    rough = [way.residual_histories[-1][-1] for way in ways[::2]]
+    assert 1e-8 < max(rough) <= 1e-3
+    assert max(way.residual_histories[-1][-1] for way in ways[1::2]) < 1e-7
