@@ -16,6 +16,7 @@ from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
+from softehl.cases.seal.rubber import soft
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmRow
 from softehl.cases.seal.telling import Teller
@@ -90,7 +91,7 @@ class ORingCase(Case[ORing, FilmRow]):
         """See :class:`Case`."""
         p = parameters
         gland = p.rod_diameter, p.housing_diameter, p.groove_width
-        return [*idle(p), *catalogue.warnings(p.free_ring, *gland)]
+        return [*idle(p), *soft(p), *catalogue.warnings(p.free_ring, *gland)]
 
     def notes(
         self, rows: Sequence[FilmRow], advice: Mapping[float, str] = MappingProxyType({})

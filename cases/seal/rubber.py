@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from softehl.cases.seal.given import number, put, shown
 from softehl.cases.seal.materials import KEYS, MATERIALS, Material, shear_modulus, unstable_at
 from softehl.cases.seal.rubber_data import fit, read_data
+
+if TYPE_CHECKING:
+    from softehl.cases.seal.rubber_keys import RubberKeys
 
 SHORE = (20.0, 90.0)
 """Hardness Shore A between which Gent's rule is taken."""
@@ -149,3 +152,18 @@ def _require_pairs(mu: tuple[float, ...], alpha: tuple[float, ...]) -> None:
         )
     if 0.0 in alpha:
         raise ValueError("ogden_alpha has a 0: an exponent of 0 is no term; leave it out")
+
+
+_LEAST_BULK = 20.0
+"""Bulk over shear modulus of a rubber at least; Poisson's ratio is 0.475 there."""
+
+
+def soft(p: RubberKeys) -> list[str]:
+    """What is unusual about a rubber, in words."""
+    ratio = p.bulk_modulus / p.shear_modulus
+    if ratio >= _LEAST_BULK:
+        return []
+    return [
+        f"bulk_modulus = {p.bulk_modulus:g} MPa is {ratio:.3g} shear moduli: "
+        "rubbers have hundreds to thousands"
+    ]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 MICROMETRE = 1e-3  # mm
 
@@ -27,14 +27,24 @@ def _pair(given: object) -> object:
     return (0.0, float(given)) if single else given  # type: ignore[arg-type]
 
 
-Rms = Annotated[float, Field(ge=0, le=20)]
+def _some(rms: float) -> float:
+    """Less than a nanometre is a slip of the unit; no film was found above such asperities."""
+    if 0.0 < rms < LEAST:
+        raise ValueError(f"a roughness is 0 or at least {LEAST:g} um")
+    return rms
+
+
+LEAST = 1e-3
+"""Least rms height of a surface that is not smooth, um."""
+
+Rms = Annotated[float, Field(ge=0, le=20), AfterValidator(_some)]
 Roughness = Annotated[tuple[Rms, Rms], Field(strict=False), BeforeValidator(_pair)]
 """Rms heights of the moving surface and of the one that rests, um."""
 
 SLIP = 1e-3
 """Speed at which the friction of asperities has 0.7 of its value where nothing moves, mm/s."""
 
-ROUGHNESS = "[moving, resting] or one number for the resting one alone; each 0 to 20"
+ROUGHNESS = "[moving, resting] or one number for the resting one alone; each 0 or 0.001 to 20"
 
 
 @dataclass(frozen=True)

@@ -108,6 +108,11 @@ def test_a_key_that_changes_nothing_is_named(given: dict[str, Any], words: str) 
     assert CASE.warnings(ORing(**{**with_them, **given})) == []
 
 
+def test_a_rubber_that_is_compressible_is_warned_of() -> None:
+    (word,) = CASE.warnings(ORing(bulk_modulus=3.66))
+    assert word.startswith("bulk_modulus = 3.66 MPa is 1 shear moduli")
+
+
 def test_a_path_from_rest_takes_few_steps_however_incompressible_the_rubber() -> None:
     """Gland 0 of the sample, kappa 1280 mu: Newton's own tangent takes minutes there."""
     p = drawn(0)

@@ -22,6 +22,13 @@ from softehl.runtime.fem.guards import ChangesLittle
 SPEEDS = (2000.0, 500.0, 200.0, 50.0, 10.0, 1.0, 0.1, 0.01)
 
 
+@pytest.mark.parametrize("rms", [2e-7, -0.1, 21.0])
+def test_a_roughness_has_bounds(rms: float) -> None:
+    """Metres for micrometres would be no roughness that a film can be solved with."""
+    with pytest.raises(ValidationError, match="roughness"):
+        ORing(roughness=(0.0, rms))
+
+
 def solved(**given: Any) -> dict[float, FilmState]:
     """States by their signed speed."""
     p = ORing.model_validate({"density": 1, "error_estimate": False, **given})
