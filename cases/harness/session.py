@@ -21,6 +21,7 @@ from softehl.cases.harness.workers import solve_side_by_side
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
 from softehl.runtime.kernels import MissingKernelsError, StaleKernelsError
+from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.backends import MissingBackend
 from softehl.runtime.solve.solution import Status
 
@@ -133,16 +134,20 @@ class Reporter(Observer):
         return self.record.drafted(key)
 
 
+_OF_THE_USER = (MissingKernelsError, StaleKernelsError, MissingBackend, MeshError)
+"""What a run may end in that is no fault of the program."""
+
+
 @contextmanager
 def _recorded(record: RunRecord) -> Iterator[None]:
-    """Leave a word in run.json if an exception ends the run; a missing library is bad input."""
+    """Leave a word in run.json if an exception ends the run; bad input for what a user can mend."""
     try:
         yield
     except BaseException as error:
         if record.began:
             with suppress(OSError):  # what ended the run matters more
                 record.save("interrupted", f"{type(error).__name__}: {error}")
-        if isinstance(error, MissingKernelsError | StaleKernelsError | MissingBackend):
+        if isinstance(error, _OF_THE_USER):
             raise BadInput(str(error)) from None
         raise
 

@@ -22,6 +22,7 @@ from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.state import FilmState, Observer, Outcome
 from softehl.cases.seal.strokes import MESHES, SealRun, Wanted
 from softehl.runtime.arrays import Array
+from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Status
@@ -82,7 +83,10 @@ def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFail
     if not (p.error_estimate and p.mesh == "graded"):
         return seal
     driver = path.driver.named("coarser mesh: ")
-    coarser = FilmPath(coarser_system(system), settings, driver, ESTIMATED)
+    try:
+        coarser = FilmPath(coarser_system(system), settings, driver, ESTIMATED)
+    except MeshError:
+        return seal  # too coarse for the corners of a section: errors are not known
     route = replace(route, follow=coarser.driver.follow, contacts=ContactStore())
     y = route.elsewhere(system, x, coarser.system)
     if not isinstance(y, StageFailed):
@@ -94,7 +98,10 @@ def _for_film(seal: SealRun, last: BuiltFilm, route: ContactRoute) -> SealRun | 
     """A run on a mesh that is made for the last film of another one; None where none is found."""
     system, (film, y) = seal.system, last
     h_star = film_numbers(system, system.film_problem(film), film, y).h_star
-    found = route.for_film((system, seal.x), film_edges(system, y, h_star))
+    try:
+        found = route.for_film((system, seal.x), film_edges(system, y, h_star))
+    except MeshError:
+        return None  # what the mesh in use has reached is worth more
     if isinstance(found, StageFailed):
         return None
     other = _begun(replace(seal.path, system=found[0]), found[1], route)

@@ -43,6 +43,7 @@ from softehl.cases.seal.telling import Teller
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.kernels import MissingKernelsError
 from softehl.runtime.library import library_of
+from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.solution import Status
 from tests.cases.oring_cases import film_values
 
@@ -499,6 +500,21 @@ def test_not_converged(here: Path, invoke: Invoke) -> None:
     assert "not reached: U = +100 mm/s, U = -400 mm/s, U = -100 mm/s" in err[-1]
     assert "reached and saved in results/oring: U = +400 mm/s" in err[-1]
     assert any("+400" in line for line in out)
+
+
+def test_a_shape_that_cannot_be_meshed_is_one_line(here: Path, invoke: Invoke) -> None:
+    def solve_without_mesh(parameters: ORing, observer: Observer) -> Outcome:
+        observer.film_state(film_state(parameters, max(parameters.speeds)))
+        raise MeshError("no sound mesh of sq at density 1; use rounder corners")
+
+    code, _, err = invoke("run", "oring", *FAST, solver=solve_without_mesh)
+    assert (code, err[-1:]) == (
+        2,
+        ["softehl: no sound mesh of sq at density 1; use rounder corners"],
+    )
+    folder = here / "results" / "oring"
+    assert run_json(folder)["status"] == "interrupted"
+    assert speeds(folder) == [400.0]
 
 
 def test_a_doubt_is_told_with_its_own_reason(here: Path, invoke: Invoke) -> None:
