@@ -100,6 +100,9 @@ def _listed(kind: type[Parameters], name: str, value: object) -> object:
     field = kind.model_fields.get(name)
     item = _item(field.annotation) if field else None
     if isinstance(value, str):
+        parts = [part.strip() for part in value.split(",")]
+        if item is float and len(parts) > 1 and all(map(is_quantity, parts)):
+            return parts
         single = item is str or (item is float and is_quantity(value))
     else:
         single = item is float and type(value) in (int, float)

@@ -55,3 +55,7 @@ def test_a_case_takes_them_in_every_key_with_a_unit() -> None:
 def test_a_viscosity_in_other_units_is_refused(viscosity: float) -> None:
     with pytest.raises(ValueError, match="viscosity"):
         ORing(viscosity=viscosity)
+
+
+def test_a_list_with_units_needs_no_brackets() -> None:
+    assert ORing(speeds="0.4 m/s, 100 mm/s").speeds == (400.0, 100.0)  # type: ignore[arg-type]
