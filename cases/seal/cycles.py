@@ -27,6 +27,7 @@ from softehl.cases.seal.restart import (
     taken_up,
     unpacked,
 )
+from softehl.cases.seal.stroke_start import StrokeStart
 from softehl.cases.seal.telling import Teller
 from softehl.cases.seal.transient import Instant, March, Reading, StuckError, TimeSteps
 from softehl.runtime.arrays import Array
@@ -70,7 +71,7 @@ def steady_start(path: FilmPath, x: Array, speed: float) -> BuiltFilm | None:
 
     settled = path.settled(x)
     if not isinstance(settled, StageFailed):
-        path.films("out", settled, keep)
+        StrokeStart(path, "out", settled).films(keep)
     return found[0] if found else None
 
 

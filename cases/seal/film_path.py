@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from softehl.cases.seal.coarser_films import CoarserFilms
-from softehl.cases.seal.contact import along, emptying_stage
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.dry import (
     dry_film,
@@ -18,7 +17,6 @@ from softehl.cases.seal.dry import (
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film import (
     FastFilm,
-    film_offsets,
     first_film,
     release_stage,
     shear_stage,
@@ -27,18 +25,14 @@ from softehl.cases.seal.film import (
 )
 from softehl.cases.seal.grading import film_thickness
 from softehl.cases.seal.loads import FilmLoads, Stroke
-from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.pockets import fed, traps
 from softehl.cases.seal.pressure_newton import patient
 from softehl.cases.seal.results import film_numbers
-from softehl.cases.seal.thinning import longer, sooner, thinned_film, thinning_stage
+from softehl.cases.seal.thinning import longer, sooner, thinning_stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.solution import Branch, Point, Status
-
-_ROUGHLY = 1e-3
-"""Residual of states on the way to an empty groove."""
 
 _POCKET = 5.0
 """Of `film_thickness`, above which oil is trapped rather than part of a thick film."""
@@ -58,21 +52,6 @@ class FilmPath:
     settings: PathSettings
     driver: PathDriver
     tolerance: float | None = None
-
-    def starts(self, stroke: Stroke, x: Array) -> Iterator[BuiltFilm]:
-        """First films of a stroke, one after the other, and the contact states they begin at.
-
-        x: the contact state of the section.
-        """
-        system, settings = self.system, self.settings
-        for offset in film_offsets(system, settings, stroke, x):
-            y: Followed = x
-            if offset != settings.offset:
-                newton, follow = self.driver.newton, self.driver.follow
-                y = rod_brought_near(system, settings, offset, x, newton, follow, quick=self.quick)
-            if not isinstance(y, StageFailed):
-                y = without_rounding(system, y)
-                yield first_film(system, replace(settings, offset=offset), stroke, y), y
 
     @property
     def quick(self) -> bool:
@@ -113,22 +92,6 @@ class FilmPath:
             return False
         h_star = film_numbers(self.system, self.system.film_problem(film), film, y).h_star
         return not fed(self.system, film, x, y, apart, h_star)
-
-    def _near(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
-        """All films of a stroke from the contact state x with the rod near: squeezed out, or else
-        by their weight; see `fast`.
-        """
-        if film.rod_offset != self.settings.offset:
-            failed = self._squeezed(film, x, on_speed)
-            if failed is None or "falling speed" in failed.stage.name:
-                return failed
-        return self.fast(film, x, on_speed)
-
-    def _squeezed(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
-        """All films of a stroke from the contact state x with the rod near, squeezed out."""
-        near = replace(self.settings, offset=film.rod_offset)
-        thin = thinned_film(self.system, near, film.stroke, x)
-        return self.thinned(thin, x, on_speed) if thin else self.fast(film, x, on_speed)
 
     def _falling(
         self, fast: FastFilm, film: FilmLoads, y: Followed, on_speed: OnSpeed
@@ -235,62 +198,6 @@ class FilmPath:
         y = self.driver.follow(fast.speed(stage) if fast else stage, x)
         return (film, x) if isinstance(y, StageFailed) else (more, y)
 
-    def begun(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> tuple[FilmLoads, Array] | None:
-        """The start to go on from by Newton's method, None if the films of a stroke are all solved.
-
-        Other starts are tried where one does not lead to a film.
-        """
-        grooved = self.system.parameters.lobes > 1
-        thick = None
-        if self.quick and not grooved:
-            thick = thinned_film(self.system, self.settings, stroke, x)
-        if thick:
-            failed = self.thinned(thick, x, on_speed)
-            if failed is None:
-                return None
-            if "falling speed" in failed.stage.name or self.tolerance is not None:
-                return first_film(self.system, self.settings, stroke, x), x
-        first: BuiltFilm | None = None
-        # a groove holds more oil than is squeezed out soon
-        ways = (self.fast, self._squeezed) if grooved else (self._near,)
-        for way in ways:
-            for film, y in self.starts(stroke, x):
-                first = first or (film, y)
-                if not self.quick:
-                    return first
-                failed = way(film, y, on_speed)
-                if failed is None:
-                    return None
-                if _was_film(failed, grooved):
-                    return film, y
-        return first or (first_film(self.system, self.settings, stroke, x), x)
-
-    def films(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> StageFailed | None:
-        """All films of a stroke from the settled contact state x; what went wrong, if anything."""
-        if self.system.parameters.rough:
-            return self.rise(stroke, x, on_speed)
-        start = self.begun(stroke, x, on_speed)
-        if start is None or (self.quick and self.tolerance is not None):
-            return None  # what is no result is not worth the slow way
-        return self.slower(self.build(*start), self.system.parameters.speeds, on_speed)
-
-    def emptied(self, x: Array) -> tuple[FilmPath, Array] | None:
-        """From the contact state x with oil under pressure between two lobes to that without it.
-
-        None where there is no such groove, or no such state.
-        """
-        system, p = self.system, self.system.parameters
-        if p.lobes < 2 or p.sealed_pressure == 0.0 or p.rough or not system.groove:
-            return None
-        stage = emptying_stage(system, self.settings)
-        rough = along(system, replace(self.driver.newton, tolerance=_ROUGHLY))
-        y = self.driver.follow(replace(stage, corrector=rough), x)
-        if not isinstance(y, StageFailed):
-            y = self.driver.follow(replace(stage, start=stage.stop), y)
-        if isinstance(y, StageFailed):
-            return None
-        return replace(self, system=replace(system, groove=0.0)), y
-
     def settled(self, x: Array) -> Followed:
         """The contact state x where the rod is as near as asperities let it; x itself if smooth."""
         if not self.system.parameters.rough:
@@ -382,15 +289,6 @@ class FilmPath:
         film, x = built
         end = self.driver.follow(speed_stage(self.system, self.settings, film, speeds, on_speed), x)
         return end if isinstance(end, StageFailed) else None
-
-
-def _was_film(failed: StageFailed, grooved: bool) -> bool:
-    """Whether there was a film before a stage failed, from which Newton's method may go on.
-
-    grooved: where another start of the film is cheaper than that, as long as no speed was reached.
-    """
-    name = failed.stage.name
-    return "falling speed" in name if grooved else "contact to film" not in name
 
 
 def below(speeds: tuple[float, ...], speed: float) -> tuple[float, ...]:

@@ -12,6 +12,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.quantities import quantities
 from softehl.cases.seal.state import Silent
+from softehl.cases.seal.stroke_start import StrokeStart
 from softehl.cases.seal.variation import FilmCase
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Tangent
@@ -47,7 +48,7 @@ class HeldFilm:
         x = path.settled(found[1])
         if isinstance(x, StageFailed):
             return None
-        path.films(p.stroke, x, keep)
+        StrokeStart(path, p.stroke, x).films(keep)
         return cls(FilmCase(found[0], kept[0][0]), kept[0][1], newton) if kept else None
 
     def change(self, quantity: str, key: str, factor: float) -> float | None:

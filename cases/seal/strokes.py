@@ -25,6 +25,7 @@ from softehl.cases.seal.results import film_numbers, film_state
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import CLIPPED, FilmState, doubt
+from softehl.cases.seal.stroke_start import StrokeStart, emptied
 from softehl.cases.seal.verdict import (
     ANY_RATIO,
     INLET_RATIO,
@@ -139,12 +140,12 @@ class SealRun:
         """With its empty groove, if the stroke needs one and it is not known from another mesh."""
         if stroke == "out" or self.empty:
             return self
-        found = self.path.emptied(self.x)
+        found = emptied(self.path, self.x)
         return self.emptied(*found) if found else self
 
     def emptied(self, path: FilmPath, x: Array) -> SealRun:
         """With the contact state x (n,) of an empty groove."""
-        coarser = self.coarser[0].emptied(self.coarser[1]) if self.coarser else None
+        coarser = emptied(*self.coarser) if self.coarser else None
         return replace(self, empty=replace(self, path=path, x=x, coarser=coarser))
 
     def stroke(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
@@ -175,7 +176,7 @@ class SealRun:
             path.carried(stroke, self.x, known, on_speed)
         if progress.slowest and progress.missing:
             path.onward(*progress.slowest, on_speed)
-        start = path.begun(stroke, self.x, on_speed) if progress.missing else None
+        start = StrokeStart(path, stroke, self.x).begun(on_speed) if progress.missing else None
         if start is None or (self.meshes and progress.slowest):
             return None
         if self.better and self.meshes < MESHES and progress.slowest is None:
@@ -247,7 +248,7 @@ class SealRun:
             if at.speed in missing:
                 found[at.speed] = at, point.solution.x
 
-        start = next(high.starts(stroke, transferred(self.x, low, pair.high)))
+        start = next(StrokeStart(high, stroke, transferred(self.x, low, pair.high)).starts())
         high.slower(high.build(*start), missing, keep)
         for at, x in found.values():
             both = driver.follow(pair.stage(self.path.settings, at), pair.start(x))
@@ -280,7 +281,7 @@ def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> Coars
             known.films[film.speed] = point.solution.x
             known.numbers[film.speed] = _numbers(path, film, point.solution.x)
 
-    path.films(stroke, x, keep)
+    StrokeStart(path, stroke, x).films(keep)
     return known
 
 

@@ -14,7 +14,6 @@ from softehl.cases.oring import CASE
 from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.estimate import ORDER, coarser_density, estimated_error
 from softehl.cases.seal.film import FastFilm
-from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import DENSITIES, ORing
 from softehl.cases.seal.path import Stage, StageFailed
@@ -26,6 +25,7 @@ from softehl.cases.seal.state import (
     Outcome,
     Silent,
 )
+from softehl.cases.seal.stroke_start import StrokeStart
 from softehl.cases.seal.strokes import Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import Disc, disc_mesh
@@ -124,12 +124,12 @@ def test_films_are_carried_by_pressures_that_lag(
 def test_an_estimate_needs_no_path_on_the_coarser_mesh(
     curve: Outcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    usual = FilmPath.films
+    usual = StrokeStart.films
 
-    def no_path(path: FilmPath, *given: Any) -> StageFailed | None:
-        return None if path.tolerance is not None else usual(path, *given)
+    def no_path(start: StrokeStart, *given: Any) -> StageFailed | None:
+        return None if start.path.tolerance is not None else usual(start, *given)
 
-    monkeypatch.setattr(FilmPath, "films", no_path)
+    monkeypatch.setattr(StrokeStart, "films", no_path)
     outcome = run(_case(), Silent())
     names = [stage.name for stage in outcome.stages]
     assert names.count("coarser mesh: film of another mesh") == len(CONVERGED)

@@ -34,6 +34,7 @@ from softehl.cases.seal.pockets import fed, traps
 from softehl.cases.seal.results import filled_ratio, film_parts, metering
 from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
+from softehl.cases.seal.stroke_start import emptied
 from softehl.cases.seal.uniform_layout import uniform_layout
 from softehl.cases.seal.verdict import INLET_RATIO, ContactNumbers, FilmNumbers, Verdict
 from softehl.runtime.arrays import Array, Integers
@@ -209,22 +210,22 @@ def test_an_instroke_begins_without_pressure_in_the_groove() -> None:
     """The pressure then ends on the first lobe, and the oil of the film ruptures in the groove."""
     system, x = _contact(**X_RING, density=1)
     path = FilmPath(system, PathSettings(), PathDriver(Silent()))
-    found = path.emptied(x)
+    found = emptied(path, x)
     assert found
-    (emptied, y), p_s = (found[0].system, found[1]), system.parameters.sealed_pressure
+    (torn, y), p_s = (found[0].system, found[1]), system.parameters.sealed_pressure
     z = system.mesh.points[system.mesh.arc_nodes, 0]
-    assert z[emptied.dam] == pytest.approx(-z[system.dam], abs=0.1)
-    groove = slice(emptied.dam + 1, system.dam)
-    full, empty = (contact_pressure(s, p_s, u)[groove] for s, u in ((system, x), (emptied, y)))
+    assert z[torn.dam] == pytest.approx(-z[system.dam], abs=0.1)
+    groove = slice(torn.dam + 1, system.dam)
+    full, empty = (contact_pressure(s, p_s, u)[groove] for s, u in ((system, x), (torn, y)))
     assert full.min() == pytest.approx(p_s)
     assert empty.min() == 0.0
-    left = contact_problem(replace(emptied, groove=0.5), PathSettings(), p_s)
+    left = contact_problem(replace(torn, groove=0.5), PathSettings(), p_s)
     assert left.parameters["sealed_groove"] == pytest.approx([0.5 * p_s])
     outcome = _curve(**X_RING, density=1, stroke="in", speeds=(800.0,))
     assert outcome.converged
     assert "groove emptied" in {stage.name for stage in outcome.stages}
-    assert path.emptied(y) is not None
-    assert found[0].emptied(y) is None
+    assert emptied(path, y) is not None
+    assert emptied(found[0], y) is None
 
 
 def test_an_empty_groove_is_carried_to_another_mesh() -> None:
@@ -232,7 +233,7 @@ def test_an_empty_groove_is_carried_to_another_mesh() -> None:
     driver = PathDriver(Silent())
     route = ContactRoute(PathSettings(), driver.follow)
     path = FilmPath(system, PathSettings(), driver)
-    found = path.emptied(x)
+    found = emptied(path, x)
     assert found
     empty = found[0].system, found[1]
     other = route.for_film((system, x), contact_edges(*empty))
@@ -240,7 +241,7 @@ def test_an_empty_groove_is_carried_to_another_mesh() -> None:
     carried = route.emptied(empty, other[0])
     assert not isinstance(carried, StageFailed)
     assert carried[0].groove == 0.0
-    own = replace(path, system=other[0]).emptied(other[1])
+    own = emptied(replace(path, system=other[0]), other[1])
     assert own
     there, here = (s.displacements(y) for s, y in (carried, (own[0].system, own[1])))
     assert there == pytest.approx(here, abs=1e-7)
@@ -251,7 +252,7 @@ def test_a_round_ring_has_no_groove_to_empty() -> None:
     system = build_system(ORing(density=1))
     assert system.dam == system.section.lowest
     path = FilmPath(system, PathSettings(), PathDriver(Silent()))
-    assert path.emptied(system.at_rest()) is None
+    assert emptied(path, system.at_rest()) is None
 
 
 def test_a_groove_that_grazes_the_rod_parts_two_contacts_and_films_may_trap_oil_in_it() -> None:

@@ -29,6 +29,7 @@ from softehl.cases.seal.sections.keys import dimensions
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import SensitivityRow, resolved
 from softehl.cases.seal.state import FilmRow, Silent
+from softehl.cases.seal.stroke_start import StrokeStart
 from softehl.cases.seal.tolerances import band, read_tolerances
 from softehl.cases.seal.variation import SPEED, FilmCase
 from softehl.cases.seal.varied import LENGTHS
@@ -86,7 +87,7 @@ def state(name: str) -> tuple[FilmCase, Array]:
         if film.speed in p.speeds:
             kept.append((film, point.solution.x))
 
-    assert path.begun(stroke, found[1], keep) is None
+    assert StrokeStart(path, stroke, found[1]).begun(keep) is None
     case = FilmCase(found[0], kept[0][0])
     return case, solved(case, kept[0][1])
 

@@ -19,6 +19,7 @@ from softehl.cases.seal.nearing import neared, nearing_stage, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.state import Silent
+from softehl.cases.seal.stroke_start import StrokeStart
 from softehl.cases.seal.system import DISPLACEMENT
 from softehl.cases.seal.thinning import gap_masses, sooner, thinned_film, thinning_stage
 from softehl.runtime.arrays import Array
@@ -132,7 +133,7 @@ def test_the_first_film_is_that_of_the_fading_contact() -> None:
             found.append(system.arc_film(point.solution.x)[1].min())
 
     assert path.thinned(loads(), x, keep) is None
-    built = path.build(*next(path.starts("out", x)))
+    built = path.build(*next(StrokeStart(path, "out", x).starts()))
     assert path.slower(built, (400.0,), keep) is None
     assert found[0] == pytest.approx(found[1], rel=1e-7)
 
