@@ -28,6 +28,11 @@ _FILM = (
     "the film is hardest to build on the instroke at p_s above twice the shear modulus; try a "
     "finer mesh (larger density), a lower sealed_pressure or a harder rubber"
 )
+_ARC = (
+    "part of it may be beyond the given arc, {:g} to {:g} degrees; leave arc_start and arc_end out"
+)
+_THICK = "try a finer mesh (larger density), or lower speeds or a thinner oil where films are thick"
+_HIGH = 1.5  # shear moduli
 
 
 def explained(failed: StageFailed, where: str, p: ORing) -> tuple[Status, str]:
@@ -38,7 +43,7 @@ def explained(failed: StageFailed, where: str, p: ORing) -> tuple[Status, str]:
     if p.rotation == "free":
         text = f"{failed.message}; {ROLLING}"
     else:
-        text = _contact(failed, p) or f"{failed.message}; {_film_advice(failed)}"
+        text = _contact(failed, p) or f"{failed.message}; {_film_advice(failed, p)}"
     return failed.branch.status, f"{where}: {text}"
 
 
@@ -69,9 +74,13 @@ def _corner(p: ORing) -> str:
     return _EXTRUSION.format(p.extrusion_gap, p.corner_fillet) if p.opens else _PRESSURE
 
 
-def _film_advice(failed: StageFailed) -> str:
-    name = failed.stage.name.split(": ")[-1]
-    return _FILM if name in ("contact to film", "shear") else failed.advice
+def _film_advice(failed: StageFailed, p: ORing) -> str:
+    """What may help a film that was not found."""
+    if failed.stage.name.split(": ")[-1] not in ("contact to film", "shear"):
+        return failed.advice
+    if p.given_arc:
+        return _ARC.format(*p.given_arc)
+    return _FILM if p.sealed_pressure > _HIGH * p.shear_modulus else _THICK
 
 
 def _ring(p: ORing) -> str:

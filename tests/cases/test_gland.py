@@ -80,6 +80,22 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
         assert "norm" not in message
 
 
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"sealed_pressure": 7.0}, "above twice the shear modulus"),
+        ({"sealed_pressure": 0.5}, "lower speeds or a thinner oil"),
+        ({"arc_start": -20.0, "arc_end": 20.0}, "beyond the given arc, -20 to 20 degrees"),
+    ],
+)
+def test_a_film_that_is_not_found_is_told_why(given: dict[str, Any], says: str) -> None:
+    p = ORing(**given)
+    system = build_system(p.model_copy(update={"mesh": "uniform", "density": 1}))
+    stage = replace(squeeze_stage(system, PathSettings()), name="contact to film")
+    failed = StageFailed(stage, Branch((), Status.DIVERGED, ""))
+    assert says in explained(failed, "stroke in", p)[1]
+
+
 def test_a_ring_that_overfills_its_gland_is_warned_of() -> None:
     narrow = ORing(ring="AS568-210", rod=19.0, groove_width=3.6, housing_diameter=23.9)
     assert CASE.warnings(narrow) == [
