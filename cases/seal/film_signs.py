@@ -22,6 +22,10 @@ EXIT_SLOPE = 40.0
 INLET = (10.0, 1.5)
 """Film thicknesses, in h*, between which the segments of the inlet are counted."""
 
+THIN = 100.0
+"""Films, h*, that count as contact where oscillations are looked for, if less than 20 um: those of
+a film of 30 nm end far beyond the dip at its exit, which then is within the mid contact."""
+
 MID_CONTACT = 0.1
 """Share of the contact that is left out at either end where oscillations are looked for."""
 
@@ -85,7 +89,7 @@ def oscillation(x: Array, h: Array, level: float = CONTACT_FILM) -> float:
     there: D_i = h_(i-1) - 2 h_i + h_(i+1), and a pair of neighbours of opposite sign counts with
     the smaller of |D_i|, |D_(i+1)|. A zigzag of amplitude a about h has the index 4 a / h, a
     smooth film next to none. The mid contact is the middle four fifths of where h is below the
-    level of `contact_film`, 20 um.
+    level, mm: that of `contact_film`, or `THIN` films.
     """
     start, end = interval_below(x, h, level)
     margin = MID_CONTACT * (end - start)

@@ -14,6 +14,7 @@ from softehl.cases.seal.entrance import built_up, wedge, wedge_friction
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film_signs import (
     INLET,
+    THIN,
     end_gap,
     inlet_ratio,
     inlet_segments,
@@ -70,6 +71,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
     q = float(flux[around].mean())
     h_star = q / (0.5 * film.rod_speed)
+    within = min(level, THIN * h_star) if h_star > 0.0 else level
     drag, friction = (
         float(2.0 * pi * system.rod_radius * (tau * at["dx"]).sum())
         for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
@@ -90,7 +92,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         friction=friction,
         flux_variation=relative_spread(flux[whole]),
         jump=jump,
-        oscillation=max(oscillation(z[_nodes(k)], h[_nodes(k)], level) for k in parts),
+        oscillation=max(oscillation(z[_nodes(k)], h[_nodes(k)], within) for k in parts),
         inlet_segments=inlet_segments(narrows, h_star),
         inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(inlet, film, h_star),
         end_gap=end_gap(*((z, h) if film.stroke == "out" else (-z[::-1], h[::-1]))),

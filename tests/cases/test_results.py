@@ -11,7 +11,13 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.contact import contact_problem
 from softehl.cases.seal.contact_results import contact_pressure
 from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.film_signs import end_gap, inlet_ratio, inlet_segments, oscillation
+from softehl.cases.seal.film_signs import (
+    THIN,
+    end_gap,
+    inlet_ratio,
+    inlet_segments,
+    oscillation,
+)
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.path import PathSettings
 from softehl.cases.seal.results import film_numbers, film_state
@@ -112,6 +118,16 @@ def test_the_oscillation_index_of_a_zigzag_is_four_amplitudes() -> None:
     kink = flat - 1e-4 * np.maximum(0.0, 1.0 - 10.0 * np.abs(x - 0.5))  # one dip of one sign
     assert oscillation(x, kink) <= 0.11
     assert oscillation(x, np.full(41, 1.0)) == 0.0  # no contact anywhere
+
+
+def test_the_dip_of_a_thin_film_is_no_oscillation() -> None:
+    # as of section 26 at 10 mm/s, um: 20 um are 700 films, and end far beyond the dip
+    x = np.array([-1.14, -1.08, -1.05, -1.02, -0.88, -0.69, -0.41, -0.22, -0.19, -0.1843, -0.1829])
+    x = np.concatenate([x, [-0.1798, -0.17, -0.15, -0.13, -0.1, -0.07]])
+    h = np.array([19.0, 6.5, 2.2, 0.03, 0.0272, 0.027, 0.0267, 0.0261, 0.0249, 0.0212, 0.05])
+    h = 1e-3 * np.concatenate([h, [0.06, 0.68, 2.5, 5.4, 11.0, 17.0]])
+    assert oscillation(x, h) > 0.2
+    assert oscillation(x, h, THIN * 2.7e-5) < 0.1
 
 
 def test_the_inlet_is_counted_in_segments() -> None:
