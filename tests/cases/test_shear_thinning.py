@@ -59,7 +59,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({**POLYMER, "carreau_stress": 0.1}, "one follows from the other"),
     ({"eyring_stress": 0.0}, "greater than 0"),
     ({**POLYMER, "carreau_exponent": 1.5}, "less than or equal to 1"),
-    ({**POLYMER, "carreau_rate": "1e5 Hz"}, "is no number in 1/s"),
+    ({**POLYMER, "carreau_rate": "1e5 mm/s"}, "is no number in 1/s"),
     ({"eyring_stress": "5 1/s"}, "is no number in MPa"),
     ({"shear_thinning": "ostwald"}, "'eyring' or 'carreau'"),
     ({"eyring_stress": 5, "reynolds": "dg"}, 'reynolds = "dg" knows Newtonian oils only'),
