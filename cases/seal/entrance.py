@@ -20,12 +20,21 @@ from softehl.runtime.arrays import Array
 def wedge(system: SealSystem, film: FilmLoads, x: Array) -> tuple[Array, Array]:
     """Way and gap (n,), mm, from the inlet end of the film x (n,) outwards.
 
-    As far as the surface faces the rod and leaves it.
+    As far as the surface faces the rod and leaves it; a step of no length where it turns away at
+    once, as one that is pressed against a wall.
     """
     loop, out = system.deformed(x)[system.mesh.boundary], film.stroke == "out"
     z, r = (np.concatenate([loop[:1], loop[:0:-1]]) if out else loop[system.mesh.arc :]).T
     way, gap = (z[0] - z if out else z - z[0]), r - system.rod_radius
-    ends = np.flatnonzero((np.diff(way) <= 0.0) | (np.diff(gap) <= 0.0))
+    return facing(way, gap)
+
+
+def facing(way: Array, gap: Array) -> tuple[Array, Array]:
+    """The part of a surface (n,) that faces the rod and leaves it, from its first node on."""
+    turns, narrows = np.diff(way) <= 0.0, np.diff(gap) <= 0.0
+    if turns[0] and not narrows[0]:
+        return way[[0, 0]], gap[:2]
+    ends = np.flatnonzero(turns | narrows)
     last = int(ends[0]) + 1 if len(ends) else len(way)
     return way[:last], gap[:last]
 

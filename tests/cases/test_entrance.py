@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.entrance import built_up, wedge_friction
+from softehl.cases.seal.entrance import built_up, facing, wedge_friction
 from softehl.cases.seal.equations import build_system
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
@@ -26,6 +26,17 @@ def test_a_straight_wedge_has_the_pressure_of_the_integral(parts: int) -> None:
     ends = [1.0 / h - 0.5 * H_STAR / h**2 for h in (gap[0], gap[-1])]
     expected = 6.0 * FLOW / SLOPE * (ends[0] - ends[1])
     assert built_up(way, gap, FLOW, H_STAR) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_surface_that_turns_away_at_once_builds_nothing_up() -> None:
+    # as a section beside the end of its arc that is pressed against the wall
+    wall = facing(np.array([0.0, -7e-12, 0.0, 1e-12]), np.array([0.127, 0.165, 0.214, 0.276]))
+    assert built_up(*wall, FLOW, H_STAR) == 0.0
+    closes = facing(np.array([0.0, 0.1, 0.2]), np.array([0.127, 0.12, 0.3]))
+    assert built_up(*closes, FLOW, H_STAR) == np.inf
+    way, gap = facing(np.array([0.0, 0.1, 0.2, 0.2, 0.3]), np.array([0.1, 0.2, 0.4, 0.6, 0.7]))
+    assert way.tolist() == [0.0, 0.1, 0.2]
+    assert gap.tolist() == [0.1, 0.2, 0.4]
 
 
 def test_friction_below_a_wedge_is_that_of_its_shear() -> None:
