@@ -154,7 +154,7 @@ class SealRun:
         p, path = self.system.parameters, self.path
         reference = float(contact_pressure(self.system, p.sealed_pressure, self.x).max())
         references = contact_peaks(self.system, p.sealed_pressure, self.x)
-        fewest = fewest_inlet_segments(p.reynolds, p.pressure_order)
+        fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
         ratios = ANY_RATIO if p.mesh == "uniform" else INLET_RATIO
         known = _known(*self.coarser, stroke, self.system) if self.coarser else None
         coarser = dict(known.numbers) if known else {}

@@ -36,7 +36,13 @@ from softehl.cases.seal.sections import SECTIONS
 from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
 from softehl.cases.seal.stroke_start import emptied
 from softehl.cases.seal.uniform_layout import uniform_layout
-from softehl.cases.seal.verdict import INLET_RATIO, ContactNumbers, FilmNumbers, Verdict
+from softehl.cases.seal.verdict import (
+    INLET_RATIO,
+    ContactNumbers,
+    FilmNumbers,
+    Verdict,
+    fewest_inlet_segments,
+)
 from softehl.runtime.arrays import Array, Integers
 
 GROOVE: dict[str, Any] = {"housing_diameter": 56.4, "groove_width": 4.3}
@@ -511,3 +517,8 @@ def test_the_films_of_a_rectangle_and_of_an_x_ring() -> None:
         assert abs(state.flux_mismatch_percent) < 1e-6
         assert state.contact_start_mm < state.groove_start_mm < state.groove_end_mm
         assert min(state.h_min_sealed_um, state.h_min_air_um) == pytest.approx(state.h_min_um)
+
+
+def test_the_inlet_of_a_section_with_two_lobes_needs_more_segments() -> None:
+    assert fewest_inlet_segments("fe", 4, lobes=2) == 2.0 * fewest_inlet_segments("fe", 4)
+    assert fewest_inlet_segments("dg", 1, lobes=2) == fewest_inlet_segments("dg", 1)
