@@ -30,6 +30,7 @@ from softehl.cases.seal.pockets import fed, traps
 from softehl.cases.seal.pressure_newton import patient
 from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.thinning import longer, sooner, thinning_stage
+from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.solution import Branch, Point, Status
@@ -184,19 +185,22 @@ class FilmPath:
             stage = speed_stage(self.system, self.settings, film, speeds, on_speed)
             self.driver.follow(fast.speed(stage), x)
 
-    def entered(self, film: FilmLoads, x: Array) -> BuiltFilm:
+    def entered(
+        self, film: FilmLoads, x: Array, numbers: FilmNumbers
+    ) -> tuple[FilmLoads, Array, FilmNumbers]:
         """The film x (n,) with the pressure of the wedge before its arc where it lacks much of it.
 
-        Without it where that leads to no film.
+        numbers: what the film means. All as they are where no such film is found.
         """
-        numbers = film_numbers(self.system, self.system.film_problem(film), film, x)
         if not numbers.enters:
-            return film, x
+            return film, x, numbers
         more, fast = replace(film, entrance=numbers.entrance), self._modified(x)
         one = speed_stage(self.system, self.settings, more, (film.speed,), lambda at, point: None)
         stage = replace(one, name="wedge before the arc")
         y = self.driver.follow(fast.speed(stage) if fast else stage, x)
-        return (film, x) if isinstance(y, StageFailed) else (more, y)
+        if isinstance(y, StageFailed):
+            return film, x, numbers
+        return more, y, film_numbers(self.system, self.system.film_problem(more), more, y)
 
     def settled(self, x: Array) -> Followed:
         """The contact state x where the rod is as near as asperities let it; x itself if smooth."""

@@ -204,15 +204,14 @@ class SealRun:
         if falling and progress.slowest and not film.speed < progress.slowest[0].speed:
             return  # a slower film is known already
         progress.slowest = wanted.last = film, x
-        problem = system.film_problem(film)
-        progress.verdict = progress.verdict.after(film_numbers(system, problem, film, x))
+        last = film_numbers(system, system.film_problem(film), film, x)
+        progress.verdict = progress.verdict.after(last)
         if film.speed not in progress.missing:
             return
         progress.missing.discard(film.speed)
         iterations = point.solution.iterations
-        film, x = self.path.entered(film, x)
+        film, x, last = self.path.entered(film, x, last)
         p, problem = system.parameters, system.film_problem(film)
-        last = film_numbers(system, problem, film, x)
         if self.coarser and film.speed not in coarser:
             coarser |= _carried(*self.coarser, film, (system, self.x, x))
         error, of_friction = _errors(p.density, last, coarser.get(film.speed))
@@ -305,5 +304,6 @@ def _carried(
 
 def _numbers(path: FilmPath, film: FilmLoads, x: Array) -> FilmNumbers:
     """What a film x (n,) means."""
-    film, y = path.entered(replace(film, entrance=0.0), x)
-    return film_numbers(path.system, path.system.film_problem(film), film, y)
+    bare = replace(film, entrance=0.0)
+    numbers = film_numbers(path.system, path.system.film_problem(bare), bare, x)
+    return path.entered(bare, x, numbers)[2]
