@@ -146,8 +146,16 @@ def test_both_strokes_move_the_load_downstream(stroke: str) -> None:
 
 
 def test_without_bubbles_in_the_pressure_it_is_without_effect() -> None:
-    """m_p = 1; the second speed is far on a path of many steps, and the film is the same."""
-    one, other = (solved(c, pressure_order=1, speeds=(6400.0, 3200.0)) for c in (0.0, 1.0))
-    for a, b in zip(one.states, other.states, strict=True):
-        assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-9)
-        assert a.oscillation_index == pytest.approx(b.oscillation_index, rel=1e-6)
+    """m_p = 1: the equations are the same, and so are their tangents.
+
+    (Films are not: several solve them, which zigzag, and rounding chooses.)
+    """
+    scale, moved = {}, {}
+    for order in (1, 2):
+        (plain, x), (with_term, _) = (films(pressure_order=order, upwinding=c) for c in (0.0, 1.0))
+        r, K = plain.linearise(x)
+        other, L = with_term.linearise(x)
+        scale[order] = np.array([abs(r).max(), abs(K).max()])
+        moved[order] = np.array([abs(other - r).max(), abs(L - K).max()])
+    assert (moved[1] <= 1e-14 * scale[1]).all()
+    assert (moved[2] > 1e-9 * scale[2]).all()
