@@ -86,6 +86,10 @@ class LaggedPressure:
         """See `Problem`."""
         return self.problem.norm(r)
 
+    def beyond_rounding(self, x: Array, K: csc_array[np.float64]) -> float:
+        """See `Problem`."""
+        return self.problem.beyond_rounding(x, K)
+
     def step_limit(self, x: Array, dx: Array) -> float:
         """See `Problem`."""
         return self.problem.step_limit(x, dx)

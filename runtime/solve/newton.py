@@ -18,6 +18,7 @@ from softehl.runtime.solve.solution import Solution, Status
 from softehl.runtime.solve.superlu import SuperLU
 
 _HARDLY_LESS = 0.5  # of the norm before: Newton does better unless rounding is all that is left
+_FEW = 10.0  # times the tolerance: more than that is iterated on before it counts as rounding
 _SUFFICIENT_DECREASE = 1e-4  # Armijo's constant on the norm, the customary value
 
 
@@ -66,6 +67,18 @@ class MeasuredProblem(NonlinearProblem, Protocol):
         """Dimensionless size of R(x), (n,), inf if it is not finite.
 
         With K, a tangent near x, what rounding may have caused does not count.
+        """
+        ...
+
+
+@runtime_checkable
+class RoundedProblem(NonlinearProblem, Protocol):
+    """A problem that knows how well double precision can fulfil its equations."""
+
+    def beyond_rounding(self, x: Array, K: SparseMatrix) -> float:
+        """Norm of what is left of R(x), (n,), where the last digits of x are at fault for the rest.
+
+        K: a tangent near x.
         """
         ...
 
@@ -210,13 +223,23 @@ class Newton:
             message = f"the residual along the Newton step is not finite, down to {fraction:.1e}"
             return _end(state, Status.NOT_FINITE, message + _where(problem, x))
         state = replace(state, x=best, norms=(*state.norms, best_norm))
-        if best_norm > _HARDLY_LESS * state.norms[-2] and self._is_rounding(problem, best, K):
+        hardly_less = best_norm > _HARDLY_LESS * state.norms[-2]
+        rounding = hardly_less and self._is_rounding(problem, best, K)
+        if rounding or self._is_exact(problem, state, K):
             return _end(state, Status.CONVERGED, f"norm {best_norm:.1e}, all of it rounding")
         return state
 
     def _is_rounding(self, problem: NonlinearProblem, x: Array, K: SparseMatrix) -> bool:
         """Whether nothing is left of the residual at x but what rounding may have caused."""
         return isinstance(problem, MeasuredProblem) and problem.measure(x, K) <= self.tolerance
+
+    def _is_exact(self, problem: NonlinearProblem, state: NewtonState, K: SparseMatrix) -> bool:
+        """Whether the last digits of x make all that is left of a residual near the tolerance."""
+        if not self.tolerance < state.norms[-1] <= min(_FEW, self.stagnation) * self.tolerance:
+            return False
+        if not isinstance(problem, RoundedProblem):
+            return False
+        return problem.beyond_rounding(state.x, K) <= self.tolerance
 
     def _acceptable(self, norm: float, before: float, fraction: float) -> bool:
         if not math.isfinite(norm):

@@ -246,6 +246,29 @@ def test_rounding_beyond_the_bound_is_not_accepted(floor: float, stagnation: flo
     assert solution.residual_norms[-1] == pytest.approx(floor, rel=1e-6)
 
 
+@dataclass(frozen=True)
+class Represented(Algebraic):
+    """One that knows what the last digits of x make of its residual."""
+
+    share: float = 1.0
+
+    def beyond_rounding(self, x: Array, K: SparseMatrix) -> float:
+        """What is left beyond a share of the residual."""
+        return (1.0 - self.share) * float(np.abs(self.residual(x)).max())
+
+
+def test_what_the_last_digits_of_x_cause_is_not_iterated_on() -> None:
+    def of(share: float) -> Solution:
+        plain = rounded(4e-9)
+        return solve(Represented(plain.equations, plain.jacobian, share=share), 1.5)
+
+    known, unknown = of(1.0), of(0.0)
+    assert known.converged
+    assert "all of it rounding" in known.message
+    assert known.iterations < unknown.iterations
+    assert known.residual_norms == unknown.residual_norms[: known.iterations + 1]
+
+
 @pytest.mark.parametrize("status", Status)
 def test_every_failure_has_advice(status: Status) -> None:
     assert bool(status.advice) is (status is not Status.CONVERGED)
