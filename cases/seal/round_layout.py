@@ -15,7 +15,7 @@ from softehl.runtime.mesh.spacing import Spacing
 
 _DENSITY = 2  # for which the sizes are chosen; other densities divide or join its segments
 
-_SIDES = 25.0  # degrees that the side blocks need at least
+_SIDES = 35.0  # degrees that the side blocks need at least: with 25 their upper corners fold
 
 _CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
 

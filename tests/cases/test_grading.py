@@ -6,10 +6,12 @@ from math import inf, radians
 import numpy as np
 import pytest
 
+from softehl.cases.seal import round_layout
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.grading import graded_layout
+from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.method import run
 from softehl.cases.seal.order import OrderPair
 from softehl.cases.seal.parameters import ORing
@@ -129,6 +131,32 @@ def test_more_layers_than_there_may_be_are_not_made() -> None:
     thinnest = layout.graded(spacing, 33, 1e-9)
     assert thinnest.disc.layers == MOST_LAYERS
     assert thinnest.disc.layer_growth == STEEPEST_GROWTH ** (2 * MOST_LAYERS)
+
+
+@pytest.mark.parametrize("density", [1, 2, 4])
+def test_no_element_is_folded_wherever_the_arc_ends(density: int) -> None:
+    _, spacing = _placed()
+    guide = uniform_layout(ORing())
+    for first, last in np.random.default_rng(7).uniform([5.0, 5.0], [74.0, 74.0], (40, 2)):
+        layout = guide.between(guide, _on_circle(guide, -first, last)).graded(spacing, 54, 1e-3)
+        assert corner_jacobians(layout.mesh(density)).min() > 0.05, (first, last)
+
+
+def test_narrow_sides_would_fold_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    # with sides of 25 degrees, AS568 rings in deep grooves at 3.7 shear moduli found no contact
+    monkeypatch.setattr(round_layout, "_SIDES", 25.0)
+    _, spacing = _placed()
+    guide = uniform_layout(ORing())
+    layout = guide.between(guide, _on_circle(guide, -51.2, 64.6)).graded(spacing, 54, 1e-3)
+    assert corner_jacobians(layout.mesh(2)).min() < 0.0
+
+
+def _on_circle(guide: Layout, first: float, last: float) -> tuple[float, float]:
+    """Ends of an arc (mm) on the guide's, from angles in degrees."""
+    assert isinstance(guide, RoundLayout)
+    start = guide.disc.arc_start
+    a, b = (float(radians(angle - start) * guide.disc.radius) for angle in (first, last))
+    return a, b
 
 
 def _placed() -> tuple[RoundLayout, Spacing]:
