@@ -24,6 +24,8 @@ from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
 
+_CORNERED = 2.0  # shear moduli
+
 WEDGED = 2
 """Nodes that touch each wall where the groove holds the section without help."""
 
@@ -193,6 +195,7 @@ def load_stage(
         steps=steps.scaled(p.shear_modulus),
         sealed_pressure=p.sealed_pressure,
         stroke="both",
+        predictor="previous" if lies_in_corner(system) else "secant",
     )
 
 
@@ -238,6 +241,12 @@ def approach_stage(system: SealSystem, settings: PathSettings, offset: float) ->
         stroke="both",
         shown=exp,
     )
+
+
+def lies_in_corner(system: SealSystem) -> bool:
+    """Whether the sealed pressure holds a round section in the corner between rod and wall."""
+    p = system.parameters
+    return not system.section.layout.flat and p.sealed_pressure > _CORNERED * p.shear_modulus
 
 
 def along(system: SealSystem, newton: Newton) -> Corrector | None:

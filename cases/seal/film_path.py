@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from softehl.cases.seal.coarser_films import CoarserFilms
+from softehl.cases.seal.contact import along, lies_in_corner
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.dry import (
     dry_film,
@@ -25,18 +26,29 @@ from softehl.cases.seal.film import (
 )
 from softehl.cases.seal.grading import film_thickness
 from softehl.cases.seal.loads import FilmLoads, Stroke
-from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
+from softehl.cases.seal.path import (
+    Followed,
+    PathDriver,
+    PathSettings,
+    Stage,
+    StageFailed,
+    laborious,
+)
 from softehl.cases.seal.pockets import fed, traps
-from softehl.cases.seal.pressure_newton import patient
+from softehl.cases.seal.pressure_newton import patient, roughly
 from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.thinning import longer, sooner, thinning_stage
 from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.newton import Corrector
 from softehl.runtime.solve.solution import Branch, Point, Status
 
 _POCKET = 5.0
 """Of `film_thickness`, above which oil is trapped rather than part of a thick film."""
+
+_LABORIOUS = 20
+"""Iterations that a state on the way may need where the section lies in a corner."""
 
 OnSpeed = Callable[[FilmLoads, Point], None]
 BuiltFilm = tuple[FilmLoads, Array]
@@ -47,12 +59,14 @@ class FilmPath:
     """The films of a system: built up from its contact state, then followed as the speed falls.
 
     tolerance: of films by modified Newton iterations that are no results, None for that of results.
+    laboriously: whether Newton's method is worth its time in a corner: not before another mesh.
     """
 
     system: SealSystem
     settings: PathSettings
     driver: PathDriver
     tolerance: float | None = None
+    laboriously: bool = True
 
     @property
     def quick(self) -> bool:
@@ -76,6 +90,8 @@ class FilmPath:
         y = self.driver.follow(first, start)
         if isinstance(y, StageFailed) and not y.branch.points:
             y = self.driver.follow(sooner(self.system, first, film, x), start)
+        if isinstance(y, StageFailed) and self._cornered:
+            y = self._onward(first, y, roughly(self.driver.newton))
         thick = _POCKET * film_thickness(p, contact_edges(self.system, x), film.speed)
         if not isinstance(y, StageFailed) and self._traps(film, x, y, thick):
             y = StageFailed(first, Branch((), Status.DIVERGED, "oil is trapped"))
@@ -84,8 +100,9 @@ class FilmPath:
         failed = self._falling(fast, film, y, on_speed)
         if failed is None or isinstance(y, StageFailed) or failed.branch.points:
             return failed
-        y = self.driver.follow(longer(first), y)  # it was not steady yet
-        return self._falling(fast, film, y, on_speed)
+        steady = self.driver.follow(longer(first), y)  # it was not yet
+        y = y if isinstance(steady, StageFailed) and self._cornered else steady
+        return self._falling(fast, film, y, on_speed, begin=True)
 
     def _traps(self, film: FilmLoads, x: Array, y: Array, apart: float) -> bool:
         """Whether the film y (n,) holds oil that is not on the way of its flux; see `fed`."""
@@ -95,30 +112,74 @@ class FilmPath:
         return not fed(self.system, film, x, y, apart, h_star)
 
     def _falling(
-        self, fast: FastFilm, film: FilmLoads, y: Followed, on_speed: OnSpeed
+        self,
+        fast: FastFilm,
+        film: FilmLoads,
+        y: Followed,
+        on_speed: OnSpeed,
+        *,
+        begin: bool = False,
     ) -> StageFailed | None:
-        """From the first film y (n,), if there is one, to shear, then to falling speed."""
+        """From the first film y (n,), if there is one, to shear, then to falling speed.
+
+        begin: see `_sheared`.
+        """
         system, settings, p = self.system, self.settings, self.system.parameters
         if p.shear_traction and not isinstance(y, StageFailed):
-            y = self._sheared(fast, shear_stage(system, settings, film), y)
+            y = self._sheared(fast, shear_stage(system, settings, film), y, begin=begin)
         if not isinstance(y, StageFailed):
             stage = speed_stage(system, settings, film, p.speeds, on_speed)
-            y = self.driver.follow(fast.speed(stage), y)
+            sheared, y = y, self.driver.follow(fast.speed(stage), y)
+            if isinstance(y, StageFailed) and self._cornered:
+                left = p.speeds
+                if y.branch.points:
+                    sheared, last = y.branch.last.x, abs(stage.shown(y.branch.points[-1].parameter))
+                    film, left = replace(film, speed=last), below(p.speeds, last)
+                return self._slower_in_corner(film, sheared, left, on_speed)
         return y if isinstance(y, StageFailed) else None
 
-    def _sheared(self, fast: FastFilm, stage: Stage, x: Array) -> Followed:
+    def _sheared(self, fast: FastFilm, stage: Stage, x: Array, *, begin: bool = False) -> Followed:
         """The shear stage from x (n,), at once if that leads there; by Newton's method from where
         the fast way ends.
 
         Where shear pulls corners of the section off the groove or into it the fast way stalls.
+        begin: whether Newton's method may also begin where the fast way did.
         """
         y = self.driver.follow(fast.shear(replace(stage, start=stage.stop)), x)
         if isinstance(y, StageFailed):
             y = self.driver.follow(fast.shear(stage), x)
-        if isinstance(y, StageFailed) and y.branch.points and self.tolerance is None:
+        if not isinstance(y, StageFailed):
+            return y
+        if self._cornered:
+            return self._onward(stage, y, self._rough, x if begin else None)
+        if y.branch.points and self.laboriously and self.tolerance is None:
             last = y.branch.points[-1]
             y = self.driver.follow(replace(stage, start=last.parameter), last.solution.x)
         return y
+
+    @property
+    def _cornered(self) -> bool:
+        """Whether its pressure holds a round section in the corner of rod and wall: Newton's method
+        goes farther there from the last state than along a secant.
+        """
+        return self.quick and self.laboriously and lies_in_corner(self.system)
+
+    @property
+    def _rough(self) -> Corrector | None:
+        """What solves films on the way of such a section."""
+        newton = replace(self.driver.newton, max_iterations=_LABORIOUS)
+        return along(self.system, roughly(newton))
+
+    def _onward(
+        self, stage: Stage, failed: StageFailed, corrector: Corrector | None, x: Array | None = None
+    ) -> Followed:
+        """From the last state of a failed stage, or else from its beginning, x (n,), if given."""
+        start = stage.start
+        if failed.branch.points:
+            start, x = failed.branch.points[-1].parameter, failed.branch.last.x
+        if x is None:
+            return failed
+        return self.driver.follow(laborious(replace(stage, start=start), corrector), x)
 
     def carried(
         self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
@@ -291,8 +352,27 @@ class FilmPath:
         if isinstance(built, StageFailed):
             return built
         film, x = built
+        if self._cornered:
+            return self._slower_in_corner(film, x, speeds, on_speed)
         end = self.driver.follow(speed_stage(self.system, self.settings, film, speeds, on_speed), x)
         return end if isinstance(end, StageFailed) else None
+
+    def _slower_in_corner(
+        self, film: FilmLoads, x: Array, speeds: tuple[float, ...], on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """The same where the section lies in a corner; only the speeds are solved to the end."""
+        system, settings, newton = self.system, self.settings, self.driver.newton
+        for speed in speeds:
+            way = speed_stage(system, settings, film, (speed,), lambda at, point: None)
+            y = self.driver.follow(laborious(way, self._rough), x)
+            film = replace(film, speed=speed)
+            if not isinstance(y, StageFailed):
+                there = speed_stage(system, settings, film, (speed,), on_speed)
+                y = self.driver.follow(laborious(there, along(system, newton)), y)
+            if isinstance(y, StageFailed):
+                return y
+            x = y
+        return None
 
 
 def below(speeds: tuple[float, ...], speed: float) -> tuple[float, ...]:

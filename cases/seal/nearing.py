@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from softehl.cases.seal.contact import along, approach_stage
+from softehl.cases.seal.contact import along, approach_stage, lies_in_corner
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
+from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed, laborious
+from softehl.cases.seal.pressure_newton import roughly
 from softehl.cases.seal.system import ROD
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
@@ -69,14 +70,23 @@ def rod_brought_near(
     follow: Callable[[Stage, Array], Followed],
     *,
     quick: bool,
+    laboriously: bool = False,
 ) -> Followed:
     """From the contact state x (n,) to that with the rod at an offset, mm.
 
     quick: whether modified Newton iterations are to be tried, where the linear solver condenses.
+    laboriously: whether Newton's method follows where they fail and the section lies in a corner.
     """
-    if quick and isinstance(newton.linear, Condenser):
-        return neared(nearing_stage(system, settings, offset, x, newton.linear), x, follow)
     stage = approach_stage(system, settings, offset)
+    if quick and isinstance(newton.linear, Condenser):
+        y = neared(nearing_stage(system, settings, offset, x, newton.linear), x, follow)
+        if not (laboriously and isinstance(y, StageFailed) and lies_in_corner(system)):
+            return y
+        way = laborious(replace(stage, steps=_STEPS), along(system, roughly(newton)))
+        y = follow(way, x)
+        if isinstance(y, StageFailed):
+            return y
+        return follow(replace(stage, start=stage.stop, corrector=along(system, newton)), y)
     return follow(replace(stage, corrector=along(system, newton)), x)
 
 

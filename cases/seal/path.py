@@ -102,6 +102,14 @@ class Stage:
         return (parameter - self.start) / way if way else 1.0
 
 
+def laborious(stage: Stage, corrector: Corrector | None) -> Stage:
+    """A stage by a corrector of its own, each state from the one before it.
+
+    Where thin elements turn with an edge of the contact a secant turns them too far.
+    """
+    return replace(stage, corrector=corrector, predictor="previous", method="newton")
+
+
 @dataclass(frozen=True, eq=False)
 class StageFailed:
     """A stage that did not reach its end. last: the last film that was solved, if there was one."""
