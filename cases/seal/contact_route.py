@@ -16,12 +16,14 @@ from softehl.cases.seal.contact import (
     held_place,
     lean_stage,
     let_go_stage,
+    lies_in_corner,
     squeeze_stage,
     wedged,
 )
 from softehl.cases.seal.contact_results import unsealed
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
 from softehl.cases.seal.contacts import Edge, contact_edges
+from softehl.cases.seal.drag import dragged
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.film_edges import between
 from softehl.cases.seal.grading import (
@@ -31,6 +33,7 @@ from softehl.cases.seal.grading import (
     inlet_length,
     placed_layout,
     slowest_films,
+    sweeps,
 )
 from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.loading import Loading, State
@@ -52,6 +55,9 @@ SEALS = 3
 
 GUIDE = 2
 """Least density of a mesh whose contact shows where another one is to be fine."""
+
+MESH_OF_INSTROKE = 9
+"""Number of a graded mesh for the instroke alone, after all others."""
 
 NEARER, SHORT_INLET = 2, 0.5
 """Meshes that are graded by a contact near the rod, and below which inlet, in offsets of the rod,
@@ -199,6 +205,25 @@ class ContactRoute:
         new = build_system(system.parameters, layout)
         return self._loading.carried(system, x, new, "contact on the mesh of the film")
 
+    def for_instroke(self, state: State) -> State | None:
+        """A contact state on a mesh for the films of the instroke, where these move their inlet by
+        many of its lengths; None where they do not, or no such state is found. See `drag`.
+        """
+        system, x = state
+        p, settings = system.parameters, self.settings
+        if not lies_in_corner(system) or p.mesh != "graded" or p.rubs or p.rough:
+            return None
+        offset = slowest_films(system, x)[0]
+        y = self._neared(system, offset, x) if self._short(system, x) else x
+        if isinstance(y, StageFailed) or y is x:
+            offset, y = settings.offset, x
+        y = without_rounding(system, y)
+        moved = dragged(system, settings, offset, y, self.newton.linear)
+        if not sweeps(system, y, moved):
+            return None
+        found = self._on(placed_layout(system, y, p, dragged=moved), p, state, MESH_OF_INSTROKE)
+        return None if isinstance(found, StageFailed) else found
+
     def _near(self, system: SealSystem, x: Array) -> list[Array] | StageFailed:
         """The contact state x with the rod where slow films have it, the thinnest first."""
         found = list[Array]()
@@ -213,7 +238,14 @@ class ContactRoute:
         """With the rod at an offset, mm, from the contact state x (n,)."""
         quick = system.parameters.solver == "auto"
         return rod_brought_near(
-            system, self.settings, offset, x, self.newton, self.follow, quick=quick
+            system,
+            self.settings,
+            offset,
+            x,
+            self.newton,
+            self.follow,
+            quick=quick,
+            laboriously=True,
         )
 
     def _short(self, system: SealSystem, x: Array) -> bool:

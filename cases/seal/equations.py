@@ -20,6 +20,7 @@ from softehl.cases.seal.system import (
     BORE,
     DISPLACEMENT,
     FIELDS,
+    FILM,
     PRESSURE,
     ROD,
     ROTATION,
@@ -306,6 +307,15 @@ class SealSystem:
             problem.with_fixed(fixed, values),
             scales={**problem.scales, **fluxes},
             guards=(*problem.guards, self.film_guard()),
+        )
+
+    def sheared(self, problem: Problem, film: FilmLoads) -> Problem:
+        """A contact problem with the shear stress of a film of the gap that there is, without its
+        pressure.
+        """
+        (block,) = [block for block in self.blocks if block.name == FILM]
+        return problem.with_parameters(
+            **{FILM: self._chosen(block, film_values(self.parameters, film, 1.0))}
         )
 
     def squeeze_values(self, rate: float) -> dict[str, Values]:

@@ -11,6 +11,7 @@ edges and are as K^(-6/5) at them resolve every speed, and one mesh serves both 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from softehl.cases.seal.contacts import Edge, contact_edges
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.system import BORE, ROD
+from softehl.cases.seal.system import AIR_WALL, BORE, ROD, SEALED_WALL, WALLS
 from softehl.cases.seal.uniform_layout import uniform_layout
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG
@@ -61,6 +62,10 @@ STEEPEST, STEEPEST_NARROW = 55.0, 68.0
 """Or where the surface is this steep, degrees: beyond it is no film. The second where the gap is
 narrower there than half of those films."""
 
+_UPRIGHT = 85.0
+"""A surface as steep as this lies on a wall. The arc ends before it: a film that rises along it has
+no length, and on a finer mesh the section may touch the wall nearer to the rod."""
+
 _FAR_SHORT, _GENTLE = 0.8, 35.0
 """An arc that ends at a gap of less than so much of what it is to have is made longer, where its
 surface is not steeper than this, degrees: a wall is near where it is."""
@@ -73,7 +78,14 @@ DEPTH = 2.5
 """Elements on such an arc are nowhere thicker than so many inlets at the slowest speed: with ten h*
 was two per cent too small, with half as many as this it changes by 0.2 %."""
 
-_MULTIPLE = 3  # of segments at density 1: meshes exist for thirds of a density
+MULTIPLE = 1.75
+"""About h* in `film_thickness`, whatever the ring."""
+
+SWEPT, COVERED = 4.0, 1.2
+"""Inlets by which the film moves its edge from which on what it sweeps has a mesh of its own, with
+segments of so many inlets of the film whose edge is there."""
+
+_THIRDS = 3  # of segments at density 1: meshes exist for thirds of a density
 _PLACED_COARSEST, _FLAT_COARSEST = 12, 24
 """As COARSEST, of an arc that the contact places: on a round section, on one that may have flats,
 along which the pressure hardly changes and the film does."""
@@ -85,6 +97,7 @@ def placed_layout(
     p: ORing,
     most: int = MOST_SEGMENTS,
     also: Sequence[Edge] = (),
+    dragged: float = 0.0,
 ) -> Layout:
     """The layout of a case whose arc reaches as far as a film may matter in the contact state x.
 
@@ -92,7 +105,9 @@ def placed_layout(
     0.3 min(1 / k, 1.5) inside: at the flatter edge the dip is as wide as the inlet of the other
     one, and lies outside. The exponents were fitted to states at p_s / mu = 0, 1 and 2.7.
     most: segments at density 1 that it may get; a state that shows the edges only roughly is no
-    reason for many. also: edges elsewhere that are to be fine too.
+    reason for many. also: edges elsewhere that are to be fine too. dragged: how far the slowest
+    film of the instroke moves its edge outward, mm, where that matters: the arc gets twice as many
+    segments, to be as fine wherever faster films move it to.
     """
     s, edges = system.section.places, contact_edges(system, x)
     most_ends = uniform_layout(p).bounds(system.section.layout)
@@ -113,13 +128,36 @@ def placed_layout(
     if p.opens:
         spots.append(_edge_spot(system, x, p, ends))
     parts, inlet = len(edges) // 2, inlet_length(p, steepest)
+    if dragged > 0.0:
+        spots.append(_swept(p, edges[-1], spots[len(edges) - 1], dragged, length))
+        most *= 2
     coarsest = length / max(parts * _PLACED_COARSEST, _FLAT_COARSEST if layout.flat else 0)
-    for long in range(layout.long, max(parts * most, layout.long) + 1, parts * _MULTIPLE):
+    for long in range(layout.long, max(parts * most, layout.long) + 1, parts * _THIRDS):
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
         if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet:
             break
     first = 0.25 * p.corner_fillet if p.opens else None
     return layout.graded(spacing, long, DEPTH * inlet, first)
+
+
+def sweeps(system: SealSystem, x: Array, dragged: float) -> bool:
+    """Whether films of the instroke move their edge by many inlets; see `placed_layout`.
+
+    x: the contact state.
+    """
+    edges = contact_edges(system, x)
+    return bool(edges) and dragged > SWEPT * inlet_length(system.parameters, edges[-1].rise)
+
+
+def _swept(p: ORing, edge: Edge, spot: Spot, dragged: float, length: float) -> Spot:
+    """Where the slowest film of the instroke has its edge, which contact has at a spot.
+
+    Faster ones have it farther outside, by as much as their inlets are longer.
+    """
+    assert spot.rates is not None
+    outside = min(spot.rates[1], COVERED * inlet_length(p, edge.rise) / dragged)
+    place = min(spot.place + dragged, length)
+    return replace(spot, place=place, rates=(spot.rates[0], outside))
 
 
 def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:
@@ -162,7 +200,7 @@ def slowest_films(system: SealSystem, x: Array) -> tuple[float, ...]:
     """
     p, edges = system.parameters, contact_edges(system, x)
     inlets = (edges[:1], edges[-1:]) if system.section.layout.flat else (edges,)
-    films = sorted(1.75 * film_thickness(p, some, min(p.speeds)) for some in inlets)
+    films = sorted(MULTIPLE * film_thickness(p, some, min(p.speeds)) for some in inlets)
     return tuple(films[:1] if films[-1] < _APART * films[0] else films)
 
 
@@ -192,10 +230,33 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) ->
         narrow = h[i] < 0.5 * films
         if np.degrees(steep[i]) >= (STEEPEST_NARROW if narrow else STEEPEST):
             # on a coarse mesh next to the contact, which the arc has to contain
-            return float(s[max(i, first + 1)])
+            end = max(i, first + 1)
+            upright = np.degrees(steep[i]) >= _UPRIGHT and not system.section.layout.flat
+            on_wall = upright and end > first + 1
+            return float(0.5 * (s[end - 1] + s[end]) if on_wall else s[end])
         if h[i + 1] >= reach:
             return float(np.interp(reach, h[i : i + 2], s[i : i + 2]))
     if h[-1] >= _FAR_SHORT * reach or not 0.0 < steep[-1] < np.radians(_GENTLE):
         return float(s[-1])
-    longer = min((reach - h[-1]) / np.sin(steep[-1]), abs(bound - s[-1]))
+    longer = min((reach - h[-1]) / np.sin(steep[-1]), abs(bound - s[-1]), _free(system, x, side))
     return float(s[-1] + np.copysign(longer, bound - s[-1]))
+
+
+def _free(system: SealSystem, x: Array, side: int) -> float:
+    """How much of the outline (mm) beyond an end of the arc touches no wall, nearly; any length of
+    a section with flats, which lie on it from their corners on.
+    """
+    if system.section.layout.flat:
+        return np.inf
+    mesh, touching = system.mesh, set[int]()
+    for wall in (SEALED_WALL, AIR_WALL):
+        nodes = system.section.chains[WALLS[wall]][0]
+        touching |= set(nodes[system.pressing(wall, x) > 0.0].tolist())
+    nodes, places = mesh.boundary[mesh.arc :], mesh.places[mesh.arc :] - mesh.places[mesh.arc]
+    if side == 0:
+        nodes = np.append(mesh.boundary[:1], mesh.boundary[: mesh.arc : -1])
+        places = np.append(0.0, mesh.length + mesh.places[0] - mesh.places[: mesh.arc : -1])
+    first = next((k for k, node in enumerate(nodes) if int(node) in touching), len(nodes))
+    if first in (0, len(nodes)):
+        return 0.0 if first == 0 else float(places[-1])
+    return float(0.5 * (places[first - 1] + places[first]))

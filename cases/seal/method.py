@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from softehl.cases.seal.contact import assembly, contact_problem
+from softehl.cases.seal.contact import assembly, contact_problem, lies_in_corner
 from softehl.cases.seal.contact_results import contact_numbers, contact_state
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
@@ -80,6 +80,8 @@ def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFail
         seal = replace(
             seal, better=lambda worse, last: _for_film(worse, last, route), meshes=MESHES
         )
+    if lies_in_corner(system) and not (p.rough or p.rubs) and p.given_arc is None:
+        seal = replace(seal, swept=lambda worse: _for_instroke(worse, route))
     if not (p.error_estimate and p.mesh == "graded"):
         return seal
     driver = path.driver.named("coarser mesh: ")
@@ -87,11 +89,20 @@ def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFail
         coarser = FilmPath(coarser_system(system), settings, driver, ESTIMATED)
     except MeshError:
         return seal  # too coarse for the corners of a section: errors are not known
-    route = replace(route, follow=coarser.driver.follow, contacts=ContactStore())
-    y = route.elsewhere(system, x, coarser.system)
+    aside = replace(route, follow=coarser.driver.follow, contacts=ContactStore())
+    y = aside.elsewhere(system, x, coarser.system)
     if not isinstance(y, StageFailed):
         y = coarser.settled(y)
     return seal if isinstance(y, StageFailed) else replace(seal, coarser=(coarser, y))
+
+
+def _for_instroke(seal: SealRun, route: ContactRoute) -> SealRun | None:
+    """A run on a mesh for the instroke; None where the one in use is as good or none is found."""
+    found = route.for_instroke((seal.system, seal.x))
+    if found is None:
+        return None
+    other = _begun(replace(seal.path, system=found[0]), found[1], route)
+    return None if isinstance(other, StageFailed) else other
 
 
 def _for_film(seal: SealRun, last: BuiltFilm, route: ContactRoute) -> SealRun | None:

@@ -49,13 +49,15 @@ class Wanted:
 
     report: takes a state for good. left: |U| without one, mm/s, in the order in which they are
     solved. held: by |U|, the state least in doubt of those that another mesh may better. last: the
-    slowest film on the mesh in use, and its unknowns.
+    slowest film on the mesh in use, and its unknowns. compared: whether no state is final before
+    all meshes had their turn.
     """
 
     report: Callable[[FilmState], None]
     left: tuple[float, ...]
     held: dict[float, FilmState] = field(default_factory=dict)
     last: BuiltFilm | None = None
+    compared: bool = False
 
     def found(self, state: FilmState, *, final: bool) -> None:
         """A state; it is held if another mesh may better it, unless it is final.
@@ -63,7 +65,7 @@ class Wanted:
         The arc of another mesh ends where that of the first does: what is clipped stays so.
         """
         speed = abs(state.rod_speed_mm_s)
-        if final or state.verdict in (OK, CLIPPED):
+        if (final and not self.compared) or state.verdict in (OK, CLIPPED):
             self.left = tuple(u for u in self.left if u != speed)
             self.report(state)
         else:
@@ -71,6 +73,7 @@ class Wanted:
 
     def close(self) -> None:
         """No other mesh follows: what is held is reported."""
+        self.compared = False
         for speed in self.left:
             if speed in self.held:
                 self.found(self.held[speed], final=True)
@@ -95,8 +98,9 @@ class SealRun:
 
     coarser: the films of a coarser mesh, which are no results, and its contact state. better: the
     same on a mesh that is made for a film, None where there is none. meshes: how many such meshes
-    may follow. empty: the same without pressure in the groove, for an instroke. rates: of the
-    inputs of the film by each parameter, once they were asked for.
+    may follow. passing: whether another mesh follows in any case. swept: the same on a mesh for the
+    instroke in a corner, None where there is none. empty: the same without pressure in the groove,
+    for an instroke. rates: of the inputs of the film by each parameter, once they were asked for.
     """
 
     path: FilmPath
@@ -104,6 +108,8 @@ class SealRun:
     coarser: tuple[FilmPath, Array] | None = None
     better: Better | None = None
     meshes: int = 0
+    passing: bool = False
+    swept: Callable[[SealRun], SealRun | None] | None = None
     empty: SealRun | None = None
     rates: dict[str, Inputs] = field(default_factory=dict)
 
@@ -117,6 +123,8 @@ class SealRun:
 
         With the run on the last of these meshes: it is also the better one for the other stroke.
         """
+        if self.swept and stroke == "in":
+            return self._instroke(wanted, self.swept), self
         seal = self._ready(stroke)
         failed = seal.either(stroke, wanted)
         while seal.better and seal.meshes and wanted.left and wanted.last:
@@ -124,6 +132,23 @@ class SealRun:
             failed = seal.either(stroke, wanted)
         wanted.close()
         return failed if wanted.left else None, replace(seal, meshes=self.meshes, empty=None)
+
+    def _instroke(
+        self, wanted: Wanted, swept: Callable[[SealRun], SealRun | None]
+    ) -> StageFailed | None:
+        """An instroke; what is not `ok` once more on a mesh made for the way of its inlet."""
+        wanted.compared = True
+        failed = replace(self._hasty(), swept=None, passing=True).stroke("in", wanted)
+        if wanted.left:
+            other = swept(self) or self
+            failed = replace(other, swept=None).stroke("in", wanted)
+        wanted.close()
+        return failed if wanted.left else None
+
+    def _hasty(self) -> SealRun:
+        """Without what Newton's method may do in a corner."""
+        coarser = self.coarser and (replace(self.coarser[0], laboriously=False), self.coarser[1])
+        return replace(self, path=replace(self.path, laboriously=False), coarser=coarser)
 
     def either(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
         """A stroke: an instroke first without pressure in the groove between two lobes.
@@ -179,6 +204,8 @@ class SealRun:
         start = StrokeStart(path, stroke, self.x).begun(on_speed) if progress.missing else None
         if start is None or (self.meshes and progress.slowest):
             return None
+        if self.passing:
+            return path.without_film(*start)
         if self.better and self.meshes < MESHES and progress.slowest is None:
             return path.without_film(*start)
         built = progress.slowest or path.build(*start)

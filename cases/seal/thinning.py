@@ -20,7 +20,7 @@ from scipy.sparse import coo_array, csc_array
 from softehl.cases.seal.contacts import Edge, contact_edges
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film import FastFilm, film_on, start_speed, stays
-from softehl.cases.seal.grading import film_thickness, inlet_time
+from softehl.cases.seal.grading import MULTIPLE, film_thickness, inlet_time
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
@@ -99,7 +99,7 @@ def sooner(system: SealSystem, stage: Stage, film: FilmLoads, x: Array) -> Stage
 
 def _shortest(p: ORing, edge: Edge, film: FilmLoads) -> float:
     """The first tau, s, by an edge of the contact."""
-    thicker = film.rod_offset / (1.75 * film_thickness(p, [edge], film.speed))
+    thicker = film.rod_offset / (MULTIPLE * film_thickness(p, [edge], film.speed))
     return _SHORT * inlet_time(p, edge, film.speed) / max(thicker, 1.0) ** 3
 
 

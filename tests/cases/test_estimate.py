@@ -19,6 +19,8 @@ from softehl.cases.seal.parameters import DENSITIES, ORing
 from softehl.cases.seal.path import Stage, StageFailed
 from softehl.cases.seal.state import (
     CLIPPED,
+    COLLAPSED,
+    UNCERTAIN,
     UNDER_RESOLVED,
     FilmRow,
     FilmState,
@@ -181,4 +183,17 @@ def test_what_another_mesh_cannot_better_is_reported() -> None:
     assert wanted.left == (200.0,)
     wanted.close()
     assert reported[-1].verdict == UNDER_RESOLVED
+    assert not wanted.left
+
+
+def test_of_two_meshes_the_state_least_in_doubt_is_reported() -> None:
+    reported = list[FilmState]()
+    wanted = Wanted(reported.append, (800.0, 200.0), compared=True)
+    found = ((800.0, UNDER_RESOLVED), (200.0, UNCERTAIN), (800.0, OK), (200.0, COLLAPSED))
+    for speed, verdict in found:
+        made_up = SimpleNamespace(rod_speed_mm_s=speed, verdict=verdict, oscillation_index=0.0)
+        wanted.found(cast("FilmState", made_up), final=True)
+    assert [state.verdict for state in reported] == [OK]
+    wanted.close()
+    assert [state.verdict for state in reported] == [OK, UNCERTAIN]
     assert not wanted.left

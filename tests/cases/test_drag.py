@@ -1,0 +1,118 @@
+"""What the shear stress of an instroke moves: the edge of contact, the mesh for it, its films."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from softehl.cases.seal.contact import contact_problem, lies_in_corner
+from softehl.cases.seal.contact_route import ContactRoute
+from softehl.cases.seal.contacts import contact_edges
+from softehl.cases.seal.drag import dragged
+from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.film import film_on
+from softehl.cases.seal.grading import (
+    COVERED,
+    FINEST,
+    MULTIPLE,
+    SWEPT,
+    film_thickness,
+    inlet_length,
+    placed_layout,
+    sweeps,
+)
+from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.state import Silent
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.newton import Newton
+from tests.cases.gland_matrix import drawn
+
+SETTINGS = PathSettings()
+
+
+@cache
+def contact(pressure: float | None = None) -> tuple[SealSystem, Array]:
+    """Gland 224 of the sample (3.1 shear moduli) on a coarse mesh, or under another pressure."""
+    p = drawn(224).model_copy(update={"density": 1})
+    if pressure is not None:
+        p = p.model_copy(update={"sealed_pressure": pressure})
+    found = ContactRoute(SETTINGS, PathDriver(Silent()).follow).contact(p)
+    assert not isinstance(found, StageFailed)
+    return found
+
+
+def moved(system: SealSystem, x: Array) -> float:
+    return dragged(system, SETTINGS, SETTINGS.offset, x, Newton().linear)
+
+
+def pulled(system: SealSystem, x: Array, share: float) -> Array:
+    """The contact state under a share of the shear stress of the slowest film, solved in full."""
+    p, edge = system.parameters, contact_edges(system, x)[-1]
+    speed = min(p.speeds)
+    thin = MULTIPLE * film_thickness(p, [edge], speed)
+    film = replace(film_on(system, "in", x, speed * SETTINGS.offset / thin), shear=share)
+    problem = contact_problem(system, SETTINGS, p.sealed_pressure)
+    solution = Newton().solve(system.sheared(problem, film), x)
+    assert solution.converged
+    return solution.x
+
+
+def test_the_edge_moves_as_one_linear_solution_says() -> None:
+    system, x = contact()
+    share = 0.02  # within one segment: between two of them the edge is not smooth
+    way = contact_edges(system, pulled(system, x, share))[-1].place
+    way -= contact_edges(system, x)[-1].place
+    assert moved(system, x) > 0.0
+    assert way / share == pytest.approx(moved(system, x), rel=0.1)
+    # another share is told from it
+    assert way / (2.0 * share) != pytest.approx(moved(system, x), rel=0.1)
+
+
+def test_it_moves_by_as_many_inlets_at_every_speed() -> None:
+    system, x = contact()
+    p = system.parameters
+    faster = replace(system, parameters=p.model_copy(update={"speeds": (1000.0,)}))
+    rises = contact_edges(system, x)[-1].rise
+    lengths = [inlet_length(s.parameters, rises) for s in (system, faster)]
+    assert moved(faster, x) / lengths[1] == pytest.approx(moved(system, x) / lengths[0], rel=1e-6)
+
+
+def test_it_hardly_moves_where_no_pressure_holds_the_section_in_the_corner() -> None:
+    inlets = {}
+    for pressure in (1.0, None):
+        system, x = contact(pressure)
+        length = inlet_length(system.parameters, contact_edges(system, x)[-1].rise)
+        inlets[pressure] = moved(system, x) / length
+        assert lies_in_corner(system) is (pressure is None)
+        for ratio in (0.9, 1.1):
+            assert sweeps(system, x, ratio * SWEPT * length) is (ratio > 1.0)
+    assert inlets[1.0] < 0.5 * SWEPT
+    assert inlets[None] > 0.9 * SWEPT
+
+
+def test_what_it_sweeps_is_as_fine_as_the_inlets_there() -> None:
+    system, x = contact()
+    p = system.parameters.model_copy(update={"density": 2})
+    edge, way = contact_edges(system, x)[-1], 3.0 * moved(system, x)
+    inlet = inlet_length(p, edge.rise)
+    found = {}
+    for name, drag in (("with", way), ("without", 0.0)):
+        layout = placed_layout(system, x, p, dragged=drag)
+        first, _ = layout.bounds(system.section.layout)
+        s = layout.mesh(2).arc_places
+        beyond = 0.5 * (s[1:] + s[:-1]) - (edge.place - first) - way
+        # the film of 100 mm/s has its edge 10^0.4 times as far, and its inlet is as much longer
+        faster = np.argmin(np.abs(beyond - (10.0**0.4 - 1.0) * way))
+        found[name] = np.diff(s)[faster] / (10.0**0.4 * inlet)
+    assert found["with"] < 1.2 * COVERED
+    assert found["without"] > 2.0 * found["with"]
+    assert FINEST < COVERED < SWEPT
+
+
+def test_no_segment_of_the_arc_lies_on_a_wall() -> None:
+    system, x = contact()
+    z, _ = system.arc_film(x)
+    assert np.diff(z).min() > 0.0
