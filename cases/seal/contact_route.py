@@ -16,7 +16,6 @@ from softehl.cases.seal.contact import (
     held_place,
     lean_stage,
     let_go_stage,
-    lies_in_corner,
     squeeze_stage,
     wedged,
 )
@@ -196,8 +195,7 @@ class ContactRoute:
     def for_film(self, state: State, edges: Sequence[Edge]) -> State | StageFailed:
         """A contact state on a mesh that is fine at the edges of a film, too."""
         system, x = state
-        near = self._near(system, x) if self._short(system, x) else [x]
-        states = [x] if isinstance(near, StageFailed) else near
+        states = self._near_or_here(system, x)
         others = [edge for y in states[1:] for edge in contact_edges(system, y)]
         more = between(edges, contact_edges(system, states[0]))
         also, most = [*others, *edges, *more], 2 * MOST_SEGMENTS
@@ -210,19 +208,19 @@ class ContactRoute:
         many of its lengths; None where they do not, or no such state is found. See `drag`.
         """
         system, x = state
-        p, settings = system.parameters, self.settings
-        if not lies_in_corner(system) or p.mesh != "graded" or p.rubs or p.rough:
-            return None
-        offset = slowest_films(system, x)[0]
-        y = self._neared(system, offset, x) if self._short(system, x) else x
-        if isinstance(y, StageFailed) or y is x:
-            offset, y = settings.offset, x
+        p, y = system.parameters, self._near_or_here(system, x)[0]
+        offset = self.settings.offset if y is x else slowest_films(system, x)[0]
         y = without_rounding(system, y)
-        moved = dragged(system, settings, offset, y, self.newton.linear)
+        moved = dragged(system, self.settings, offset, y, self.newton.linear)
         if not sweeps(system, y, moved):
             return None
         found = self._on(placed_layout(system, y, p, dragged=moved), p, state, MESH_OF_INSTROKE)
         return None if isinstance(found, StageFailed) else found
+
+    def _near_or_here(self, system: SealSystem, x: Array) -> list[Array]:
+        """As `_near`; the contact state x itself where its edges stay or no such state is found."""
+        near = self._near(system, x) if self._short(system, x) else [x]
+        return [x] if isinstance(near, StageFailed) else near
 
     def _near(self, system: SealSystem, x: Array) -> list[Array] | StageFailed:
         """The contact state x with the rod where slow films have it, the thinnest first."""

@@ -313,10 +313,8 @@ class SealSystem:
         """A contact problem with the shear stress of a film of the gap that there is, without its
         pressure.
         """
-        (block,) = [block for block in self.blocks if block.name == FILM]
-        return problem.with_parameters(
-            **{FILM: self._chosen(block, film_values(self.parameters, film, 1.0))}
-        )
+        values = film_values(self.parameters, film, 1.0)
+        return problem.with_parameters(**{FILM: self._chosen(self._block(FILM), values)})
 
     def squeeze_values(self, rate: float) -> dict[str, Values]:
         """Parameters of the block of what the film holds; rate: coefficient of d/dt, 1/s."""

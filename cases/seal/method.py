@@ -80,7 +80,8 @@ def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFail
         seal = replace(
             seal, better=lambda worse, last: _for_film(worse, last, route), meshes=MESHES
         )
-    if lies_in_corner(system) and not (p.rough or p.rubs) and p.given_arc is None:
+    graded = p.mesh == "graded" and p.given_arc is None
+    if lies_in_corner(system) and graded and not (p.rough or p.rubs):
         seal = replace(seal, swept=lambda worse: _for_instroke(worse, route))
     if not (p.error_estimate and p.mesh == "graded"):
         return seal

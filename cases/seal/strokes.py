@@ -66,17 +66,19 @@ class Wanted:
         """
         speed = abs(state.rod_speed_mm_s)
         if (final and not self.compared) or state.verdict in (OK, CLIPPED):
-            self.left = tuple(u for u in self.left if u != speed)
-            self.report(state)
+            self._reported(state)
         else:
             self.held[speed] = min(self.held.get(speed, state), state, key=doubt)
 
     def close(self) -> None:
         """No other mesh follows: what is held is reported."""
-        self.compared = False
         for speed in self.left:
             if speed in self.held:
-                self.found(self.held[speed], final=True)
+                self._reported(self.held[speed])
+
+    def _reported(self, state: FilmState) -> None:
+        self.left = tuple(u for u in self.left if u != abs(state.rod_speed_mm_s))
+        self.report(state)
 
 
 @dataclass
@@ -98,9 +100,9 @@ class SealRun:
 
     coarser: the films of a coarser mesh, which are no results, and its contact state. better: the
     same on a mesh that is made for a film, None where there is none. meshes: how many such meshes
-    may follow. passing: whether another mesh follows in any case. swept: the same on a mesh for the
-    instroke in a corner, None where there is none. empty: the same without pressure in the groove,
-    for an instroke. rates: of the inputs of the film by each parameter, once they were asked for.
+    may follow. swept: the same on a mesh for the instroke in a corner, None where there is none.
+    empty: the same without pressure in the groove, for an instroke. rates: of the inputs of the
+    film by each parameter, once they were asked for.
     """
 
     path: FilmPath
@@ -108,7 +110,6 @@ class SealRun:
     coarser: tuple[FilmPath, Array] | None = None
     better: Better | None = None
     meshes: int = 0
-    passing: bool = False
     swept: Callable[[SealRun], SealRun | None] | None = None
     empty: SealRun | None = None
     rates: dict[str, Inputs] = field(default_factory=dict)
@@ -138,7 +139,7 @@ class SealRun:
     ) -> StageFailed | None:
         """An instroke; what is not `ok` once more on a mesh made for the way of its inlet."""
         wanted.compared = True
-        failed = replace(self._hasty(), swept=None, passing=True).stroke("in", wanted)
+        failed = replace(self._hasty(), swept=None).stroke("in", wanted)
         if wanted.left:
             other = swept(self) or self
             failed = replace(other, swept=None).stroke("in", wanted)
@@ -204,9 +205,8 @@ class SealRun:
         start = StrokeStart(path, stroke, self.x).begun(on_speed) if progress.missing else None
         if start is None or (self.meshes and progress.slowest):
             return None
-        if self.passing:
-            return path.without_film(*start)
-        if self.better and self.meshes < MESHES and progress.slowest is None:
+        made_for_film = self.better and self.meshes < MESHES and progress.slowest is None
+        if made_for_film or not path.laboriously:
             return path.without_film(*start)
         built = progress.slowest or path.build(*start)
         left = p.speeds if progress.slowest is None else below(p.speeds, progress.slowest[0].speed)

@@ -99,9 +99,9 @@ class Layered:
         """See `Problem`."""
         return self.problem.scaled(r)
 
-    def beyond_rounding(self, x: Array, K: csc_array[np.float64]) -> float:
+    def beyond_rounding(self, r: Array, x: Array, K: csc_array[np.float64]) -> float:
         """See `Problem`."""
-        return self.problem.beyond_rounding(x, K)
+        return self.problem.beyond_rounding(r, x, K)
 
     def step_limit(self, x: Array, dx: Array) -> float:
         """See `Problem`."""

@@ -191,14 +191,14 @@ class Problem:
             )
         return float(np.linalg.norm(parts))
 
-    def beyond_rounding(self, x: Array, K: csc_array[np.float64]) -> float:
-        """Norm of what is left of the residual at x, (n,), once what the last digits of x make of
+    def beyond_rounding(self, r: Array, x: Array, K: csc_array[np.float64]) -> float:
+        """Norm of what is left of the residual r at x, (n,), once what the last digits of x make of
         it does not count; inf without `absolute` scales. K: a tangent near x.
         """
         if not self.absolute:
             return np.inf
         noise = np.finfo(np.float64).eps * np.asarray(abs(K) @ np.abs(x))
-        return self.norm(np.maximum(np.abs(self.residual(x)) - noise, 0.0))
+        return self.norm(np.maximum(np.abs(r) - noise, 0.0))
 
     def _is_lost(self, x: Array, size: Array, noise: Array) -> bool:
         """Whether unknowns have grown until rounding is as large as the loads: nothing holds them.

@@ -75,10 +75,9 @@ class MeasuredProblem(NonlinearProblem, Protocol):
 class RoundedProblem(NonlinearProblem, Protocol):
     """A problem that knows how well double precision can fulfil its equations."""
 
-    def beyond_rounding(self, x: Array, K: SparseMatrix) -> float:
-        """Norm of what is left of R(x), (n,), where the last digits of x are at fault for the rest.
-
-        K: a tangent near x.
+    def beyond_rounding(self, r: Array, x: Array, K: SparseMatrix) -> float:
+        """Norm of what is left of r = R(x), (n,), where the last digits of x are at fault for the
+        rest. K: a tangent near x.
         """
         ...
 
@@ -239,7 +238,8 @@ class Newton:
             return False
         if not isinstance(problem, RoundedProblem):
             return False
-        return problem.beyond_rounding(state.x, K) <= self.tolerance
+        r = problem.residual(state.x)
+        return problem.beyond_rounding(r, state.x, K) <= self.tolerance
 
     def _acceptable(self, norm: float, before: float, fraction: float) -> bool:
         if not math.isfinite(norm):

@@ -252,9 +252,9 @@ class Represented(Algebraic):
 
     share: float = 1.0
 
-    def beyond_rounding(self, x: Array, K: SparseMatrix) -> float:
+    def beyond_rounding(self, r: Array, x: Array, K: SparseMatrix) -> float:
         """What is left beyond a share of the residual."""
-        return (1.0 - self.share) * float(np.abs(self.residual(x)).max())
+        return (1.0 - self.share) * float(np.abs(r).max())
 
 
 def test_what_the_last_digits_of_x_cause_is_not_iterated_on() -> None:
