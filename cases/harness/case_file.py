@@ -50,8 +50,12 @@ def read_case(
     origins = dict.fromkeys(values, given)
     typed = [(text, "--set") for text in assignments]
     typed += [(f"{key}={text}", f"--{key}") for key, text in options.items()]
+    seen = dict[str, object]()
     for text, origin in typed:
         key, value = read_assignment(text, origin)
+        if repr(seen.setdefault(key, value)) != repr(value):
+            both = f"{shown(seen[key])} and {shown(value)}"
+            raise BadInput(f"{origin} {key}: {both}; allowed: one of them")
         origins[_put(values, key, value)] = origin
     checked = validated(case.parameters, values, origins)
     return Run(case, checked, given=frozenset(values))

@@ -156,9 +156,16 @@ def test_assignment(text: str, value: object) -> None:
 def test_case_file_and_set(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text('case = "oring"\ndensity = 4\nspeeds = [800, 25]\nstroke = "in"\n')
-    run = read_case(str(path), SHIPPED, ["stroke=out", "stroke=both"])
+    run = read_case(str(path), SHIPPED, ["stroke=both", "stroke=both"])
     assert run.case.name == "oring"
     assert run.parameters == ORing(density=4, speeds=(800.0, 25.0), stroke="both")
+
+
+def test_a_key_is_set_once() -> None:
+    with pytest.raises(BadInput, match='--set stroke: "out" and "both"; allowed: one of them'):
+        read_case("oring", SHIPPED, ["stroke=out", "stroke=both"])
+    with pytest.raises(BadInput, match=r"--rod rod: 20 and 19; allowed: one of them"):
+        read_case("oring", SHIPPED, ["rod=20"], {"rod": "19"})
 
 
 def test_several_complaints_are_counted() -> None:
