@@ -1,6 +1,7 @@
 """The rows of a run as a table on disk, with the files of each of them."""
 
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -48,11 +49,18 @@ class CurveFolder(Generic[R]):
         self.digests = {name: file_digest(self.path / name) for name in names}
 
     def drop(self, key: float) -> None:
-        """Take a row out of the curve; its files stay until they are written again."""
-        kept = [row for row in self.rows if row.key != key]
-        if len(kept) < len(self.rows):
-            self.rows = kept
-            self.save()
+        """Take a row out of the curve with its files; nothing is left of a curve without rows."""
+        gone = [row for row in self.rows if row.key == key]
+        if not gone:
+            return
+        self.rows = [row for row in self.rows if row.key != key]
+        self.save()
+        for name in (name for row in gone for name in row.file_names()):
+            (self.path / name).unlink(missing_ok=True)
+        if not self.rows:
+            (self.path / "curve.csv").unlink()
+            with suppress(OSError):  # something else is in it
+                self.path.rmdir()
 
     def save(self) -> None:
         """Write curve.csv, a header alone if there is no row yet."""

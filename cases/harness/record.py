@@ -155,10 +155,14 @@ class RunRecord:
             write_content(self.folder / name, content)
 
     def state(self, state: State) -> Row:
-        """Write a state where it belongs and the run record after it."""
+        """Write a state where it belongs and the run record after it.
+
+        One that is not final is kept with those that are no results: a resumed run tries it again.
+        """
         self.begin()
-        row: Row = (self.curve if state.row.usable else self.rejected).add(state)
-        if row.usable:
+        result = state.row.usable and state.final
+        row: Row = (self.curve if result else self.rejected).add(state)
+        if result:
             self.rejected.drop(row.key)
             (self.folder / _DRAFT).unlink(missing_ok=True)
         self.advice[row.key] = state.advice

@@ -109,7 +109,8 @@ class Reporter(Observer):
         """See :class:`Observer`."""
         with writing(self.record.folder):
             row = self.record.state(state)
-        self.display.state(row)
+        if state.final:
+            self.display.state(row)
 
     def files(self, contents: Mapping[str, Content]) -> None:
         """See :class:`Observer`."""

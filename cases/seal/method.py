@@ -20,7 +20,8 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.state import FilmState, Observer, Outcome
-from softehl.cases.seal.strokes import MESHES, SealRun, Wanted
+from softehl.cases.seal.strokes import MESHES, SealRun
+from softehl.cases.seal.wanted import Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.backends import choose
@@ -62,7 +63,8 @@ def run(
 
     strokes: tuple[Stroke, ...] = ("out", "in")
     for stroke in strokes if parameters.stroke == "both" else (parameters.stroke,):
-        failed, seal = seal.on_meshes(stroke, Wanted(report, parameters.speeds))
+        wanted = Wanted(report, parameters.speeds, observer.film_draft)
+        failed, seal = seal.on_meshes(stroke, wanted)
         if failed is not None:
             failures.append(explained(failed, f"stroke {stroke}", parameters))
     numbers = contact_numbers(seal.system, seal.x)

@@ -278,6 +278,10 @@ class Observer(Protocol):
         """A requested speed converged: keep it now."""
         return None
 
+    def film_draft(self, state: FilmState) -> None:
+        """The same, where another mesh may better it: keep it for a run that is cut short."""
+        return None
+
 
 _DOUBTS = (OK, OSCILLATING, CLIPPED, UNCERTAIN, UNDER_RESOLVED, COLLAPSED)
 
@@ -308,4 +312,7 @@ class Silent(Observer):
         """See :class:`Observer`."""
 
     def film_state(self, state: FilmState) -> None:
+        """See :class:`Observer`."""
+
+    def film_draft(self, state: FilmState) -> None:
         """See :class:`Observer`."""

@@ -1,7 +1,7 @@
 """The films of a stroke on one mesh: each is judged, and reported or held for a better one.
 
 What changes along a stroke on a mesh is a `StrokeState`, what is left of it for other meshes a
-`Wanted`; everything else is frozen.
+`cases.seal.wanted.Wanted`; everything else is frozen.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from math import nan
 from typing import TypeAlias
 
-from softehl.cases.harness.row import OK
 from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.contact_results import contact_peaks, contact_pressure, unsealed
 from softehl.cases.seal.equations import SealSystem
@@ -24,7 +23,7 @@ from softehl.cases.seal.path import StageFailed
 from softehl.cases.seal.results import film_numbers, film_state
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import resolved
-from softehl.cases.seal.state import CLIPPED, FilmState, doubt
+from softehl.cases.seal.state import FilmState
 from softehl.cases.seal.stroke_start import StrokeStart, emptied
 from softehl.cases.seal.verdict import (
     ANY_RATIO,
@@ -33,6 +32,7 @@ from softehl.cases.seal.verdict import (
     Verdict,
     fewest_inlet_segments,
 )
+from softehl.cases.seal.wanted import Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
 from softehl.runtime.solve.linear import SingularMatrix
@@ -41,44 +41,6 @@ from softehl.runtime.solve.solution import Point
 MESHES = 2
 """How many meshes may be made for the films of a stroke on a section that is not round, one after
 the other, where they are not `ok` on the one before."""
-
-
-@dataclass
-class Wanted:
-    """What is still to be reported of a stroke, on one mesh after the other.
-
-    report: takes a state for good. left: |U| without one, mm/s, in the order in which they are
-    solved. held: by |U|, the state least in doubt of those that another mesh may better. last: the
-    slowest film on the mesh in use, and its unknowns. compared: whether no state is final before
-    all meshes had their turn.
-    """
-
-    report: Callable[[FilmState], None]
-    left: tuple[float, ...]
-    held: dict[float, FilmState] = field(default_factory=dict)
-    last: BuiltFilm | None = None
-    compared: bool = False
-
-    def found(self, state: FilmState, *, final: bool) -> None:
-        """A state; it is held if another mesh may better it, unless it is final.
-
-        The arc of another mesh ends where that of the first does: what is clipped stays so.
-        """
-        speed = abs(state.rod_speed_mm_s)
-        if (final and not self.compared) or state.verdict in (OK, CLIPPED):
-            self._reported(state)
-        else:
-            self.held[speed] = min(self.held.get(speed, state), state, key=doubt)
-
-    def close(self) -> None:
-        """No other mesh follows: what is held is reported."""
-        for speed in self.left:
-            if speed in self.held:
-                self._reported(self.held[speed])
-
-    def _reported(self, state: FilmState) -> None:
-        self.left = tuple(u for u in self.left if u != abs(state.rod_speed_mm_s))
-        self.report(state)
 
 
 @dataclass
@@ -176,14 +138,13 @@ class SealRun:
 
     def stroke(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
         """Second and third stage of one stroke; why it ended early, if it did."""
-        wanted.last = None
         p, path = self.system.parameters, self.path
         reference = float(contact_pressure(self.system, p.sealed_pressure, self.x).max())
         references = contact_peaks(self.system, p.sealed_pressure, self.x)
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
         ratios = ANY_RATIO if p.mesh == "uniform" else INLET_RATIO
         known = _known(*self.coarser, stroke, self.system) if self.coarser else None
-        coarser = dict(known.numbers) if known else {}
+        coarser = wanted.begin(known.numbers if known else {})
         verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
         verdict = replace(
             verdict,
@@ -241,14 +202,18 @@ class SealRun:
         p, problem = system.parameters, system.film_problem(film)
         if self.coarser and film.speed not in coarser:
             coarser |= _carried(*self.coarser, film, (system, self.x, x))
-        error, of_friction = _errors(p.density, last, coarser.get(film.speed))
-        estimated = p.error_estimate and p.mesh == "graded"
-        verdict = replace(progress.verdict, last=last, error=error if estimated else None)
-        state = film_state(system, problem, film, x, verdict, iterations)
-        state = replace(state, h_star_error_percent=error, rod_friction_error_percent=of_friction)
-        if p.sensitivity and resolved(state) and not film.entrance:
-            state = replace(state, sensitivity=self._differentiated(film, x))
-        wanted.found(state, final=self.better is None)
+        verdict, wants_error = progress.verdict, p.error_estimate and p.mesh == "graded"
+
+        def judged(other: FilmNumbers | None) -> FilmState:
+            error, friction = _errors(p.density, last, other)
+            told = replace(verdict, last=last, error=error if wants_error else None)
+            state = film_state(system, problem, film, x, told, iterations)
+            state = replace(state, h_star_error_percent=error, rod_friction_error_percent=friction)
+            if p.sensitivity and resolved(state) and not film.entrance:
+                state = replace(state, sensitivity=self._differentiated(film, x))
+            return state
+
+        wanted.found(film.speed, judged, final=self.better is None)
 
     def _differentiated(
         self, film: FilmLoads, x: Array

@@ -58,13 +58,21 @@ class Teller(Observer):
 
     def film_state(self, state: FilmState) -> None:
         """A row, its profile and its section, and a file of its sensitivities."""
-        profile = {name: getattr(state.profile, name) for name in PROFILE_COLUMNS}
-        row = FilmRow.part_of(state)
         if state.sensitivity:
+            row = FilmRow.part_of(state)
             table = rows_of(row, state.sensitivity)
             columns = {n: np.array([getattr(r, n) for r in table]) for n in table[0].header()}
             self.to.files({f"sensitivity_{row.name}.csv": columns})
-        self.to.state(harness.State(row, (profile, state.section), state.advice))
+        self._row(state, final=True)
+
+    def film_draft(self, state: FilmState) -> None:
+        """A row, its profile and its section, until the run has a better one."""
+        self._row(state, final=False)
+
+    def _row(self, state: FilmState, *, final: bool) -> None:
+        profile = {name: getattr(state.profile, name) for name in PROFILE_COLUMNS}
+        row, contents = FilmRow.part_of(state), (profile, state.section)
+        self.to.state(harness.State(row, contents, state.advice, final))
 
 
 def read_profile(folder: Path, row: FilmRow) -> Profile:

@@ -28,7 +28,8 @@ from softehl.cases.seal.state import (
     Silent,
 )
 from softehl.cases.seal.stroke_start import StrokeStart
-from softehl.cases.seal.strokes import Wanted
+from softehl.cases.seal.verdict import LARGEST_ERROR, FilmNumbers
+from softehl.cases.seal.wanted import Judged, Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import film_values, oring
@@ -173,13 +174,25 @@ def test_friction_that_is_not_known_is_named() -> None:
     assert note.startswith("friction not known to 2 %: U = -200 mm/s")
 
 
+def made_up(speed: float, verdict: str, errors: dict[float, float] | None = None) -> Judged:
+    """A film with this verdict, or with these errors (%) by h* of a coarser mesh."""
+
+    def judged(coarser: FilmNumbers | None) -> FilmState:
+        error = (errors or {}).get(coarser.h_star, nan) if coarser else nan
+        word = verdict if errors is None else OK if abs(error) <= LARGEST_ERROR else UNCERTAIN
+        values = {"rod_speed_mm_s": speed, "verdict": word, "h_star_error_percent": error}
+        return cast("FilmState", SimpleNamespace(oscillation_index=0.0, **values))
+
+    return judged
+
+
 def test_what_another_mesh_cannot_better_is_reported() -> None:
-    reported = list[FilmState]()
-    wanted = Wanted(reported.append, (800.0, 200.0, 50.0))
+    reported, drafts = list[FilmState](), list[FilmState]()
+    wanted = Wanted(reported.append, (800.0, 200.0, 50.0), drafts.append)
     for speed, verdict in ((800.0, CLIPPED), (200.0, UNDER_RESOLVED), (50.0, OK)):
-        made_up = SimpleNamespace(rod_speed_mm_s=speed, verdict=verdict, oscillation_index=0.0)
-        wanted.found(cast("FilmState", made_up), final=False)
+        wanted.found(speed, made_up(speed, verdict), final=False)
     assert [state.verdict for state in reported] == [CLIPPED, OK]
+    assert [state.verdict for state in drafts] == [UNDER_RESOLVED]
     assert wanted.left == (200.0,)
     wanted.close()
     assert reported[-1].verdict == UNDER_RESOLVED
@@ -191,9 +204,41 @@ def test_of_two_meshes_the_state_least_in_doubt_is_reported() -> None:
     wanted = Wanted(reported.append, (800.0, 200.0), compared=True)
     found = ((800.0, UNDER_RESOLVED), (200.0, UNCERTAIN), (800.0, OK), (200.0, COLLAPSED))
     for speed, verdict in found:
-        made_up = SimpleNamespace(rod_speed_mm_s=speed, verdict=verdict, oscillation_index=0.0)
-        wanted.found(cast("FilmState", made_up), final=True)
+        wanted.found(speed, made_up(speed, verdict), final=True)
     assert [state.verdict for state in reported] == [OK]
     wanted.close()
     assert [state.verdict for state in reported] == [OK, UNCERTAIN]
     assert not wanted.left
+
+
+@pytest.mark.parametrize("compared", [True, False])
+def test_the_coarser_film_of_another_mesh_says_as_much(compared: bool) -> None:
+    """One mesh has no coarser film, the other one that of another branch; two h* agree."""
+    reported, drafts = list[FilmState](), list[FilmState]()
+    wanted = Wanted(reported.append, (100.0, 10.0), drafts.append, compared=compared)
+    errors = {0.7: 0.4, 0.2: -32.0}
+    wanted.begin({10.0: numbers_of(0.2)})
+    wanted.found(100.0, made_up(100.0, OK, errors), final=False)
+    wanted.found(10.0, made_up(10.0, OK, errors), final=False)
+    assert [state.verdict for state in drafts] == [UNCERTAIN, UNCERTAIN]
+    wanted.begin({100.0: numbers_of(0.7), 10.0: numbers_of(0.7)})
+    wanted.close()
+    found = {state.rod_speed_mm_s: state.h_star_error_percent for state in reported}
+    assert found[10.0] == (0.4 if compared else -32.0)
+    assert isnan(found[100.0]) is not compared
+    assert {state.verdict for state in reported} == {OK if compared else UNCERTAIN}
+
+
+def test_a_film_is_held_until_a_coarser_one_is_like_it() -> None:
+    reported = list[FilmState]()
+    wanted = Wanted(reported.append, (10.0,), compared=True)
+    errors = {0.7: 0.4, 0.2: -32.0}
+    wanted.begin({10.0: numbers_of(0.7)})
+    wanted.begin({10.0: numbers_of(0.2)})
+    wanted.found(10.0, made_up(10.0, OK, errors), final=True)
+    assert [state.h_star_error_percent for state in reported] == [0.4]
+
+
+def numbers_of(h_star: float) -> FilmNumbers:
+    """A film of a coarser mesh, of which h* alone matters."""
+    return cast("FilmNumbers", SimpleNamespace(h_star=h_star))
