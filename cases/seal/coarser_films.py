@@ -30,7 +30,10 @@ from softehl.runtime.fem.rules import lagrange, pressure_nodes
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Newton
 
-_ITERATIONS = 8  # a start that needs more leads nowhere
+_ITERATIONS = 8
+"""A start that needs more leads nowhere, or takes `PATIENT` with each reducing the residual."""
+
+PATIENT = 80
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +63,20 @@ class CoarserFilms:
         return self.built(speed) if before is None else self.next(before, speed)
 
     def lagged(
-        self, stage: Stage, newton: Newton, before: float | None, x: Array
+        self,
+        stage: Stage,
+        newton: Newton,
+        before: float | None,
+        x: Array,
+        *,
+        patiently: bool = False,
     ) -> tuple[Stage, Array]:
         """The film where a stage of falling speed begins, with pressures that lag; and its start.
 
         x: (n,) our film at the speed before, see `change`.
         """
+        careful = replace(newton, max_iterations=PATIENT, line_search=True)
+        quick = replace(newton, max_iterations=_ITERATIONS)
         speed, problem = abs(stage.shown(stage.start)), stage.problem_at(stage.start)
         assert isinstance(problem, Problem)
         start = self.contact if before is None else self.films[before]
@@ -84,7 +95,7 @@ class CoarserFilms:
             stop=stage.start,
             waypoints=(),
             method="newton, carried from another mesh",
-            corrector=replace(newton, max_iterations=_ITERATIONS),
+            corrector=careful if patiently else quick,
         )
         return stage, x + self.change(before, speed)
 

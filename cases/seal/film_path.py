@@ -214,10 +214,13 @@ class FilmPath:
         known: CoarserFilms,
         before: tuple[float | None, Array],
         on_speed: OnSpeed,
+        *,
+        patiently: bool = False,
     ) -> StageFailed | None:
         """A film that another mesh has from that at the speed before, see `CoarserFilms.lagged`."""
         stage = speed_stage(self.system, self.settings, film, (film.speed,), on_speed)
-        end = self.driver.follow(*known.lagged(stage, self.driver.newton, *before))
+        newton = self.driver.newton
+        end = self.driver.follow(*known.lagged(stage, newton, *before, patiently=patiently))
         return end if isinstance(end, StageFailed) else None
 
     def _carried_film(self, stroke: Stroke, x: Array, known: CoarserFilms) -> FilmLoads:
@@ -232,6 +235,8 @@ class FilmPath:
         """The film that a finer mesh has from the contact state x, where no path leads to it."""
         film = self._carried_film(stroke, x, known)
         failed = self.lagged(film, known, (None, x), on_speed)
+        if failed and lies_in_corner(self.system):
+            failed = self.lagged(film, known, (None, x), on_speed, patiently=True)
         if failed:
             careful = patient(self.driver.newton)
             stage = replace(failed.stage, name="film of another mesh", corrector=careful)
