@@ -7,7 +7,7 @@ Where a route fails the next one begins on a finer mesh, the last of them on the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from softehl.cases.seal.contact import (
@@ -22,7 +22,7 @@ from softehl.cases.seal.contact import (
 from softehl.cases.seal.contact_results import unsealed
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
 from softehl.cases.seal.contacts import Edge, contact_edges
-from softehl.cases.seal.drag import dragged
+from softehl.cases.seal.drag import dragged, pushed
 from softehl.cases.seal.equations import SealSystem, build_system
 from softehl.cases.seal.film_edges import between
 from softehl.cases.seal.grading import (
@@ -31,10 +31,12 @@ from softehl.cases.seal.grading import (
     graded_layout,
     inlet_length,
     placed_layout,
+    reaches_wall,
     slowest_films,
     sweeps,
 )
 from softehl.cases.seal.layout import Layout
+from softehl.cases.seal.loads import Stroke
 from softehl.cases.seal.loading import Loading, State
 from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.parameters import ORing
@@ -55,8 +57,8 @@ SEALS = 3
 GUIDE = 2
 """Least density of a mesh whose contact shows where another one is to be fine."""
 
-MESH_OF_INSTROKE = 9
-"""Number of a graded mesh for the instroke alone, after all others."""
+MESH_OF_STROKE: Mapping[Stroke, int] = {"in": 9, "out": 10}
+"""Number of a graded mesh for a stroke alone, after all others."""
 
 NEARER, SHORT_INLET = 2, 0.5
 """Meshes that are graded by a contact near the rod, and below which inlet, in offsets of the rod,
@@ -214,7 +216,19 @@ class ContactRoute:
         moved = dragged(system, self.settings, offset, y, self.newton.linear)
         if not sweeps(system, y, moved):
             return None
-        found = self._on(placed_layout(system, y, p, dragged=moved), p, state, MESH_OF_INSTROKE)
+        found = self._on(placed_layout(system, y, p, dragged=moved), p, state, MESH_OF_STROKE["in"])
+        return None if isinstance(found, StageFailed) else found
+
+    def for_outstroke(self, state: State) -> State | None:
+        """A contact state on a mesh for the films of the outstroke, where these push the end of its
+        arc against the wall; None where they do not, or no such state is found.
+        """
+        system, x = state
+        push = pushed(system, self.settings, x, self.newton.linear)
+        if not reaches_wall(system, x, push):
+            return None
+        layout = placed_layout(system, x, system.parameters, pushed=push)
+        found = self._on(layout, system.parameters, state, MESH_OF_STROKE["out"])
         return None if isinstance(found, StageFailed) else found
 
     def _near_or_here(self, system: SealSystem, x: Array) -> list[Array]:

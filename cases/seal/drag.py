@@ -13,10 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from softehl.cases.seal.contact import contact_problem
-from softehl.cases.seal.contacts import contact_edges, contacts
+from softehl.cases.seal.contacts import Edge, contact_edges, contacts
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.film import film_on
+from softehl.cases.seal.film import film_on, start_speed
 from softehl.cases.seal.grading import MULTIPLE, film_thickness
+from softehl.cases.seal.loads import Stroke
 from softehl.cases.seal.path import PathSettings
 from softehl.cases.seal.system import ROD
 from softehl.runtime.arrays import Array
@@ -31,20 +32,54 @@ def dragged(
     offset: of the rod in the contact state x (n,), mm. 0 where contact has no edges or no tangent.
     """
     p, edges = system.parameters, contact_edges(system, x)
-    if not edges or not p.shear_traction:
+    if not edges:
+        return 0.0
+    at = replace(settings, offset=offset)
+    change = _change(system, at, "in", min(p.speeds), edges[-1], x, linear)
+    if change is None:
         return 0.0
     edge, nodes = edges[-1], contacts(system, x)[-1][::-1][1:3]
-    speed = min(p.speeds)
-    thin = MULTIPLE * film_thickness(p, [edge], speed)
-    film = film_on(system, "in", x, speed * offset / thin)
-    problem = contact_problem(system, replace(settings, offset=offset), p.sealed_pressure)
-    r, K = problem.linearise(x)
-    force = system.sheared(problem, replace(film, shear=1.0)).residual(x) - r
-    try:
-        change = -linear.factorise(K).solve(force)
-    except SingularMatrix:
-        return 0.0
     rod = system.layout.part(ROD)
     # the square of the pressure is a straight line from the edge on, which moves with it
     squares = 2.0 * x[rod][nodes] * change[rod][nodes]
     return float(np.mean(squares) / edge.rise)
+
+
+def pushed(system: SealSystem, settings: PathSettings, x: Array, linear: LinearSolver) -> float:
+    """How far the first film of the outstroke moves the arc towards the wall of the air side, mm.
+
+    x: contact state. 0 where contact has no edges or no tangent.
+    """
+    edges = contact_edges(system, x)
+    if not edges:
+        return 0.0
+    speed = start_speed(system, settings)
+    change = _change(system, settings, "out", speed, edges[0], x, linear)
+    if change is None:
+        return 0.0
+    moved = system.displacements(change)[system.mesh.arc_nodes, 0]
+    return float(max(moved.max(), 0.0))
+
+
+def _change(
+    system: SealSystem,
+    settings: PathSettings,
+    stroke: Stroke,
+    speed: float,
+    inlet: Edge,
+    x: Array,
+    linear: LinearSolver,
+) -> Array | None:
+    """What the shear stress of a film changes in the contact state x: (n,), to first order."""
+    p = system.parameters
+    if not p.shear_traction:
+        return None
+    thin = MULTIPLE * film_thickness(p, [inlet], speed)
+    film = film_on(system, stroke, x, speed * settings.offset / thin)
+    problem = contact_problem(system, settings, p.sealed_pressure)
+    r, K = problem.linearise(x)
+    force = system.sheared(problem, replace(film, shear=1.0)).residual(x) - r
+    try:
+        return -linear.factorise(K).solve(force)
+    except SingularMatrix:
+        return None

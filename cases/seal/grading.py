@@ -81,6 +81,10 @@ was two per cent too small, with half as many as this it changes by 0.2 %."""
 MULTIPLE = 1.75
 """About h* in `film_thickness`, whatever the ring."""
 
+CLEAR = 1.25
+"""Room between an arc and the wall of the air side, in what the outstroke takes of it: a segment on
+the wall has no length along the rod, and a film there no equation."""
+
 SWEPT, COVERED = 4.0, 1.2
 """Inlets by which the film moves its edge from which on what it sweeps has a mesh of its own, with
 segments of so many inlets of the film whose edge is there."""
@@ -98,6 +102,7 @@ def placed_layout(
     most: int = MOST_SEGMENTS,
     also: Sequence[Edge] = (),
     dragged: float = 0.0,
+    pushed: float = 0.0,
 ) -> Layout:
     """The layout of a case whose arc reaches as far as a film may matter in the contact state x.
 
@@ -107,11 +112,14 @@ def placed_layout(
     most: segments at density 1 that it may get; a state that shows the edges only roughly is no
     reason for many. also: edges elsewhere that are to be fine too. dragged: how far the slowest
     film of the instroke moves its edge outward, mm, where that matters: the arc gets twice as many
-    segments, to be as fine wherever faster films move it to.
+    segments, to be as fine wherever faster films move it to. pushed: how far the first film of the
+    outstroke moves the arc towards the wall of the air side, mm.
     """
     s, edges = system.section.places, contact_edges(system, x)
     most_ends = uniform_layout(p).bounds(system.section.layout)
-    ends = _way_out(system, x, s, 0, most_ends[0]), _way_out(system, x, s, 1, most_ends[1])
+    ends = _way_out(system, x, s, 0, most_ends[0]), _way_out(
+        system, x, s, 1, most_ends[1], CLEAR * pushed
+    )
     seen = system.section.layout.held(
         system.mesh, system.pressing(ROD, x), system.pressing(BORE, x), p.sealed_pressure
     )
@@ -149,15 +157,21 @@ def sweeps(system: SealSystem, x: Array, dragged: float) -> bool:
     return bool(edges) and dragged > SWEPT * inlet_length(system.parameters, edges[-1].rise)
 
 
+def reaches_wall(system: SealSystem, x: Array, pushed: float) -> bool:
+    """Whether the outstroke takes the room between arc and wall; x: the contact state."""
+    p, (z, _) = system.parameters, system.arc_film(x)
+    return bool(p.groove_centre + 0.5 * p.groove_width - z[-1] < CLEAR * pushed)
+
+
 def _swept(p: ORing, edge: Edge, spot: Spot, dragged: float, length: float) -> Spot:
     """Where the slowest film of the instroke has its edge, which contact has at a spot.
 
     Faster ones have it farther outside, by as much as their inlets are longer.
     """
     assert spot.rates is not None
-    outside = min(spot.rates[1], COVERED * inlet_length(p, edge.rise) / dragged)
+    most = COVERED * inlet_length(p, edge.rise) / dragged
     place = min(spot.place + dragged, length)
-    return replace(spot, place=place, rates=(spot.rates[0], outside))
+    return replace(spot, place=place, rates=(min(spot.rates[0], most), min(spot.rates[1], most)))
 
 
 def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:
@@ -209,10 +223,13 @@ _APART = 2.0
 its edges are elsewhere, far away where the surface lies nearly along the rod."""
 
 
-def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) -> float:
+def _way_out(
+    system: SealSystem, x: Array, s: Array, side: int, bound: float, clear: float = 0.0
+) -> float:
     """Where on the arc (mm) an end of the film is to be: side 0 the sealed, 1 the air end.
 
-    At most at `bound`, which may lie beyond the arc.
+    At most at `bound`, which may lie beyond the arc. clear: room between its air end and the wall
+    there, mm.
     """
     p = system.parameters
     z, h = system.arc_film(x)
@@ -223,6 +240,7 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) ->
         z, h, s, first = -z[::-1], h[::-1], s[::-1], len(s) - 1 - touching[0]
     else:
         first = touching[-1]
+    room = (p.groove_centre + 0.5 * p.groove_width - clear - z) if clear > 0.0 else np.full(len(z), np.inf)
     films = FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds))
     reach = max(REACH, films)
     steep = np.arctan2(np.diff(h), np.diff(z))
@@ -236,9 +254,12 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) ->
             return float(0.5 * (s[end - 1] + s[end]) if on_wall else s[end])
         if h[i + 1] >= reach:
             return float(np.interp(reach, h[i : i + 2], s[i : i + 2]))
+        if room[i + 1] < 0.0 and i > first:
+            return float(np.interp(0.0, -room[i : i + 2], s[i : i + 2]))
     if h[-1] >= _FAR_SHORT * reach or not 0.0 < steep[-1] < np.radians(_GENTLE):
         return float(s[-1])
-    longer = min((reach - h[-1]) / np.sin(steep[-1]), abs(bound - s[-1]), _free(system, x, side))
+    free = min(_free(system, x, side), room[-1] / np.cos(steep[-1]))
+    longer = min((reach - h[-1]) / np.sin(steep[-1]), abs(bound - s[-1]), free)
     return float(s[-1] + np.copysign(longer, bound - s[-1]))
 
 

@@ -84,7 +84,7 @@ def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFail
         )
     graded = p.mesh == "graded" and p.given_arc is None
     if lies_in_corner(system) and graded and not (p.rough or p.rubs):
-        seal = replace(seal, swept=lambda worse: _for_instroke(worse, route))
+        seal = replace(seal, cornered=lambda worse, stroke: _for_stroke(worse, stroke, route))
     if not (p.error_estimate and p.mesh == "graded"):
         return seal
     driver = path.driver.named("coarser mesh: ")
@@ -99,9 +99,10 @@ def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFail
     return seal if isinstance(y, StageFailed) else replace(seal, coarser=(coarser, y))
 
 
-def _for_instroke(seal: SealRun, route: ContactRoute) -> SealRun | None:
-    """A run on a mesh for the instroke; None where the one in use is as good or none is found."""
-    found = route.for_instroke((seal.system, seal.x))
+def _for_stroke(seal: SealRun, stroke: Stroke, route: ContactRoute) -> SealRun | None:
+    """A run on a mesh for a stroke; None where the one in use is as good or none is found."""
+    made = route.for_instroke if stroke == "in" else route.for_outstroke
+    found = made((seal.system, seal.x))
     if found is None:
         return None
     other = _begun(replace(seal.path, system=found[0]), found[1], route)

@@ -62,7 +62,7 @@ class SealRun:
 
     coarser: the films of a coarser mesh, which are no results, and its contact state. better: the
     same on a mesh that is made for a film, None where there is none. meshes: how many such meshes
-    may follow. swept: the same on a mesh for the instroke in a corner, None where there is none.
+    may follow. cornered: the same on a mesh for a stroke of what lies in a corner, None where there is none.
     empty: the same without pressure in the groove, for an instroke. rates: of the inputs of the
     film by each parameter, once they were asked for.
     """
@@ -72,7 +72,7 @@ class SealRun:
     coarser: tuple[FilmPath, Array] | None = None
     better: Better | None = None
     meshes: int = 0
-    swept: Callable[[SealRun], SealRun | None] | None = None
+    cornered: Callable[[SealRun, Stroke], SealRun | None] | None = None
     empty: SealRun | None = None
     rates: dict[str, Inputs] = field(default_factory=dict)
 
@@ -86,8 +86,8 @@ class SealRun:
 
         With the run on the last of these meshes: it is also the better one for the other stroke.
         """
-        if self.swept and stroke == "in":
-            return self._instroke(wanted, self.swept), self
+        if self.cornered:
+            return self._in_corner(stroke, wanted, self.cornered), self
         seal = self._ready(stroke)
         failed = seal.either(stroke, wanted)
         while seal.better and seal.meshes and wanted.left and wanted.last:
@@ -96,15 +96,18 @@ class SealRun:
         wanted.close()
         return failed if wanted.left else None, replace(seal, meshes=self.meshes, empty=None)
 
-    def _instroke(
-        self, wanted: Wanted, swept: Callable[[SealRun], SealRun | None]
+    def _in_corner(
+        self,
+        stroke: Stroke,
+        wanted: Wanted,
+        cornered: Callable[[SealRun, Stroke], SealRun | None],
     ) -> StageFailed | None:
-        """An instroke; what is not `ok` once more on a mesh made for the way of its inlet."""
+        """A stroke; what is not `ok` once more on a mesh for where its shear stress moves the arc."""
         wanted.compared = True
-        failed = replace(self._hasty(), swept=None).stroke("in", wanted)
+        failed = replace(self._hasty(), cornered=None).stroke(stroke, wanted)
         if wanted.left:
-            other = swept(self) or self
-            failed = replace(other, swept=None).stroke("in", wanted)
+            other = cornered(self, stroke) or self
+            failed = replace(other, cornered=None).stroke(stroke, wanted)
         wanted.close()
         return failed if wanted.left else None
 

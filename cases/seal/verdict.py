@@ -38,7 +38,7 @@ friction within 1.1 %, 0.736 at density 1 within 1.8 and 9 %. The estimate says 
 ANY_RATIO = (-inf, inf)
 """That of meshes where it is not judged."""
 
-EXIT_FILMS, END_GAP = 10.0, 0.1
+EXIT_FILMS, END_GAP = 5.0, 0.1
 """At its exit the arc is outside the film where the gap is so many h*, or so many mm."""
 
 MOST_LACKING = 0.02

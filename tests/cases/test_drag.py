@@ -11,10 +11,11 @@ import pytest
 from softehl.cases.seal.contact import contact_problem, lies_in_corner
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contacts import contact_edges
-from softehl.cases.seal.drag import dragged
+from softehl.cases.seal.drag import dragged, pushed
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.film import film_on
+from softehl.cases.seal.film import film_on, start_speed
 from softehl.cases.seal.grading import (
+    CLEAR,
     COVERED,
     FINEST,
     MULTIPLE,
@@ -24,6 +25,7 @@ from softehl.cases.seal.grading import (
     placed_layout,
     sweeps,
 )
+from softehl.cases.seal.loads import Stroke
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.state import Silent
 from softehl.runtime.arrays import Array
@@ -48,12 +50,15 @@ def moved(system: SealSystem, x: Array) -> float:
     return dragged(system, SETTINGS, SETTINGS.offset, x, Newton().linear)
 
 
-def pulled(system: SealSystem, x: Array, share: float) -> Array:
-    """The contact state under a share of the shear stress of the slowest film, solved in full."""
-    p, edge = system.parameters, contact_edges(system, x)[-1]
-    speed = min(p.speeds)
+def pulled(system: SealSystem, x: Array, share: float, stroke: Stroke = "in") -> Array:
+    """The contact state under a share of the shear stress of a film, solved in full: of the slowest
+    one of the instroke, of the first one of the outstroke.
+    """
+    p, slow = system.parameters, stroke == "in"
+    edge = contact_edges(system, x)[-1 if slow else 0]
+    speed = min(p.speeds) if slow else start_speed(system, SETTINGS)
     thin = MULTIPLE * film_thickness(p, [edge], speed)
-    film = replace(film_on(system, "in", x, speed * SETTINGS.offset / thin), shear=share)
+    film = replace(film_on(system, stroke, x, speed * SETTINGS.offset / thin), shear=share)
     problem = contact_problem(system, SETTINGS, p.sealed_pressure)
     solution = Newton().solve(system.sheared(problem, film), x)
     assert solution.converged
@@ -110,6 +115,33 @@ def test_what_it_sweeps_is_as_fine_as_the_inlets_there() -> None:
     assert found["with"] < 1.2 * COVERED
     assert found["without"] > 2.0 * found["with"]
     assert FINEST < COVERED < SWEPT
+
+
+def test_the_outstroke_pushes_as_one_linear_solution_says() -> None:
+    system, x = contact()
+    share, arc = 0.02, system.mesh.arc_nodes
+    full = pulled(system, x, share, "out")
+    way = float((system.deformed(full) - system.deformed(x))[arc, 0].max())
+    found = pushed(system, SETTINGS, x, Newton().linear)
+    assert found > 0.001
+    assert way / share == pytest.approx(found, rel=0.05)
+    assert way / (2.0 * share) != pytest.approx(found, rel=0.05)
+
+
+def test_the_arc_ends_where_the_outstroke_leaves_room_before_the_wall() -> None:
+    system, x = contact()
+    p = system.parameters
+    z, _ = system.arc_film(x)
+    wall = p.groove_centre + 0.5 * p.groove_width
+    before = system.section.places[-1]
+    for room in (wall - z[-1] + 0.01, wall - z[-1] + 0.02):
+        layout = placed_layout(system, x, p, pushed=room / CLEAR)
+        last = layout.bounds(system.section.layout)[1]
+        assert last < before
+        there = float(np.interp(last, system.section.places, z))
+        assert wall - there == pytest.approx(room, rel=1e-6)
+    free = placed_layout(system, x, p).bounds(system.section.layout)[1]
+    assert free > last
 
 
 def test_no_segment_of_the_arc_lies_on_a_wall() -> None:
