@@ -36,8 +36,8 @@ from softehl.cases.seal.grading import (
     sweeps,
 )
 from softehl.cases.seal.layout import Layout
-from softehl.cases.seal.loads import Stroke
 from softehl.cases.seal.loading import Loading, State
+from softehl.cases.seal.loads import Stroke
 from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed

@@ -117,8 +117,9 @@ def placed_layout(
     """
     s, edges = system.section.places, contact_edges(system, x)
     most_ends = uniform_layout(p).bounds(system.section.layout)
-    ends = _way_out(system, x, s, 0, most_ends[0]), _way_out(
-        system, x, s, 1, most_ends[1], CLEAR * pushed
+    ends = (
+        _way_out(system, x, s, 0, most_ends[0]),
+        _way_out(system, x, s, 1, most_ends[1], CLEAR * pushed),
     )
     seen = system.section.layout.held(
         system.mesh, system.pressing(ROD, x), system.pressing(BORE, x), p.sealed_pressure
@@ -240,7 +241,9 @@ def _way_out(
         z, h, s, first = -z[::-1], h[::-1], s[::-1], len(s) - 1 - touching[0]
     else:
         first = touching[-1]
-    room = (p.groove_centre + 0.5 * p.groove_width - clear - z) if clear > 0.0 else np.full(len(z), np.inf)
+    room = np.full(len(z), np.inf)
+    if clear > 0.0:
+        room = p.groove_centre + 0.5 * p.groove_width - clear - z
     films = FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds))
     reach = max(REACH, films)
     steep = np.arctan2(np.diff(h), np.diff(z))

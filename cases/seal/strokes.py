@@ -62,9 +62,9 @@ class SealRun:
 
     coarser: the films of a coarser mesh, which are no results, and its contact state. better: the
     same on a mesh that is made for a film, None where there is none. meshes: how many such meshes
-    may follow. cornered: the same on a mesh for a stroke of what lies in a corner, None where there is none.
-    empty: the same without pressure in the groove, for an instroke. rates: of the inputs of the
-    film by each parameter, once they were asked for.
+    may follow. cornered: the same on a mesh for a stroke of what lies in a corner, None where there
+    is none. empty: the same without pressure in the groove, for an instroke. rates: of the inputs
+    of the film by each parameter, once they were asked for.
     """
 
     path: FilmPath
@@ -102,7 +102,7 @@ class SealRun:
         wanted: Wanted,
         cornered: Callable[[SealRun, Stroke], SealRun | None],
     ) -> StageFailed | None:
-        """A stroke; what is not `ok` once more on a mesh for where its shear stress moves the arc."""
+        """A stroke; what is not `ok` once more on a mesh for what its shear stress moves."""
         wanted.compared = True
         failed = replace(self._hasty(), cornered=None).stroke(stroke, wanted)
         if wanted.left:
