@@ -54,13 +54,15 @@ class CurveFolder(Generic[R]):
         if not gone:
             return
         self.rows = [row for row in self.rows if row.key != key]
-        self.save()
-        for name in (name for row in gone for name in row.file_names()):
-            (self.path / name).unlink(missing_ok=True)
-        if not self.rows:
-            (self.path / "curve.csv").unlink()
-            with suppress(OSError):  # something else is in it
-                self.path.rmdir()
+        if self.rows:
+            self.save()
+        else:
+            (self.path / "curve.csv").unlink(missing_ok=True)
+        for row in gone:
+            for name in row.file_names():
+                (self.path / name).unlink(missing_ok=True)
+        with suppress(OSError):  # something is in it
+            self.path.rmdir()
 
     def save(self) -> None:
         """Write curve.csv, a header alone if there is no row yet."""

@@ -21,6 +21,7 @@ from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.path import Stage
+from softehl.cases.seal.pressure_newton import patient
 from softehl.cases.seal.refinement import carried_elements, carried_unknowns
 from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.arrays import Array, Integers
@@ -30,10 +31,8 @@ from softehl.runtime.fem.rules import lagrange, pressure_nodes
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Newton
 
-_ITERATIONS = 8
-"""A start that needs more leads nowhere, or takes `PATIENT` with each reducing the residual."""
-
-PATIENT = 80
+_ITERATIONS, _PATIENT = 8, 80
+"""A start that needs more leads nowhere, or takes the second with each reducing the residual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +74,6 @@ class CoarserFilms:
 
         x: (n,) our film at the speed before, see `change`.
         """
-        careful = replace(newton, max_iterations=PATIENT, line_search=True)
         quick = replace(newton, max_iterations=_ITERATIONS)
         speed, problem = abs(stage.shown(stage.start)), stage.problem_at(stage.start)
         assert isinstance(problem, Problem)
@@ -95,7 +93,7 @@ class CoarserFilms:
             stop=stage.start,
             waypoints=(),
             method="newton, carried from another mesh",
-            corrector=careful if patiently else quick,
+            corrector=patient(newton, _PATIENT) if patiently else quick,
         )
         return stage, x + self.change(before, speed)
 

@@ -122,7 +122,7 @@ def against_wall(system: SealSystem, x: Array) -> tuple[Array, float]:
     It fulfils the equations of the squeeze at its new place: rod and housing are cylinders.
     """
     p, y = system.parameters, x.copy()
-    wall = p.groove_centre + 0.5 * p.groove_width
+    wall = p.air_wall
     shift = wall - float(system.deformed(x)[:, 0].max())
     system.displacements(y)[:, 0] += shift
     return y, shift

@@ -205,31 +205,32 @@ class ContactRoute:
         new = build_system(system.parameters, layout)
         return self._loading.carried(system, x, new, "contact on the mesh of the film")
 
-    def for_instroke(self, state: State) -> State | None:
-        """A contact state on a mesh for the films of the instroke, where these move their inlet by
-        many of its lengths; None where they do not, or no such state is found. See `drag`.
+    def for_stroke(self, stroke: Stroke, state: State) -> State | None:
+        """A contact state on a mesh for what films of a stroke move; None where they do not move
+        it far, or no such state is found. See `drag`.
         """
-        system, x = state
-        p, y = system.parameters, self._near_or_here(system, x)[0]
+        layout = self._for_instroke(*state) if stroke == "in" else self._for_outstroke(*state)
+        if layout is None:
+            return None
+        found = self._on(layout, state[0].parameters, state, MESH_OF_STROKE[stroke])
+        return None if isinstance(found, StageFailed) else found
+
+    def _for_instroke(self, system: SealSystem, x: Array) -> Layout | None:
+        """Fine where films of the instroke have their inlet, many of its lengths from contact's."""
+        y = self._near_or_here(system, x)[0]
         offset = self.settings.offset if y is x else slowest_films(system, x)[0]
         y = without_rounding(system, y)
         moved = dragged(system, self.settings, offset, y, self.newton.linear)
         if not sweeps(system, y, moved):
             return None
-        found = self._on(placed_layout(system, y, p, dragged=moved), p, state, MESH_OF_STROKE["in"])
-        return None if isinstance(found, StageFailed) else found
+        return placed_layout(system, y, system.parameters, dragged=moved)
 
-    def for_outstroke(self, state: State) -> State | None:
-        """A contact state on a mesh for the films of the outstroke, where these push the end of its
-        arc against the wall; None where they do not, or no such state is found.
-        """
-        system, x = state
+    def _for_outstroke(self, system: SealSystem, x: Array) -> Layout | None:
+        """With an arc whose end the films of the outstroke do not push against the wall."""
         push = pushed(system, self.settings, x, self.newton.linear)
         if not reaches_wall(system, x, push):
             return None
-        layout = placed_layout(system, x, system.parameters, pushed=push)
-        found = self._on(layout, system.parameters, state, MESH_OF_STROKE["out"])
-        return None if isinstance(found, StageFailed) else found
+        return placed_layout(system, x, system.parameters, pushed=push)
 
     def _near_or_here(self, system: SealSystem, x: Array) -> list[Array]:
         """As `_near`; the contact state x itself where its edges stay or no such state is found."""

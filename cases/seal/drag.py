@@ -3,7 +3,8 @@
 Under a high sealed pressure the section lies in the corner between rod and wall. The rod of an
 instroke pulls it out of there, and the edge moves outward along the arc, by many inlets. Couette's
 stress eta U / h grows like the length of the inlet, U^0.4, so that one linear solution of the
-contact problem says where the edge is at every speed.
+contact problem says where the edge is at every speed. That of an outstroke pushes the section, and
+the end of the arc with it, against the wall.
 """
 
 from __future__ import annotations

@@ -161,7 +161,7 @@ def sweeps(system: SealSystem, x: Array, dragged: float) -> bool:
 def reaches_wall(system: SealSystem, x: Array, pushed: float) -> bool:
     """Whether the outstroke takes the room between arc and wall; x: the contact state."""
     p, (z, _) = system.parameters, system.arc_film(x)
-    return bool(p.groove_centre + 0.5 * p.groove_width - z[-1] < CLEAR * pushed)
+    return bool(p.air_wall - z[-1] < CLEAR * pushed)
 
 
 def _swept(p: ORing, edge: Edge, spot: Spot, dragged: float, length: float) -> Spot:
@@ -178,7 +178,7 @@ def _swept(p: ORing, edge: Edge, spot: Spot, dragged: float, length: float) -> S
 def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:
     """Where the section meets the edge of the gap, on an arc between `ends`, mm, or its air end."""
     nodes = system.mesh.arc_nodes
-    centre = np.array([p.groove_centre + 0.5 * p.groove_width, 0.5 * p.rod_diameter])
+    centre = np.array([p.air_wall, 0.5 * p.rod_diameter])
     centre += p.corner_fillet + np.array([0.0, p.extrusion_gap])
     away = np.linalg.norm(system.deformed(x)[nodes] - centre, axis=1)
     place = system.section.places[int(np.argmin(away))]
@@ -243,7 +243,7 @@ def _way_out(
         first = touching[-1]
     room = np.full(len(z), np.inf)
     if clear > 0.0:
-        room = p.groove_centre + 0.5 * p.groove_width - clear - z
+        room = p.air_wall - clear - z
     films = FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds))
     reach = max(REACH, films)
     steep = np.arctan2(np.diff(h), np.diff(z))
@@ -261,7 +261,7 @@ def _way_out(
             return float(np.interp(0.0, -room[i : i + 2], s[i : i + 2]))
     if h[-1] >= _FAR_SHORT * reach or not 0.0 < steep[-1] < np.radians(_GENTLE):
         return float(s[-1])
-    free = min(_free(system, x, side), room[-1] / np.cos(steep[-1]))
+    free = min(_free(system, x, side), max(room[-1], 0.0) / np.cos(steep[-1]))
     longer = min((reach - h[-1]) / np.sin(steep[-1]), abs(bound - s[-1]), free)
     return float(s[-1] + np.copysign(longer, bound - s[-1]))
 

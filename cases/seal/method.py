@@ -101,8 +101,7 @@ def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFail
 
 def _for_stroke(seal: SealRun, stroke: Stroke, route: ContactRoute) -> SealRun | None:
     """A run on a mesh for a stroke; None where the one in use is as good or none is found."""
-    made = route.for_instroke if stroke == "in" else route.for_outstroke
-    found = made((seal.system, seal.x))
+    found = route.for_stroke(stroke, (seal.system, seal.x))
     if found is None:
         return None
     other = _begun(replace(seal.path, system=found[0]), found[1], route)

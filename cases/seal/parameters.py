@@ -273,6 +273,11 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
         return with_oil(with_rubber(with_regions(fitted(with_outline(dict(given))))))
 
     @property
+    def air_wall(self) -> float:
+        """Axial place of the groove's wall on the air side, mm."""
+        return self.groove_centre + 0.5 * self.groove_width
+
+    @property
     def free_section(self) -> Shape:
         """The free section where it is."""
         return self.free(self.section_diameter, self.inner_diameter)

@@ -24,13 +24,13 @@ def roughly(newton: Newton) -> Newton:
     return replace(newton, tolerance=_ROUGH, stagnation=1.0)
 
 
-def patient(newton: Newton) -> Newton:
+def patient(newton: Newton, iterations: int = _PATIENT) -> Newton:
     """Newton's method for a state of another mesh where fewer iterations lead nowhere.
 
     Each has to reduce the residual: that helps where the ring is squeezed into the corners of its
     groove, and the edges of contact there lie elsewhere.
     """
-    return replace(newton, max_iterations=_PATIENT, line_search=True)
+    return replace(newton, max_iterations=iterations, line_search=True)
 
 
 @dataclass(eq=False)

@@ -72,7 +72,7 @@ class SealRun:
     coarser: tuple[FilmPath, Array] | None = None
     better: Better | None = None
     meshes: int = 0
-    cornered: Callable[[SealRun, Stroke], SealRun | None] | None = None
+    cornered: Cornered | None = None
     empty: SealRun | None = None
     rates: dict[str, Inputs] = field(default_factory=dict)
 
@@ -96,12 +96,7 @@ class SealRun:
         wanted.close()
         return failed if wanted.left else None, replace(seal, meshes=self.meshes, empty=None)
 
-    def _in_corner(
-        self,
-        stroke: Stroke,
-        wanted: Wanted,
-        cornered: Callable[[SealRun, Stroke], SealRun | None],
-    ) -> StageFailed | None:
+    def _in_corner(self, stroke: Stroke, wanted: Wanted, cornered: Cornered) -> StageFailed | None:
         """A stroke; what is not `ok` once more on a mesh for what its shear stress moves."""
         wanted.compared = True
         failed = replace(self._hasty(), cornered=None).stroke(stroke, wanted)
@@ -264,6 +259,7 @@ def _errors(density: int, film: FilmNumbers, coarser: FilmNumbers | None) -> tup
 
 
 Better: TypeAlias = Callable[[SealRun, BuiltFilm], SealRun | None]
+Cornered: TypeAlias = Callable[[SealRun, Stroke], SealRun | None]
 
 
 def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> CoarserFilms:

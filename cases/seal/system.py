@@ -185,7 +185,7 @@ def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | Non
     if block.group == "load":
         return {"pressure": 0.0}
     if block.group == "contact":
-        wall = {"wall": p.groove_centre + 0.5 * p.groove_width, "fillet": p.corner_fillet}
+        wall = {"wall": p.air_wall, "fillet": p.corner_fillet}
         edge = {**wall, "lip": 0.5 * p.rod_diameter + p.extrusion_gap}
         return {"offset": 0.0, "force_weight": 1.0, "friction": p.housing_friction, **edge}
     area, (z, r), polar_moment = section.moments
