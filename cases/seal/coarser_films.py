@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
+from softehl.cases.seal.contact import lies_in_corner
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.path import Stage
 from softehl.cases.seal.pressure_newton import patient
@@ -31,8 +32,9 @@ from softehl.runtime.fem.rules import lagrange, pressure_nodes
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Newton
 
-_ITERATIONS, _PATIENT = 8, 80
-"""A start that needs more leads nowhere, or takes the second with each reducing the residual."""
+_ITERATIONS, _PATIENT, _IN_CORNER = 8, 30, 80
+"""A start that needs more leads nowhere, or takes the second with each reducing the residual; the
+third where a section lies in a corner."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +88,7 @@ class CoarserFilms:
             _pressures(self.ours, x) + carried_elements(self.other, self.ours, change),
             self.ours.bulk_moduli,
         )
+        most = _IN_CORNER if lies_in_corner(self.ours) else _PATIENT
         stage = replace(
             stage,
             name="film of another mesh",
@@ -93,7 +96,7 @@ class CoarserFilms:
             stop=stage.start,
             waypoints=(),
             method="newton, carried from another mesh",
-            corrector=patient(newton, _PATIENT) if patiently else quick,
+            corrector=patient(newton, most) if patiently else quick,
         )
         return stage, x + self.change(before, speed)
 

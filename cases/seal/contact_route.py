@@ -352,10 +352,17 @@ class ContactRoute:
             *before, replace(new, groove=before[0].groove), "groove emptied before"
         )
 
-    def elsewhere(self, old: SealSystem, x: Array, new: SealSystem) -> Followed:
-        """Unknowns in contact on a mesh of its own, from the contact state x of another one."""
+    def elsewhere(
+        self, old: SealSystem, x: Array, new: SealSystem, *, from_rest: bool = True
+    ) -> Followed:
+        """Unknowns in contact on a mesh of its own, from the contact state x of another one.
+
+        from_rest: whether the path from rest is followed where that leads nowhere.
+        """
         state = self._loading.carried(old, x, new, "contact")
-        return self._loaded(new) if isinstance(state, StageFailed) else state[1]
+        if not isinstance(state, StageFailed):
+            return state[1]
+        return self._loaded(new) if from_rest else state
 
 
 def _doublings(first: int, last: int) -> Iterator[int]:

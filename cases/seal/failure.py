@@ -76,7 +76,7 @@ def _corner(p: ORing) -> str:
 
 def _film_advice(failed: StageFailed, p: ORing) -> str:
     """What may help a film that was not found."""
-    if failed.stage.name.split(": ")[-1] not in ("contact to film", "shear"):
+    if failed.stage.name.split(": ")[-1] not in ("contact to film", "shear", "speed"):
         return failed.advice
     if p.given_arc:
         return _ARC.format(*p.given_arc)

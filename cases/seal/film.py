@@ -222,6 +222,10 @@ class FastFilm:
         """The stage of falling speed, to the full tolerance."""
         return replace(self._stage(stage, self.corrector, _SPEED_STEPS), predictor="parabola")
 
+    def slower(self, stage: Stage) -> Stage:
+        """The same on the way to a slower film, to the tolerance of shear."""
+        return replace(self.speed(stage), corrector=self.corrector.with_tolerance(_FIRM))
+
     def carried(
         self, stage: Stage, known: CoarserFilms, before: float | None, x: Array
     ) -> tuple[Stage, Array]:

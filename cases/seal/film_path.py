@@ -5,27 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.contact import along, lies_in_corner
 from softehl.cases.seal.contacts import contact_edges
-from softehl.cases.seal.dry import (
-    dry_film,
-    rising_stage,
-    settle_stage,
-    sliding_stages,
-    wetting_stages,
-)
+from softehl.cases.seal.dry import settle_stage
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film import (
     FastFilm,
-    first_film,
     release_stage,
     shear_stage,
     speed_stage,
     weight_stage,
 )
 from softehl.cases.seal.grading import film_thickness
-from softehl.cases.seal.loads import FilmLoads, Stroke
+from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.path import (
     Followed,
     PathDriver,
@@ -35,7 +27,7 @@ from softehl.cases.seal.path import (
     laborious,
 )
 from softehl.cases.seal.pockets import fed, traps
-from softehl.cases.seal.pressure_newton import patient, roughly
+from softehl.cases.seal.pressure_newton import roughly
 from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.thinning import longer, sooner, thinning_stage
 from softehl.cases.seal.verdict import FilmNumbers
@@ -77,14 +69,14 @@ class FilmPath:
 
     def fast(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
         """All film stages by modified Newton iterations; the one that ended early, if one did."""
-        fast = self._modified(x)
+        fast = self.modified(x)
         assert fast
         first = fast.weight(weight_stage(self.system, self.settings, film))
         return self._falling(fast, film, self.driver.follow(first, x), on_speed)
 
     def thinned(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
         """All films of a stroke, the first by squeezing out what is in contact at x; see `fast`."""
-        fast, p = self._modified(x), self.system.parameters
+        fast, p = self.modified(x), self.system.parameters
         assert fast
         first, start = thinning_stage(fast, film, x)
         y = self.driver.follow(first, start)
@@ -98,11 +90,37 @@ class FilmPath:
         if p.shear_traction:
             film = replace(film, shear=1.0)
         failed = self._falling(fast, film, y, on_speed)
-        if failed is None or isinstance(y, StageFailed) or failed.branch.points:
+        if failed is None or isinstance(y, StageFailed):
             return failed
-        steady = self.driver.follow(longer(first), y)  # it was not yet
-        y = y if isinstance(steady, StageFailed) and self._cornered else steady
-        return self._falling(fast, film, y, on_speed, begin=True)
+        if not failed.branch.points:  # it was not steady yet
+            steady = self.driver.follow(longer(first), y)
+            y = y if isinstance(steady, StageFailed) and self._cornered else steady
+            failed = self._falling(fast, film, y, on_speed, begin=True)
+        if failed is None or isinstance(y, StageFailed) or "shear" not in failed.stage.name:
+            return failed
+        if not lies_in_corner(self.system):
+            return failed
+        return self._slower_first(film, y, on_speed) and failed
+
+    def _slower_first(self, film: FilmLoads, y: Array, on_speed: OnSpeed) -> StageFailed | None:
+        """Films from slower ones than the first, y (n,), on: they have less shear stress.
+
+        What went wrong, None if all that is asked for was reached.
+        """
+        system, settings = self.system, self.settings
+        failed: StageFailed | None = None
+        for speed in below(system.parameters.speeds, film.speed):
+            fast = self.modified(y)
+            assert fast
+            bare = speed_stage(system, settings, replace(film, shear=0.0), (speed,), _untold)
+            slower = self.driver.follow(fast.slower(bare), y)
+            if isinstance(slower, StageFailed):
+                return slower
+            film, y = replace(film, speed=speed), slower
+            missed, failed = failed, self._falling(fast, film, y, on_speed)
+            if failed is None or "shear" not in failed.stage.name:
+                return failed or missed
+        return failed
 
     def _traps(self, film: FilmLoads, x: Array, y: Array, apart: float) -> bool:
         """Whether the film y (n,) holds oil that is not on the way of its flux; see `fed`."""
@@ -128,13 +146,13 @@ class FilmPath:
         if p.shear_traction and not isinstance(y, StageFailed):
             y = self._sheared(fast, shear_stage(system, settings, film), y, begin=begin)
         if not isinstance(y, StageFailed):
-            stage = speed_stage(system, settings, film, p.speeds, on_speed)
+            left = tuple(u for u in p.speeds if u <= film.speed)
+            stage = speed_stage(system, settings, film, left, on_speed)
             sheared, y = y, self.driver.follow(fast.speed(stage), y)
             if isinstance(y, StageFailed) and self._cornered:
-                left = p.speeds
                 if y.branch.points:
                     sheared, last = y.branch.last.x, abs(stage.shown(y.branch.points[-1].parameter))
-                    film, left = replace(film, speed=last), below(p.speeds, last)
+                    film, left = replace(film, speed=last), below(left, last)
                 return self._slower_in_corner(film, sheared, left, on_speed)
         return y if isinstance(y, StageFailed) else None
 
@@ -181,73 +199,11 @@ class FilmPath:
             return failed
         return self.driver.follow(laborious(replace(stage, start=start), corrector), x)
 
-    def carried(
-        self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
-    ) -> StageFailed | None:
-        """The films that another mesh has, as far as they lead from one to the next.
-
-        By modified Newton iterations, and where these fail with pressures of the section that lag.
-        """
-        left = tuple(sorted(known.films, reverse=True))
-        reached: list[tuple[float | None, Array]] = [(None, x)]
-
-        def keep(at: FilmLoads, point: Point) -> None:
-            reached.append((at.speed, point.solution.x))
-            on_speed(at, point)
-
-        film = self._carried_film(stroke, x, known) if self.quick and left else None
-        while film and left and (fast := self._modified(reached[-1][1])):
-            here = replace(film, speed=left[0])
-            stage = speed_stage(self.system, self.settings, here, left, keep)
-            self.driver.follow(*fast.carried(stage, known, *reached[-1]))
-            left = tuple(u for u in left if reached[-1][0] is None or u < reached[-1][0])
-            if left:
-                failed = self.lagged(replace(film, speed=left[0]), known, reached[-1], keep)
-                if failed:
-                    return failed
-                left = left[1:]
-        return None
-
-    def lagged(
-        self,
-        film: FilmLoads,
-        known: CoarserFilms,
-        before: tuple[float | None, Array],
-        on_speed: OnSpeed,
-        *,
-        patiently: bool = False,
-    ) -> StageFailed | None:
-        """A film that another mesh has from that at the speed before, see `CoarserFilms.lagged`."""
-        stage = speed_stage(self.system, self.settings, film, (film.speed,), on_speed)
-        newton = self.driver.newton
-        end = self.driver.follow(*known.lagged(stage, newton, *before, patiently=patiently))
-        return end if isinstance(end, StageFailed) else None
-
-    def _carried_film(self, stroke: Stroke, x: Array, known: CoarserFilms) -> FilmLoads:
-        """The fastest film that another mesh has; x: the contact state."""
-        speed = max(known.films)
-        _, gap = self.system.arc_film(x + known.built(speed))
-        return replace(first_film(self.system, self.settings, stroke, x), speed=speed, gap=gap)
-
-    def from_finer(
-        self, stroke: Stroke, x: Array, known: CoarserFilms, on_speed: OnSpeed
-    ) -> StageFailed | None:
-        """The film that a finer mesh has from the contact state x, where no path leads to it."""
-        film = self._carried_film(stroke, x, known)
-        failed = self.lagged(film, known, (None, x), on_speed)
-        if failed and lies_in_corner(self.system):
-            failed = self.lagged(film, known, (None, x), on_speed, patiently=True)
-        if failed:
-            careful = patient(self.driver.newton)
-            stage = replace(failed.stage, name="film of another mesh", corrector=careful)
-            end = self.driver.follow(stage, x + known.built(film.speed))
-            failed = end if isinstance(end, StageFailed) else None
-        return failed
-
-    def onward(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> None:
-        """The films that are slower than one that is known, x (n,), as far as they are reached."""
-        fast, speeds = self._modified(x), below(self.system.parameters.speeds, film.speed)
-        if fast and speeds:
+    def onward(
+        self, film: FilmLoads, x: Array, speeds: tuple[float, ...], on_speed: OnSpeed
+    ) -> None:
+        """From a film that is known, x (n,), to these slower ones, as far as they are reached."""
+        if speeds and (fast := self.modified(x)):
             stage = speed_stage(self.system, self.settings, film, speeds, on_speed)
             self.driver.follow(fast.speed(stage), x)
 
@@ -260,8 +216,8 @@ class FilmPath:
         """
         if not numbers.enters:
             return film, x, numbers
-        more, fast = replace(film, entrance=numbers.entrance), self._modified(x)
-        one = speed_stage(self.system, self.settings, more, (film.speed,), lambda at, point: None)
+        more, fast = replace(film, entrance=numbers.entrance), self.modified(x)
+        one = speed_stage(self.system, self.settings, more, (film.speed,), _untold)
         stage = replace(one, name="wedge before the arc")
         y = self.driver.follow(fast.speed(stage) if fast else stage, x)
         if isinstance(y, StageFailed):
@@ -275,22 +231,8 @@ class FilmPath:
         stage = settle_stage(self.system, self.settings, self.driver.newton)
         return self.driver.follow(stage, x)
 
-    def rise(self, stroke: Stroke, x: Array, on_speed: OnSpeed) -> StageFailed | None:
-        """Rough films: from asperities in contact at x to dry sliding, then to higher speeds."""
-        system, p = self.system, self.system.parameters
-        film = dry_film(system, stroke, x)
-        y = self.driver.follow_all(wetting_stages(system, film, x), x)
-        if not isinstance(y, StageFailed):
-            fast = self._modified(y)
-            y = self._sliding(film, y, fast)
-        if isinstance(y, StageFailed):
-            return y
-        shear = 1.0 if p.shear_traction else 0.0
-        moment = 0.0 if p.rotation == "free" else film.moment
-        return self._faster(replace(film, shear=shear, moment=moment), y, on_speed, fast)
-
-    def _modified(self, x: Array) -> FastFilm | None:
-        """Modified Newton iterations of a stroke begun at x (n,), None where they do not serve."""
+    def modified(self, x: Array) -> FastFilm | None:
+        """Modified Newton iterations that begin at x (n,), None where they do not serve."""
         linear = self.driver.newton.linear
         if not self.quick or not isinstance(linear, Condenser):
             return None
@@ -298,40 +240,6 @@ class FilmPath:
         if self.tolerance is None:
             return fast
         return replace(fast, corrector=fast.corrector.with_tolerance(self.tolerance))
-
-    def _sliding(self, film: FilmLoads, x: Array, fast: FastFilm | None) -> Followed:
-        """The dry film x (n,) with its friction; by Newton's method where the fast way fails."""
-        stages = sliding_stages(self.system, self.settings, film, x)
-        if fast:
-            y = self.driver.follow_all(map(fast.shear, stages), x)
-            if not isinstance(y, StageFailed):
-                return y
-        return self.driver.follow_all(stages, x)
-
-    def _faster(
-        self, film: FilmLoads, x: Array, on_speed: OnSpeed, fast: FastFilm | None
-    ) -> StageFailed | None:
-        """Rising speeds by modified Newton iterations; by Newton's method where they fail."""
-        system, p = self.system, self.system.parameters
-        reached = [(film, x)]
-
-        def keep(at: FilmLoads, point: Point) -> None:
-            if at.speed > reached[0][0].speed or not reached[1:]:
-                reached[1:] = [(at, point.solution.x)]
-                on_speed(at, point)
-
-        def stage(start: FilmLoads) -> Stage:
-            speeds = tuple(u for u in p.speeds if u >= start.speed)
-            return rising_stage(system, self.settings, start, speeds, keep)
-
-        if fast:
-            end = self.driver.follow(fast.rising(stage(film)), x)
-            if not isinstance(end, StageFailed):
-                return None
-        film, x = reached[-1]
-        reached[:] = [(film, x)]
-        end = self.driver.follow(stage(film), x)
-        return end if isinstance(end, StageFailed) else None
 
     def build(self, film: FilmLoads, x: Array) -> BuiltFilm | StageFailed:
         """By Newton's method from the contact state x to the film at its first speed."""
@@ -346,9 +254,17 @@ class FilmPath:
 
     def without_film(self, film: FilmLoads, _: Array) -> StageFailed:
         """What is said where there is no film, and another mesh had one: nothing more is tried."""
-        speeds = self.system.parameters.speeds
-        stage = speed_stage(self.system, self.settings, film, speeds, lambda at, point: None)
-        return StageFailed(stage, Branch((), Status.DIVERGED, "no film on this mesh"))
+        return self._missed(film, self.system.parameters.speeds, "no film on this mesh")
+
+    def faster_missed(self, film: FilmLoads, missing: set[float]) -> StageFailed:
+        """What is said of speeds that were not reached although slower ones were."""
+        speed = max(missing)
+        failed = self._missed(replace(film, speed=speed), (speed,), "slower films are there")
+        return replace(failed, stage=replace(failed.stage, name="speed"))
+
+    def _missed(self, film: FilmLoads, speeds: tuple[float, ...], why: str) -> StageFailed:
+        stage = speed_stage(self.system, self.settings, film, speeds, _untold)
+        return StageFailed(stage, Branch((), Status.DIVERGED, why))
 
     def slower(
         self, built: BuiltFilm | StageFailed, speeds: tuple[float, ...], on_speed: OnSpeed
@@ -368,7 +284,7 @@ class FilmPath:
         """The same where the section lies in a corner; only the speeds are solved to the end."""
         system, settings, newton = self.system, self.settings, self.driver.newton
         for speed in speeds:
-            way = speed_stage(system, settings, film, (speed,), lambda at, point: None)
+            way = speed_stage(system, settings, film, (speed,), _untold)
             y = self.driver.follow(laborious(way, self._rough), x)
             film = replace(film, speed=speed)
             if not isinstance(y, StageFailed):
@@ -378,6 +294,10 @@ class FilmPath:
                 return y
             x = y
         return None
+
+
+def _untold(film: FilmLoads, point: Point) -> None:
+    """For a stage whose films are of no interest."""
 
 
 def below(speeds: tuple[float, ...], speed: float) -> tuple[float, ...]:

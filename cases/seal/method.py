@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from fractions import Fraction
+from functools import cache, partial
 from pathlib import Path
 
 from softehl.cases.seal.contact import assembly, contact_problem, lies_in_corner
@@ -11,7 +13,12 @@ from softehl.cases.seal.contact_results import contact_numbers, contact_state
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contact_store import ContactStore
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.estimate import ESTIMATED, coarser_system
+from softehl.cases.seal.estimate import (
+    ESTIMATED,
+    coarser_density,
+    finer_density,
+    system_at,
+)
 from softehl.cases.seal.failure import explained
 from softehl.cases.seal.film_edges import film_edges
 from softehl.cases.seal.film_path import BuiltFilm, FilmPath
@@ -20,7 +27,7 @@ from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.results import film_numbers
 from softehl.cases.seal.state import FilmState, Observer, Outcome
-from softehl.cases.seal.strokes import MESHES, SealRun
+from softehl.cases.seal.strokes import MESHES, OtherMesh, SealRun
 from softehl.cases.seal.wanted import Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import MeshError
@@ -73,7 +80,7 @@ def run(
 
 def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFailed:
     """A run whose contact state x (n,) is settled, and with it the mesh; shared by both strokes."""
-    system, settings, p = path.system, path.settings, path.system.parameters
+    system, p = path.system, path.system.parameters
     settled = path.settled(x)
     if isinstance(settled, StageFailed):
         return settled
@@ -87,16 +94,44 @@ def _begun(path: FilmPath, x: Array, route: ContactRoute) -> SealRun | StageFail
         seal = replace(seal, cornered=lambda worse, stroke: _for_stroke(worse, stroke, route))
     if not (p.error_estimate and p.mesh == "graded"):
         return seal
-    driver = path.driver.named("coarser mesh: ")
+    if seal.cornered:
+        seal = replace(seal, finer=cache(partial(_finer_mesh, path, x, route)))
+    return replace(seal, coarser=_coarser_mesh(path, x, route))
+
+
+def _coarser_mesh(path: FilmPath, x: Array, route: ContactRoute) -> OtherMesh | None:
+    """For estimates of errors; None where there is none, or no contact state on it."""
+    density = coarser_density(path.system.parameters.density)
+    return _contact_on(density, path.driver.named("coarser mesh: "), (path, x), route)
+
+
+def _finer_mesh(path: FilmPath, x: Array, route: ContactRoute) -> OtherMesh | None:
+    """For estimates of errors, too; contact on it is not worth a path from rest."""
+    density = finer_density(path.system.parameters.density)
+    driver = path.driver.named("finer mesh: ")
+    return _contact_on(density, driver, (path, x), route, from_rest=False)
+
+
+def _contact_on(
+    density: Fraction,
+    driver: PathDriver,
+    before: OtherMesh,
+    route: ContactRoute,
+    *,
+    from_rest: bool = True,
+) -> OtherMesh | None:
+    """A mesh of another density, in contact; see `ContactRoute.elsewhere`."""
+    path, x = before
     try:
-        coarser = FilmPath(coarser_system(system), settings, driver, ESTIMATED)
+        system = system_at(path.system, density)
     except MeshError:
-        return seal  # too coarse for the corners of a section: errors are not known
-    aside = replace(route, follow=coarser.driver.follow, contacts=ContactStore())
-    y = aside.elsewhere(system, x, coarser.system)
+        return None  # too coarse for the corners of a section
+    other = FilmPath(system, path.settings, driver, ESTIMATED)
+    aside = replace(route, follow=driver.follow, contacts=ContactStore())
+    y = aside.elsewhere(path.system, x, system, from_rest=from_rest)
     if not isinstance(y, StageFailed):
-        y = coarser.settled(y)
-    return seal if isinstance(y, StageFailed) else replace(seal, coarser=(coarser, y))
+        y = other.settled(y)
+    return None if isinstance(y, StageFailed) else (other, y)
 
 
 def _for_stroke(seal: SealRun, stroke: Stroke, route: ContactRoute) -> SealRun | None:

@@ -16,6 +16,7 @@ from softehl.cases.seal.film_path import BuiltFilm, FilmPath, OnSpeed
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.nearing import rod_brought_near, without_rounding
 from softehl.cases.seal.path import Followed, StageFailed
+from softehl.cases.seal.rough_path import RoughPath
 from softehl.cases.seal.thinning import thinned_film
 from softehl.runtime.arrays import Array
 
@@ -53,7 +54,7 @@ class StrokeStart:
         """All films of the stroke from the settled contact state; what went wrong, if anything."""
         path, p = self.path, self.path.system.parameters
         if p.rough:
-            return path.rise(self.stroke, self.x, on_speed)
+            return RoughPath(path).risen(self.stroke, self.x, on_speed)
         start = self.begun(on_speed)
         if start is None or (path.quick and path.tolerance is not None):
             return None  # what is no result is not worth the slow way

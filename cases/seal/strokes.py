@@ -11,16 +11,23 @@ from dataclasses import dataclass, field, replace
 from math import nan
 from typing import TypeAlias
 
-from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.contact_results import contact_peaks, contact_pressure, unsealed
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.estimate import estimated_error
+from softehl.cases.seal.estimate import coarser_density, estimated_error, finer_density
 from softehl.cases.seal.film_path import BuiltFilm, FilmPath, OnSpeed, below
+from softehl.cases.seal.film_transfer import (
+    FilmTransfer,
+    FoundFilms,
+    film_on_coarser,
+    film_on_finer,
+    films_of,
+)
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.order import REFERENCE_ORDER, OrderPair, transferred
 from softehl.cases.seal.overlap import overlap
 from softehl.cases.seal.path import StageFailed
 from softehl.cases.seal.results import film_numbers, film_state
+from softehl.cases.seal.rough_path import RoughPath
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmState
@@ -32,7 +39,7 @@ from softehl.cases.seal.verdict import (
     Verdict,
     fewest_inlet_segments,
 )
-from softehl.cases.seal.wanted import Wanted
+from softehl.cases.seal.wanted import Found, Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
 from softehl.runtime.solve.linear import SingularMatrix
@@ -47,12 +54,15 @@ the other, where they are not `ok` on the one before."""
 class StrokeState:
     """What changes along a stroke on a mesh.
 
-    verdict: on the films so far. slowest: the slowest film that was solved, and its unknowns.
-    missing: speeds that are wanted and were not reached yet.
+    first: the verdict before any film; verdict: on those so far. slowest: the slowest film that was
+    solved, and its unknowns. missing: speeds that are wanted and were not reached yet. films: by
+    |U|, unknowns (n,) of those that were.
     """
 
+    first: Verdict
     verdict: Verdict
     missing: set[float]
+    films: dict[float, Array] = field(default_factory=dict)
     slowest: BuiltFilm | None = None
 
 
@@ -60,8 +70,9 @@ class StrokeState:
 class SealRun:
     """A system whose contact state x is known, with what is needed for its films.
 
-    coarser: the films of a coarser mesh, which are no results, and its contact state. better: the
-    same on a mesh that is made for a film, None where there is none. meshes: how many such meshes
+    coarser: the films of a coarser mesh, which are no results, and its contact state. finer: of a
+    finer one, where an estimate is worth its time, None where there is none. better: the run on a
+    mesh that is made for a film, None where there is none. meshes: how many such meshes
     may follow. cornered: the same on a mesh for a stroke of what lies in a corner, None where there
     is none. empty: the same without pressure in the groove, for an instroke. rates: of the inputs
     of the film by each parameter, once they were asked for.
@@ -69,7 +80,8 @@ class SealRun:
 
     path: FilmPath
     x: Array
-    coarser: tuple[FilmPath, Array] | None = None
+    coarser: OtherMesh | None = None
+    finer: Callable[[], OtherMesh | None] | None = None
     better: Better | None = None
     meshes: int = 0
     cornered: Cornered | None = None
@@ -100,6 +112,7 @@ class SealRun:
         """A stroke; what is not `ok` once more on a mesh for what its shear stress moves."""
         wanted.compared = True
         failed = replace(self._hasty(), cornered=None).stroke(stroke, wanted)
+        wanted.compare_with_finer()
         if wanted.left:
             other = cornered(self, stroke) or self
             failed = replace(other, cornered=None).stroke(stroke, wanted)
@@ -141,7 +154,7 @@ class SealRun:
         references = contact_peaks(self.system, p.sealed_pressure, self.x)
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
         ratios = ANY_RATIO if p.mesh == "uniform" else INLET_RATIO
-        known = _known(*self.coarser, stroke, self.system) if self.coarser else None
+        known = films_of(*self.coarser, stroke, self.system) if self.coarser else None
         coarser = wanted.begin(known.numbers if known else {})
         verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
         verdict = replace(
@@ -150,17 +163,17 @@ class SealRun:
             references=references,
             overlap=overlap(self.system, self.x),
         )
-        progress = StrokeState(verdict, set(wanted.left))
+        progress = StrokeState(verdict, verdict, set(wanted.left))
 
         def on_speed(film: FilmLoads, point: Point) -> None:
             self._judge(wanted, progress, coarser, film, point)
 
         if p.rough:
-            return path.rise(stroke, self.x, on_speed)
+            return RoughPath(path).risen(stroke, self.x, on_speed)
         if known:
-            path.carried(stroke, self.x, known, on_speed)
+            FilmTransfer(path, stroke, self.x, known).in_turn(on_speed)
         if progress.slowest and progress.missing:
-            path.onward(*progress.slowest, on_speed)
+            path.onward(*progress.slowest, below(p.speeds, progress.slowest[0].speed), on_speed)
         start = StrokeStart(path, stroke, self.x).begun(on_speed) if progress.missing else None
         if start is None or (self.meshes and progress.slowest):
             return None
@@ -171,7 +184,7 @@ class SealRun:
         left = p.speeds if progress.slowest is None else below(p.speeds, progress.slowest[0].speed)
         failed = path.slower(built, left, on_speed)
         if failed is None:
-            return None
+            return path.faster_missed(start[0], progress.missing) if progress.missing else None
         last = progress.verdict.last
         self._from_higher_order(stroke, progress, on_speed)
         return replace(failed, last=last) if progress.missing else None
@@ -184,26 +197,35 @@ class SealRun:
         film: FilmLoads,
         point: Point,
     ) -> None:
-        """Look at a film of falling speed; one at a requested speed becomes a state."""
+        """Look at a film of falling speed; one at a requested speed becomes a state.
+
+        One that is faster than the slowest known belongs to another path, and is judged alone.
+        """
         system, x = self.system, point.solution.x
-        falling = not system.parameters.rough
-        if falling and progress.slowest and not film.speed < progress.slowest[0].speed:
-            return  # a slower film is known already
-        progress.slowest = wanted.last = film, x
+        known = None if system.parameters.rough else progress.slowest
+        slowest = known is None or film.speed < known[0].speed
+        if not (slowest or film.speed in progress.missing):
+            return
         last = film_numbers(system, system.film_problem(film), film, x)
-        progress.verdict = progress.verdict.after(last)
+        verdict = progress.verdict.after(last) if slowest else progress.first.after(last)
+        if slowest:
+            progress.slowest = wanted.last = film, x
+            progress.verdict = verdict
         if film.speed not in progress.missing:
             return
         progress.missing.discard(film.speed)
+        progress.films[film.speed] = x
+        here = FoundFilms(system, self.x, dict(progress.films))
         iterations = point.solution.iterations
         film, x, last = self.path.entered(film, x, last)
         p, problem = system.parameters, system.film_problem(film)
         if self.coarser and film.speed not in coarser:
-            coarser |= _carried(*self.coarser, film, (system, self.x, x))
-        verdict, wants_error = progress.verdict, p.error_estimate and p.mesh == "graded"
+            other = film_on_coarser(*self.coarser, film, here)
+            coarser |= {film.speed: other} if other else {}
+        wants_error = p.error_estimate and p.mesh == "graded"
 
-        def judged(other: FilmNumbers | None) -> FilmState:
-            error, friction = _errors(p.density, last, other)
+        def judged(other: FilmNumbers | None, *, finer: bool = False) -> FilmState:
+            error, friction = _errors(p.density, last, other, finer=finer)
             told = replace(verdict, last=last, error=error if wants_error else None)
             state = film_state(system, problem, film, x, told, iterations)
             state = replace(state, h_star_error_percent=error, rod_friction_error_percent=friction)
@@ -211,7 +233,12 @@ class SealRun:
                 state = replace(state, sensitivity=self._differentiated(film, x))
             return state
 
-        wanted.found(film.speed, judged, final=self.better is None)
+        def of_finer() -> FilmNumbers | None:
+            mesh = self.finer() if self.finer else None
+            return film_on_finer(*mesh, film, here) if mesh else None
+
+        found = Found(judged, of_finer)
+        wanted.found(film.speed, found, final=self.better is None)
 
     def _differentiated(
         self, film: FilmLoads, x: Array
@@ -248,53 +275,21 @@ class SealRun:
                 on_speed(at, Point(1.0, solution))
 
 
-def _errors(density: int, film: FilmNumbers, coarser: FilmNumbers | None) -> tuple[float, float]:
-    """Estimated errors of h* and of friction, %, from the film of the coarser mesh."""
-    if coarser is None:
+def _errors(
+    density: int, film: FilmNumbers, other: FilmNumbers | None, *, finer: bool
+) -> tuple[float, float]:
+    """Estimated errors of h* and of friction, %, from the film of a coarser mesh or a finer one."""
+    if other is None:
         return nan, nan
+    at = finer_density(density) if finer else coarser_density(density)
     return (
-        estimated_error(density, film.h_star, coarser.h_star),
-        estimated_error(density, film.friction, coarser.friction),
+        estimated_error(density, film.h_star, other.h_star, at),
+        estimated_error(density, film.friction, other.friction, at),
     )
 
 
+OtherMesh: TypeAlias = tuple[FilmPath, Array]
+"""Films of another mesh, and its contact state (n,)."""
+
 Better: TypeAlias = Callable[[SealRun, BuiltFilm], SealRun | None]
 Cornered: TypeAlias = Callable[[SealRun, Stroke], SealRun | None]
-
-
-def _known(path: FilmPath, x: Array, stroke: Stroke, finer: SealSystem) -> CoarserFilms:
-    """The films at the requested speeds, as far as they are reached; nothing is reported."""
-    known, speeds = CoarserFilms(path.system, finer, x), path.system.parameters.speeds
-
-    def keep(film: FilmLoads, point: Point) -> None:
-        if film.speed in speeds:
-            known.films[film.speed] = point.solution.x
-            known.numbers[film.speed] = _numbers(path, film, point.solution.x)
-
-    StrokeStart(path, stroke, x).films(keep)
-    return known
-
-
-def _carried(
-    path: FilmPath, x: Array, film: FilmLoads, finer: tuple[SealSystem, Array, Array]
-) -> dict[float, FilmNumbers]:
-    """By |U|, of a film that no path led to, from that of a finer mesh; nothing is reported.
-
-    x: the contact state. finer: that mesh, its contact state and its film.
-    """
-    other, contact, y = finer
-    known = CoarserFilms(other, path.system, contact, {film.speed: y})
-
-    def keep(film: FilmLoads, point: Point) -> None:
-        known.numbers[film.speed] = _numbers(path, film, point.solution.x)
-
-    if path.quick and not path.system.parameters.rough:
-        path.from_finer(film.stroke, x, known, keep)
-    return known.numbers
-
-
-def _numbers(path: FilmPath, film: FilmLoads, x: Array) -> FilmNumbers:
-    """What a film x (n,) means."""
-    bare = replace(film, entrance=0.0)
-    numbers = film_numbers(path.system, path.system.film_problem(bare), bare, x)
-    return path.entered(bare, x, numbers)[2]

@@ -11,9 +11,11 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
+from softehl.cases.seal import method
 from softehl.cases.seal.coarser_films import CoarserFilms
-from softehl.cases.seal.estimate import ORDER, coarser_density, estimated_error
+from softehl.cases.seal.estimate import ORDER, coarser_density, estimated_error, finer_density
 from softehl.cases.seal.film import FastFilm
+from softehl.cases.seal.film_transfer import FilmTransfer
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import DENSITIES, ORing
 from softehl.cases.seal.path import Stage, StageFailed
@@ -29,7 +31,7 @@ from softehl.cases.seal.state import (
 )
 from softehl.cases.seal.stroke_start import StrokeStart
 from softehl.cases.seal.verdict import LARGEST_ERROR, FilmNumbers
-from softehl.cases.seal.wanted import Judged, Wanted
+from softehl.cases.seal.wanted import Found, Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import film_values, oring
@@ -142,6 +144,29 @@ def test_an_estimate_needs_no_path_on_the_coarser_mesh(
     )
 
 
+@pytest.mark.parametrize("lost", [False, True], ids=["at once", "by a faster film"])
+def test_where_no_coarser_film_is_known_a_finer_one_says_as_much(
+    lost: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = FilmTransfer.at_once
+
+    def not_slow(to: FilmTransfer, speed: float, *given: Any, **how: Any) -> None:
+        if not (lost and speed < max(CONVERGED)):
+            usual(to, speed, *given, **how)
+
+    monkeypatch.setattr(method, "lies_in_corner", lambda system: True)
+    monkeypatch.setattr(method, "_coarser_mesh", lambda *given: None)
+    monkeypatch.setattr(FilmTransfer, "at_once", not_slow)
+    outcome = run(_case(arc_start=None, arc_end=None), Silent())
+    names = [stage.name for stage in outcome.stages]
+    assert names.count("finer mesh: film of another mesh") == 2
+    assert names.count("finer mesh: falling speed") == (1 if lost else 0)
+    assert [s.verdict for s in outcome.states] == [OK, OK]
+    for state, h in zip(outcome.states, CONVERGED.values(), strict=True):
+        error = 100.0 * (state.h_star_um / h - 1.0)
+        assert state.h_star_error_percent == pytest.approx(error, abs=0.1)
+
+
 @pytest.mark.parametrize(
     ("misleading", "stage", "times"),
     [("next", "falling speed", 2), ("built", "contact to film", 1)],
@@ -174,16 +199,21 @@ def test_friction_that_is_not_known_is_named() -> None:
     assert note.startswith("friction not known to 2 %: U = -200 mm/s")
 
 
-def made_up(speed: float, verdict: str, errors: dict[float, float] | None = None) -> Judged:
-    """A film with this verdict, or with these errors (%) by h* of a coarser mesh."""
+def made_up(
+    speed: float,
+    verdict: str,
+    errors: dict[float, float] | None = None,
+    finer: FilmNumbers | None = None,
+) -> Found:
+    """A film with this verdict, or with these errors (%) by h* of another mesh."""
 
-    def judged(coarser: FilmNumbers | None) -> FilmState:
-        error = (errors or {}).get(coarser.h_star, nan) if coarser else nan
+    def judged(other: FilmNumbers | None, *, finer: bool = False) -> FilmState:
+        error = (errors or {}).get(-other.h_star if finer else other.h_star, nan) if other else nan
         word = verdict if errors is None else OK if abs(error) <= LARGEST_ERROR else UNCERTAIN
         values = {"rod_speed_mm_s": speed, "verdict": word, "h_star_error_percent": error}
         return cast("FilmState", SimpleNamespace(oscillation_index=0.0, **values))
 
-    return judged
+    return Found(judged, lambda: finer)
 
 
 def test_what_another_mesh_cannot_better_is_reported() -> None:
@@ -229,6 +259,17 @@ def test_the_coarser_film_of_another_mesh_says_as_much(compared: bool) -> None:
     assert {state.verdict for state in reported} == {OK if compared else UNCERTAIN}
 
 
+@pytest.mark.parametrize("value", [0.997, 1.004])
+def test_a_finer_mesh_gives_the_error_of_ours(value: float) -> None:
+    """Of a curve that converges with the order that is assumed; not of another one."""
+    density, limit = 2, 0.7
+    slope = (value - 1.0) * limit * density**ORDER
+    ours, finer = (limit + slope / float(d) ** ORDER for d in (density, finer_density(density)))
+    estimate = estimated_error(density, ours, finer, finer_density(density))
+    assert estimate == pytest.approx(100.0 * (1.0 - limit / ours), rel=1e-2)
+    assert abs(estimated_error(density, ours, finer)) < 0.9 * abs(estimate)
+
+
 def test_a_film_is_held_until_a_coarser_one_is_like_it() -> None:
     reported = list[FilmState]()
     wanted = Wanted(reported.append, (10.0,), compared=True)
@@ -239,6 +280,26 @@ def test_a_film_is_held_until_a_coarser_one_is_like_it() -> None:
     assert [state.h_star_error_percent for state in reported] == [0.4]
 
 
+@pytest.mark.parametrize(
+    ("finer", "error"), [(0.6, 0.3), (0.1, -5.0), (None, -32.0)], ids=["agrees", "does not", "none"]
+)
+def test_a_finer_mesh_decides_where_the_coarser_ones_leave_doubt(
+    finer: float | None, error: float
+) -> None:
+    """What it finds counts as that of a finer mesh; h* that differs there is not believed."""
+    reported = list[FilmState]()
+    wanted = Wanted(reported.append, (100.0, 10.0), compared=True)
+    errors = {0.2: -32.0, -0.6: 0.3, -0.1: -5.0}
+    wanted.begin({10.0: numbers_of(0.2)})
+    found = made_up(10.0, OK, errors, None if finer is None else numbers_of(finer))
+    wanted.found(10.0, found, final=True)
+    assert not reported
+    wanted.close()
+    assert [state.h_star_error_percent for state in reported] == [error]
+    assert reported[0].verdict == (OK if error == 0.3 else UNCERTAIN)
+    assert wanted.left == (100.0,)
+
+
 def numbers_of(h_star: float) -> FilmNumbers:
-    """A film of a coarser mesh, of which h* alone matters."""
+    """A film of another mesh, of which h* alone matters."""
     return cast("FilmNumbers", SimpleNamespace(h_star=h_star))

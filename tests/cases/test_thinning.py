@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from math import log
+from typing import Any
 
 import numpy as np
 import pytest
 
+from softehl.cases.seal import film_path, method
 from softehl.cases.seal.contact import approach_stage
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film import METHOD, FastFilm, shear_stage
 from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.loads import FilmLoads
+from softehl.cases.seal.method import run
 from softehl.cases.seal.nearing import neared, nearing_stage, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
@@ -192,6 +195,59 @@ def test_a_film_that_is_not_steady_is_squeezed_for_longer() -> None:
     assert squeezed[1].parameters[0] == pytest.approx(squeezed[0].parameters[-1])
     assert squeezed[1].parameters[-1] == pytest.approx(1e9)
     assert found[1][400.0] == pytest.approx(found[0][400.0], rel=1e-7)
+
+
+class StrongShear(PathDriver):
+    """The shear stress of the first film leads nowhere."""
+
+    def follow(self, stage: Stage, x0: Array) -> Followed:
+        if stage.name == "shear" and not any(r.name == "falling speed" for r in self.records):
+            return StageFailed(stage, Branch((), Status.DIVERGED, "too much of it"))
+        return super().follow(stage, x0)
+
+
+def test_shear_stress_that_leads_nowhere_begins_at_a_slower_film(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    system, x = contact()
+    monkeypatch.setattr(film_path, "lies_in_corner", lambda system: True)
+    found: list[float] = []
+    for kind in (PathDriver, StrongShear):
+        driver = kind(Silent())
+
+        def keep(film: FilmLoads, point: Point) -> None:
+            if film.speed == 400.0:
+                found.append(system.arc_film(point.solution.x)[1].min())
+
+        assert FilmPath(system, SETTINGS, driver).thinned(loads(), x, keep) is None
+    names = [record.name for record in driver.records]
+    number = names.index("falling speed")
+    assert "shear" not in names[:number]
+    assert names[number + 1] == "shear"
+    slower = driver.records[number].parameters
+    assert [slower[0], slower[-1]] == pytest.approx([1600.0, 400.0])
+    assert found[1] == pytest.approx(found[0], rel=1e-7)
+
+
+def test_a_speed_that_is_missed_is_named_though_slower_ones_are_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    usual = FilmPath._falling
+
+    def strong(path: FilmPath, fast: FastFilm, film: FilmLoads, *given: Any, **how: Any) -> Any:
+        if film.speed > 200.0:
+            stage = shear_stage(path.system, path.settings, film)
+            return StageFailed(stage, Branch((), Status.DIVERGED, "too much of it"))
+        return usual(path, fast, film, *given, **how)
+
+    for place in (film_path, method):
+        monkeypatch.setattr(place, "lies_in_corner", lambda system: True)
+    monkeypatch.setattr(FilmPath, "_falling", strong)
+    p = contact()[0].parameters.model_copy(update={"speeds": (400.0, 100.0), "stroke": "out"})
+    outcome = run(p, Silent())
+    assert [state.rod_speed_mm_s for state in outcome.states] == [100.0]
+    assert not outcome.converged
+    assert "speed 400 was not reached" in outcome.message
 
 
 def test_a_rod_that_nothing_touches_has_no_such_film() -> None:
