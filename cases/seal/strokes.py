@@ -6,7 +6,7 @@ What changes along a stroke on a mesh is a `StrokeState`, what is left of it for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import nan
 from typing import TypeAlias
@@ -30,7 +30,7 @@ from softehl.cases.seal.results import film_numbers, film_state
 from softehl.cases.seal.rough_path import RoughPath
 from softehl.cases.seal.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity_table import resolved
-from softehl.cases.seal.state import FilmState
+from softehl.cases.seal.state import COLLAPSED, UNDER_RESOLVED, FilmState
 from softehl.cases.seal.stroke_start import StrokeStart, emptied
 from softehl.cases.seal.verdict import (
     ANY_RATIO,
@@ -56,7 +56,7 @@ class StrokeState:
 
     first: the verdict before any film; verdict: on those so far. slowest: the slowest film that was
     solved, and its unknowns. missing: speeds that are wanted and were not reached yet. films: by
-    |U|, unknowns (n,) of those that were.
+    |U|, unknowns (n,) of those that were. unsound: whether one is not resolved, or has collapsed.
     """
 
     first: Verdict
@@ -64,6 +64,11 @@ class StrokeState:
     missing: set[float]
     films: dict[float, Array] = field(default_factory=dict)
     slowest: BuiltFilm | None = None
+    unsound: bool = False
+
+    def again(self, left: Iterable[float]) -> None:
+        """Nothing is known of these speeds: other films than those that were found are wanted."""
+        self.verdict, self.missing, self.slowest, self.films = self.first, set(left), None, {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +177,8 @@ class SealRun:
             return RoughPath(path).risen(stroke, self.x, on_speed)
         if known:
             FilmTransfer(path, stroke, self.x, known).in_turn(on_speed)
+        if wanted.compared and progress.unsound:
+            progress.again(wanted.left)  # what is carried may lead to another film than the path
         if progress.slowest and progress.missing:
             path.onward(*progress.slowest, below(p.speeds, progress.slowest[0].speed), on_speed)
         start = StrokeStart(path, stroke, self.x).begun(on_speed) if progress.missing else None
@@ -211,11 +218,13 @@ class SealRun:
         if slowest:
             progress.slowest = wanted.last = film, x
             progress.verdict = verdict
+        if film.speed in system.parameters.speeds:
+            progress.films[film.speed] = x
         if film.speed not in progress.missing:
             return
         progress.missing.discard(film.speed)
-        progress.films[film.speed] = x
         here = FoundFilms(system, self.x, dict(progress.films))
+        progress.unsound |= verdict.word in (UNDER_RESOLVED, COLLAPSED)
         iterations = point.solution.iterations
         film, x, last = self.path.entered(film, x, last)
         p, problem = system.parameters, system.film_problem(film)

@@ -1,6 +1,7 @@
 """The estimated error of h*: exact for the order that is assumed, near where it is not."""
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 from math import isnan, nan
 from types import SimpleNamespace
@@ -15,7 +16,9 @@ from softehl.cases.seal import method
 from softehl.cases.seal.coarser_films import CoarserFilms
 from softehl.cases.seal.estimate import ORDER, coarser_density, estimated_error, finer_density
 from softehl.cases.seal.film import FastFilm
+from softehl.cases.seal.film_path import OnSpeed
 from softehl.cases.seal.film_transfer import FilmTransfer
+from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import DENSITIES, ORing
 from softehl.cases.seal.path import Stage, StageFailed
@@ -34,6 +37,7 @@ from softehl.cases.seal.verdict import LARGEST_ERROR, FilmNumbers
 from softehl.cases.seal.wanted import Found, Wanted
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import Disc, disc_mesh
+from softehl.runtime.solve.solution import Point
 from tests.cases.oring_cases import film_values, oring
 
 CONVERGED = {1600.0: 3.1842, 100.0: 0.59552}
@@ -165,6 +169,30 @@ def test_where_no_coarser_film_is_known_a_finer_one_says_as_much(
     for state, h in zip(outcome.states, CONVERGED.values(), strict=True):
         error = 100.0 * (state.h_star_um / h - 1.0)
         assert state.h_star_error_percent == pytest.approx(error, abs=0.1)
+
+
+def test_where_what_is_carried_is_no_film_the_path_is_followed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A film that is reported as carried has half the gap: its inlet says so."""
+    usual = FilmTransfer.in_turn
+
+    def spoiled(to: FilmTransfer, on_speed: OnSpeed) -> StageFailed | None:
+        def thinner(film: FilmLoads, point: Point) -> None:
+            x, nodes = point.solution.x.copy(), to.path.system.mesh.arc_nodes
+            to.path.system.displacements(x)[nodes, 1] -= 0.5 * to.path.system.arc_film(x)[1].min()
+            on_speed(film, replace(point, solution=replace(point.solution, x=x)))
+
+        return usual(to, thinner)
+
+    monkeypatch.setattr(method, "lies_in_corner", lambda system: True)
+    monkeypatch.setattr(FilmTransfer, "in_turn", spoiled)
+    outcome = run(_case(arc_start=None, arc_end=None), Silent())
+    names = [stage.name for stage in outcome.stages]
+    assert "contact to film" in names
+    assert [s.verdict for s in outcome.states] == [OK, OK]
+    for state, h in zip(outcome.states, CONVERGED.values(), strict=True):
+        assert state.h_star_um == pytest.approx(h, rel=5e-3)
 
 
 @pytest.mark.parametrize(
