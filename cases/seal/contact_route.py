@@ -29,7 +29,6 @@ from softehl.cases.seal.grading import (
     MOST_SEGMENTS,
     PASSES,
     graded_layout,
-    inlet_length,
     placed_layout,
     reaches_wall,
     slowest_films,
@@ -38,7 +37,7 @@ from softehl.cases.seal.grading import (
 from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.loading import Loading, State
 from softehl.cases.seal.loads import Stroke
-from softehl.cases.seal.nearing import rod_brought_near, without_rounding
+from softehl.cases.seal.nearing import NearRod, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import finer
@@ -60,9 +59,8 @@ GUIDE = 2
 MESH_OF_STROKE: Mapping[Stroke, int] = {"in": 9, "out": 10}
 """Number of a graded mesh for a stroke alone, after all others."""
 
-NEARER, SHORT_INLET = 2, 0.5
-"""Meshes that are graded by a contact near the rod, and below which inlet, in offsets of the rod,
-they are: its way from there moves the edges by about as much as it is long."""
+NEARER = 2
+"""Meshes that are graded by a contact near the rod."""
 
 
 @dataclass(frozen=True)
@@ -184,9 +182,9 @@ class ContactRoute:
         """
         found: State | StageFailed = state
         for number in range(NEARER):
-            if isinstance(found, StageFailed) or not self._short(*found):
+            if isinstance(found, StageFailed) or not self._rod.needed(*found):
                 break
-            near = self._near(*found)
+            near = self._rod.states(*found)
             if isinstance(near, StageFailed):
                 break
             also = [edge for y in near[1:] for edge in contact_edges(found[0], y)]
@@ -197,7 +195,7 @@ class ContactRoute:
     def for_film(self, state: State, edges: Sequence[Edge]) -> State | StageFailed:
         """A contact state on a mesh that is fine at the edges of a film, too."""
         system, x = state
-        states = self._near_or_here(system, x)
+        states = self._rod.states_or_here(system, x)
         others = [edge for y in states[1:] for edge in contact_edges(system, y)]
         more = between(edges, contact_edges(system, states[0]))
         also, most = [*others, *edges, *more], 2 * MOST_SEGMENTS
@@ -217,7 +215,7 @@ class ContactRoute:
 
     def _for_instroke(self, system: SealSystem, x: Array) -> Layout | None:
         """Fine where films of the instroke have their inlet, many of its lengths from contact's."""
-        y = self._near_or_here(system, x)[0]
+        y = self._rod.states_or_here(system, x)[0]
         offset = self.settings.offset if y is x else slowest_films(system, x)[0]
         y = without_rounding(system, y)
         moved = dragged(system, self.settings, offset, y, self.newton.linear)
@@ -232,42 +230,9 @@ class ContactRoute:
             return None
         return placed_layout(system, x, system.parameters, pushed=push)
 
-    def _near_or_here(self, system: SealSystem, x: Array) -> list[Array]:
-        """As `_near`; the contact state x itself where its edges stay or no such state is found."""
-        near = self._near(system, x) if self._short(system, x) else [x]
-        return [x] if isinstance(near, StageFailed) else near
-
-    def _near(self, system: SealSystem, x: Array) -> list[Array] | StageFailed:
-        """The contact state x with the rod where slow films have it, the thinnest first."""
-        found = list[Array]()
-        for offset in slowest_films(system, x):
-            near = self._neared(system, offset, x)
-            if isinstance(near, StageFailed):
-                return near
-            found.append(without_rounding(system, near))
-        return found
-
-    def _neared(self, system: SealSystem, offset: float, x: Array) -> Followed:
-        """With the rod at an offset, mm, from the contact state x (n,)."""
-        quick = system.parameters.solver == "auto"
-        return rod_brought_near(
-            system,
-            self.settings,
-            offset,
-            x,
-            self.newton,
-            self.follow,
-            quick=quick,
-            laboriously=True,
-        )
-
-    def _short(self, system: SealSystem, x: Array) -> bool:
-        """Whether the edges of the contact x move by inlets when the rod comes nearer."""
-        p, edges = system.parameters, contact_edges(system, x)
-        if p.mesh == "uniform" or p.rubs or p.rough or not edges:
-            return False
-        length = inlet_length(p, max(edge.rise for edge in edges))
-        return length < SHORT_INLET * self.settings.offset
+    @property
+    def _rod(self) -> NearRod:
+        return NearRod(self.settings, self.follow, self.newton)
 
     def _sealed(self, p: ORing, state: State) -> State | StageFailed:
         """On the last of the graded meshes; on more where pressure ends outside the contact."""

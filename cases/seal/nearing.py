@@ -8,12 +8,14 @@ contact of the arc as the layer these changes concern a small matrix only.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from softehl.cases.seal.contact import along, approach_stage, lies_in_corner
+from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.grading import inlet_length, slowest_films
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed, laborious
 from softehl.cases.seal.pressure_newton import roughly
 from softehl.cases.seal.system import ROD
@@ -29,6 +31,9 @@ _NEAR = 0.3
 _TOLERANCE = 1e-6  # by which gaps are right to hundredths of a micrometre
 _LOOSE = 1e-3  # on the way
 _TOUCHES = 1e-9  # of the largest pressure: what is less is rounding
+SHORT_INLET = 0.5
+"""Of the rod's offset: an inlet that is shorter moves by about its length as the rod comes near."""
+
 _STEPS = StepRule(0.5, 0.02, 5.0, target_iterations=8)  # of the logarithm of the offset
 
 
@@ -88,6 +93,54 @@ def rod_brought_near(
             return y
         return follow(replace(stage, start=stage.stop, corrector=along(system, newton)), y)
     return follow(replace(stage, corrector=along(system, newton)), x)
+
+
+@dataclass(frozen=True)
+class NearRod:
+    """Contact states with the rod where slow films have it, for the meshes of these films.
+
+    follow: solves a stage from a start.
+    """
+
+    settings: PathSettings
+    follow: Callable[[Stage, Array], Followed]
+    newton: Newton
+
+    def needed(self, system: SealSystem, x: Array) -> bool:
+        """Whether the edges of the contact x (n,) move by inlets when the rod comes nearer."""
+        p, edges = system.parameters, contact_edges(system, x)
+        if p.mesh == "uniform" or p.rubs or p.rough or not edges:
+            return False
+        length = inlet_length(p, max(edge.rise for edge in edges))
+        return length < SHORT_INLET * self.settings.offset
+
+    def states(self, system: SealSystem, x: Array) -> list[Array] | StageFailed:
+        """From the contact state x (n,), that of the thinnest film first."""
+        found = list[Array]()
+        for offset in slowest_films(system, x):
+            near = self._neared(system, offset, x)
+            if isinstance(near, StageFailed):
+                return near
+            found.append(without_rounding(system, near))
+        return found
+
+    def states_or_here(self, system: SealSystem, x: Array) -> list[Array]:
+        """The same; the contact state x itself where its edges stay or no such state is found."""
+        near = self.states(system, x) if self.needed(system, x) else [x]
+        return [x] if isinstance(near, StageFailed) else near
+
+    def _neared(self, system: SealSystem, offset: float, x: Array) -> Followed:
+        """With the rod at an offset, mm, from the contact state x (n,)."""
+        return rod_brought_near(
+            system,
+            self.settings,
+            offset,
+            x,
+            self.newton,
+            self.follow,
+            quick=system.parameters.solver == "auto",
+            laboriously=True,
+        )
 
 
 def without_rounding(system: SealSystem, x: Array) -> Array:
