@@ -72,7 +72,7 @@ class FilmPath:
         fast = self.modified(x)
         assert fast
         first = fast.weight(weight_stage(self.system, self.settings, film))
-        return self._falling(fast, film, self.driver.follow(first, x), on_speed)
+        return self._falling(fast, film, self.driver.follow(first, x), on_speed, onward=True)
 
     def thinned(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
         """All films of a stroke, the first by squeezing out what is in contact at x; see `fast`."""
@@ -89,18 +89,26 @@ class FilmPath:
             y = StageFailed(first, Branch((), Status.DIVERGED, "oil is trapped"))
         if p.shear_traction:
             film = replace(film, shear=1.0)
-        failed = self._falling(fast, film, y, on_speed)
+        failed, begin = self._falling(fast, film, y, on_speed), False
         if failed is None or isinstance(y, StageFailed):
             return failed
         if not failed.branch.points:  # it was not steady yet
-            steady = self.driver.follow(longer(first), y)
+            steady, begin = self.driver.follow(longer(first), y), True
             y = y if isinstance(steady, StageFailed) and self._cornered else steady
-            failed = self._falling(fast, film, y, on_speed, begin=True)
+            failed = self._falling(fast, film, y, on_speed)
         if failed is None or isinstance(y, StageFailed) or "shear" not in failed.stage.name:
             return failed
-        if not lies_in_corner(self.system):
+        found = list[float]()
+
+        def tell(at: FilmLoads, point: Point) -> None:
+            found.append(at.speed)
+            on_speed(at, point)
+
+        if lies_in_corner(self.system) and self._slower_first(film, y, tell) is None:
+            return None
+        if not self._cornered or (found and self.tolerance is not None):
             return failed
-        return self._slower_first(film, y, on_speed) and failed
+        return self._falling(fast, film, y, on_speed, onward=True, begin=begin)
 
     def _slower_first(self, film: FilmLoads, y: Array, on_speed: OnSpeed) -> StageFailed | None:
         """Films from slower ones than the first, y (n,), on: they have less shear stress.
@@ -136,15 +144,17 @@ class FilmPath:
         y: Followed,
         on_speed: OnSpeed,
         *,
+        onward: bool = False,
         begin: bool = False,
     ) -> StageFailed | None:
         """From the first film y (n,), if there is one, to shear, then to falling speed.
 
-        begin: see `_sheared`.
+        onward, begin: see `_sheared`.
         """
         system, settings, p = self.system, self.settings, self.system.parameters
         if p.shear_traction and not isinstance(y, StageFailed):
-            y = self._sheared(fast, shear_stage(system, settings, film), y, begin=begin)
+            stage = shear_stage(system, settings, film)
+            y = self._sheared(fast, stage, y, onward=onward, begin=begin)
         if not isinstance(y, StageFailed):
             left = tuple(u for u in p.speeds if u <= film.speed)
             stage = speed_stage(system, settings, film, left, on_speed)
@@ -156,12 +166,21 @@ class FilmPath:
                 return self._slower_in_corner(film, sheared, left, on_speed)
         return y if isinstance(y, StageFailed) else None
 
-    def _sheared(self, fast: FastFilm, stage: Stage, x: Array, *, begin: bool = False) -> Followed:
+    def _sheared(
+        self,
+        fast: FastFilm,
+        stage: Stage,
+        x: Array,
+        *,
+        onward: bool = False,
+        begin: bool = False,
+    ) -> Followed:
         """The shear stage from x (n,), at once if that leads there; by Newton's method from where
         the fast way ends.
 
         Where shear pulls corners of the section off the groove or into it the fast way stalls.
-        begin: whether Newton's method may also begin where the fast way did.
+        onward: whether Newton's method goes on in a corner, where it takes long; begin: and whether
+        it may also begin where the fast way did.
         """
         y = self.driver.follow(fast.shear(replace(stage, start=stage.stop)), x)
         if isinstance(y, StageFailed):
@@ -169,7 +188,7 @@ class FilmPath:
         if not isinstance(y, StageFailed):
             return y
         if self._cornered:
-            return self._onward(stage, y, self._rough, x if begin else None)
+            return self._onward(stage, y, self._rough, x if begin else None) if onward else y
         if y.branch.points and self.laboriously and self.tolerance is None:
             last = y.branch.points[-1]
             y = self.driver.follow(replace(stage, start=last.parameter), last.solution.x)

@@ -39,7 +39,8 @@ class FilmTransfer:
     def in_turn(self, on_speed: OnSpeed) -> StageFailed | None:
         """All films, as far as they lead from one to the next.
 
-        By modified Newton iterations, and where these fail with pressures of the section that lag.
+        By modified Newton iterations, and where these fail with pressures of the section that lag;
+        patiently if there is no film yet from which the speed may fall.
         """
         path = self.path
         left = tuple(sorted(self.known.films, reverse=True))
@@ -58,7 +59,7 @@ class FilmTransfer:
             if left:
                 slower = replace(film, speed=left[0])
                 failed = self._lagged(slower, reached[-1], keep)
-                if failed and lies_in_corner(path.system):
+                if failed and reached[-1][0] is None and lies_in_corner(path.system):
                     failed = self._lagged(slower, reached[-1], keep, patiently=True)
                 if failed:
                     return failed

@@ -75,6 +75,8 @@ class StrokeStart:
                 return None
             if "falling speed" in failed.stage.name or path.tolerance is not None:
                 return self._here
+            if "shear" in failed.stage.name and not path.laboriously:
+                return self._here  # another mesh follows
         first: BuiltFilm | None = None
         ways = (path.fast, self._squeezed) if grooved else (self._near,)
         for way in ways:
