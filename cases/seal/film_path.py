@@ -161,7 +161,7 @@ class FilmPath:
             sheared, y = y, self.driver.follow(fast.speed(stage), y)
             if isinstance(y, StageFailed) and self._cornered:
                 if y.branch.points:
-                    sheared, last = y.branch.last.x, abs(stage.shown(y.branch.points[-1].parameter))
+                    sheared, last = y.branch.last.x, abs(stage.shown(y.reached))
                     film, left = replace(film, speed=last), below(left, last)
                 return self._slower_in_corner(film, sheared, left, on_speed)
         return y if isinstance(y, StageFailed) else None
@@ -213,7 +213,7 @@ class FilmPath:
         """From the last state of a failed stage, or else from its beginning, x (n,), if given."""
         start = stage.start
         if failed.branch.points:
-            start, x = failed.branch.points[-1].parameter, failed.branch.last.x
+            start, x = failed.reached, failed.branch.last.x
         if x is None:
             return failed
         return self.driver.follow(laborious(replace(stage, start=start), corrector), x)

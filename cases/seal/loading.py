@@ -68,7 +68,7 @@ class Loading:
         found, mu = self.follow(stage, x), system.parameters.shear_modulus
         jumps = list(_JUMPS) if system.parameters.opens else []
         while jumps and isinstance(found, StageFailed) and found.branch.points:
-            start = found.branch.points[-1].parameter + jumps.pop(0) * mu
+            start = found.reached + jumps.pop(0) * mu
             if start >= stage.stop:
                 break
             beyond = self.follow(replace(stage, start=start), found.branch.last.x)

@@ -125,8 +125,13 @@ class StageFailed:
         goal = f"{stage.name} {stage.shown(stage.stop):.5g}"
         if not branch.points:
             return f"{goal} was not reached, not even its start"
-        reached = stage.shown(branch.points[-1].parameter)
-        return f"{goal} was not reached, only {reached:.5g}"
+        return f"{goal} was not reached, only {stage.shown(self.reached):.5g}"
+
+    @property
+    def reached(self) -> float:
+        """Parameter of the last state; of the beginning, if there is none."""
+        points = self.branch.points
+        return points[-1].parameter if points else self.stage.start
 
     @property
     def advice(self) -> str:

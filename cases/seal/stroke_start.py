@@ -105,7 +105,7 @@ class StrokeStart:
                     system, settings, offset, self.x, newton, follow, quick=path.quick
                 )
             if isinstance(y, StageFailed) and y.stage.start > y.stage.stop:
-                nearest = max(nearest, y.stage.shown(_last(y)))  # others end on the same way
+                nearest = max(nearest, y.stage.shown(y.reached))  # others end on the same way
             if not isinstance(y, StageFailed):
                 y = without_rounding(system, y)
                 yield first_film(system, replace(settings, offset=offset), self.stroke, y), y
@@ -130,12 +130,6 @@ class StrokeStart:
         near = replace(self.path.settings, offset=film.rod_offset)
         thin = thinned_film(self.path.system, near, film.stroke, x)
         return self.path.thinned(thin, x, on_speed) if thin else self.path.fast(film, x, on_speed)
-
-
-def _last(failed: StageFailed) -> float:
-    """Parameter of the last state of a stage; of its beginning, if there is none."""
-    points = failed.branch.points
-    return points[-1].parameter if points else failed.stage.start
 
 
 def _was_film(failed: StageFailed, grooved: bool) -> bool:
