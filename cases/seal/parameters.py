@@ -6,11 +6,11 @@ Units are mm, MPa, N, s.
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from softehl.cases.harness.parameters import key
 from softehl.cases.seal.catalogue import Ring
+from softehl.cases.seal.contradictions import require_consistent
 from softehl.cases.seal.fitting import fitted
 from softehl.cases.seal.oils import with_oil
 from softehl.cases.seal.regions import MATERIALS, Region, with_regions
@@ -18,7 +18,6 @@ from softehl.cases.seal.rubber import with_rubber
 from softehl.cases.seal.rubber_keys import RubberKeys
 from softehl.cases.seal.sections.keys import (
     SectionKeys,
-    is_mesh,
     lobes,
     mesh_of_file,
     surface_of,
@@ -26,16 +25,12 @@ from softehl.cases.seal.sections.keys import (
 )
 from softehl.cases.seal.shear_thinning import ThinningKeys
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness, Surfaces
-from softehl.cases.seal.tolerances import read_tolerances
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.parted_mesh import CAP
 from softehl.runtime.mesh.sections import SectionMesh
 
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
-
-_LOWEST_ESTIMATED = 3
-"""Least pressure order whose error is well below what the meshes differ by."""
 
 # strict again on the item: the list itself is lax so that a TOML array becomes a tuple
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
@@ -394,171 +389,6 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
         return speeds
 
     @model_validator(mode="after")
-    def _mesh_is_there(self) -> Self:
-        if self.mesh != "file":
-            return self
-        if not is_mesh(self.outline):
-            raise ValueError(
-                'mesh = "file" takes the mesh of a file: give outline = "seal.msh" too, or leave '
-                "mesh out"
-            )
-        if self.cap_thickness is not None:
-            raise ValueError("cap_thickness: the mesh of a file has its own regions; leave it out")
-        regions = self.file_mesh.regions
-        cells = [n for name in self.materials for n in regions.get(name, np.empty(0)).tolist()]
-        if len(cells) > len(set(cells)):
-            names = " and ".join(self.materials)
-            raise ValueError(f"materials: {names} have elements in common; an element has one")
-        return self
-
-    @model_validator(mode="after")
-    def _rubber_has_an_element(self) -> Self:
-        rubbers: tuple[RubberKeys, ...] = (self, *self.materials.values())
-        for rubber in rubbers:
-            if self.solid != "taylor_mean" and rubber.energy != "mooney_rivlin":
-                raise ValueError(
-                    f'material = "{rubber.material}" and solid = "{self.solid}": other elements '
-                    'than "taylor_mean" have "mooney-rivlin" and "neo-hooke" alone; leave solid out'
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _sensitivity_has_a_meaning(self) -> Self:
-        read_tolerances(self.tolerances, dict(self), self.ring)
-        if self.tolerances and not self.sensitivity:
-            raise ValueError(
-                "tolerances need the sensitivities of the run; set sensitivity = true "
-                "(--sensitivity)"
-            )
-        if self.sensitivity and self.rubs:
-            raise ValueError(
-                f"sensitivity = true with housing_friction = {self.housing_friction:g}: with "
-                "friction a state depends on how it was reached, and has no derivative by its "
-                "parameters alone; set housing_friction = 0"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _rule_is_rich_enough(self) -> Self:
-        points, order = self.quadrature_points, self.pressure_order
-        if points is not None and points < order:
-            raise ValueError(
-                f"quadrature_points = {points} cannot hold {order + 1} pressures of a segment "
-                f"(pressure_order = {order}); give at least {order}, or leave it out"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _film_has_its_model(self) -> Self:
-        for name, given in (
-            ("roughness", self.rough),
-            ("cavitation_pressure", self.cavitation_pressure < 0.0),
-        ):
-            if given and not self.conserving:
-                raise ValueError(f'cavitation = "penalty" knows no {name}; leave cavitation out')
-        if self.conserving and self.reynolds == "dg":
-            raise ValueError('reynolds = "dg" knows the penalty only; use "fe", or leave it out')
-        self.require_smooth_film(dg=self.reynolds == "dg", rough=self.rough)
-        return self
-
-    @model_validator(mode="after")
-    def _tolerance_has_an_estimate(self) -> Self:
-        if self.tolerance is not None and not (self.error_estimate and self.mesh == "graded"):
-            raise ValueError(
-                f"tolerance = {self.tolerance:g} needs an estimate of the error; "
-                'set error_estimate = true and mesh = "graded"'
-            )
-        if self.tolerance is not None and self.pressure_order < _LOWEST_ESTIMATED:
-            raise ValueError(
-                f"tolerance = {self.tolerance:g}: meshes do not show the error of pressure_order = "
-                f"{self.pressure_order}; use an order of at least {_LOWEST_ESTIMATED}"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _air_side_is_closed_or_open(self) -> Self:
-        gap, depth = self.extrusion_gap, 0.5 * (self.housing_diameter - self.rod_diameter)
-        if self.backup and gap:
-            raise ValueError(
-                f"backup = true and extrusion_gap = {gap:g} contradict each other: a back-up ring "
-                "closes the gap; leave one of them out"
-            )
-        if self.backup is False and not gap:
-            raise ValueError(
-                "backup = false leaves a gap whose width is not given: add extrusion_gap, 0.02 to "
-                "0.1 mm is usual, or leave backup out"
-            )
-        if gap and gap + self.corner_fillet > 0.5 * depth:
-            raise ValueError(
-                f"extrusion_gap = {gap:g} and corner_fillet = {self.corner_fillet:g} mm leave too "
-                f"little of a wall that is {depth:g} mm high; both together at most half of it"
-            )
-        if gap and self.rubs:
-            raise ValueError(
-                f"extrusion_gap = {gap:g} and housing_friction = {self.housing_friction:g}: the "
-                "edge of the gap has no friction; give one of them"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _arc_has_two_ends(self) -> Self:
-        if (self.arc_start is None) != (self.arc_end is None):
-            raise ValueError("arc_start and arc_end: give both, or none to have them found")
-        return self
-
-    @model_validator(mode="after")
-    def _section_is_one(self) -> Self:
-        self.sized(self.section_diameter)
-        if self.round:
-            if self.materials:
-                raise ValueError(
-                    'materials and cap_thickness: not for section = "round"; leave them out'
-                )
-            return self
-        _ = self.free_section
-        has = ", ".join(self.regions) or "no regions; cap_thickness makes one"
-        for name in self.materials:
-            if name not in self.regions:
-                raise ValueError(f"materials.{name}: the section has {has}")
-        for name, given in (
-            ("arc_start and arc_end", self.arc_start is not None),
-            ("extrusion_gap", self.opens),
-        ):
-            if given:
-                raise ValueError(f'{name}: for section = "round" only; leave it out')
-        if self.sensitivity and (self.outline is not None or self.cap_thickness is not None):
-            raise ValueError(
-                "sensitivity = true: not of an outline of a file, which has no dimensions, and not "
-                "of a section with a cap; leave it out"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _seal_is_squeezed(self) -> Self:
-        gap = 0.5 * (self.housing_diameter - self.rod_diameter)
-        if not 0.5 * self.section_diameter < gap < self.section_diameter:
-            raise ValueError(
-                f"the gap between rod and housing is {gap:g} mm (rod_diameter, housing_diameter); "
-                f"to squeeze the seal it must be between a half and one section_diameter, "
-                f"{0.5 * self.section_diameter:g} to {self.section_diameter:g} mm"
-            )
-        stretch = self.rod_diameter / self.inner_diameter - 1.0
-        if not -0.1 <= stretch <= 0.2:
-            raise ValueError(
-                f"rod_diameter = {self.rod_diameter:g} mm stretches inner_diameter = "
-                f"{self.inner_diameter:g} mm by {100 * stretch:.3g} %; allowed are -10 to 20 %"
-            )
-        if self.groove_width < self.axial_width:
-            what = "section_diameter" if self.round else "the width of the section"
-            raise ValueError(
-                f"groove_width = {self.groove_width:g} mm; it must be at least "
-                f"{what}, {self.axial_width:g} mm"
-            )
-        limit = 0.5 * (self.groove_width - self.axial_width)
-        if abs(self.groove_centre) > limit + 1e-9 * self.groove_width:
-            what = "round section" if self.round else "section"
-            raise ValueError(
-                f"groove_centre = {self.groove_centre:g} mm; the {what} must lie between "
-                f"the walls, {-limit:g} to {limit:g} mm"
-            )
+    def _nothing_contradicts(self) -> Self:
+        require_consistent(self)
         return self
