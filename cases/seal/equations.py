@@ -17,15 +17,12 @@ from softehl.cases.seal.section import SealSection, seal_section
 from softehl.cases.seal.system import (
     AIR_WALL,
     AXIAL,
-    BORE,
     DISPLACEMENT,
     FIELDS,
     FILM,
     PRESSURE,
     ROD,
     ROTATION,
-    SEALED_WALL,
-    SHEAR,
     VOID,
     WALLS,
     Values,
@@ -36,23 +33,20 @@ from softehl.cases.seal.system import (
     obstacles_of,
     values_at_rest,
 )
-from softehl.runtime.arrays import Array, Integers
+from softehl.cases.seal.unknowns import SealUnknowns
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem.assembly import Assembler, Memo
 from softehl.runtime.fem.contact import Obstacle, contact_data, tributary_areas
-from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
-from softehl.runtime.fem.layered import Layer
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
-from softehl.runtime.mesh.sections import SectionMesh
 
 _STEP = 0.9  # of its thickness a film may lose in an iteration
-_AT_WALL = 0.02  # of the section: as near to a wall it may come to touch it
 _ROUGH_STEP = 0.7  # of its thickness that of a rough film may change, at least by sigma
 
 
 @dataclass(frozen=True, eq=False)
-class SealSystem:
+class SealSystem(SealUnknowns):
     """A section with its unknowns and equations: everything that does not change while loads do.
 
     blocks: those that the case has. obstacles: by block name. problem: the contact problem at
@@ -61,9 +55,6 @@ class SealSystem:
     has in the groove between two lobes.
     """
 
-    parameters: ORing
-    section: SealSection
-    numbering: Numbering
     blocks: tuple[Block, ...]
     obstacles: Mapping[str, Obstacle]
     problem: Problem
@@ -125,12 +116,7 @@ class SealSystem:
         section = self.section
         return section.lowest if self.groove else section.layout.before_groove(section.mesh)
 
-    # --- the section ----------------------------------------------------------------------------
-
-    @property
-    def mesh(self) -> SectionMesh:
-        """The undeformed mesh."""
-        return self.section.mesh
+    # --- blocks -----------------------------------------------------------------------------------
 
     @property
     def solids(self) -> tuple[str, ...]:
@@ -151,79 +137,6 @@ class SealSystem:
             ]
         )
 
-    @property
-    def rod_radius(self) -> float:
-        """Radius of the rod, mm."""
-        return 0.5 * self.parameters.rod_diameter
-
-    @property
-    def rod_areas(self) -> Array:
-        """Tributary areas (arc nodes,) of the rod multipliers, mm^2."""
-        return tributary_areas(self.mesh.points, self.mesh.arc_segments, self.mesh.arc_nodes)
-
-    # --- what a vector of unknowns holds ----------------------------------------------------------
-
-    @property
-    def layout(self) -> DofLayout:
-        """The vector of unknowns, one for all stages."""
-        return self.numbering.layout
-
-    def at_rest(self) -> Array:
-        """Unknowns of the undeformed section: all zero."""
-        return np.zeros(self.layout.total)
-
-    def displacements(self, x: Array) -> Array:
-        """Displacements (V, 2) in (z, r), mm."""
-        return x[self.layout.part(DISPLACEMENT)].reshape(-1, 2)
-
-    def deformed(self, x: Array) -> Array:
-        """Deformed nodes (V, 2) in (z, r), mm."""
-        return np.asarray(self.mesh.points + self.displacements(x))
-
-    def arc_film(self, x: Array) -> tuple[Array, Array]:
-        """Positions z and distances h from the rod of the deformed arc nodes, (arc nodes,), mm."""
-        z, r = self.deformed(x)[self.mesh.arc_nodes].T
-        return z, r - self.rod_radius
-
-    def rod_multipliers(self, x: Array) -> Array:
-        """Contact multipliers (arc nodes,) of the rod, MPa; negative where it presses."""
-        return x[self.layout.part(ROD)]
-
-    def moment(self, x: Array) -> float:
-        """Moment that holds the mean rotation of the section, N mm."""
-        return float(x[self.layout.part(ROTATION)][0])
-
-    def pressure_dofs(self, field: str = PRESSURE) -> Integers:
-        """Numbers (segments, m_p + 1) of the pressure unknowns of each segment of the film."""
-        return self.numbering.rows(field, "arc")
-
-    def pressures(self, x: Array, field: str = PRESSURE) -> Array:
-        """All pressure unknowns, MPa."""
-        return x[self.layout.part(field)]
-
-    @property
-    def pressure_count(self) -> int:
-        """Number of pressure unknowns."""
-        return self.layout.count(PRESSURE)
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Numbers of unknowns, as a run records them."""
-        return {"total": self.layout.total, PRESSURE: self.pressure_count}
-
-    def wall_forces(self, x: Array) -> Array:
-        """Normal forces (nodes,) of the housing and its walls on the nodes, N."""
-        total = np.zeros(len(self.mesh.points))
-        for name, on in WALLS.items():
-            nodes, segments = self.section.chains[on]
-            areas = tributary_areas(self.mesh.points, segments, nodes)
-            total[nodes] += self.pressing(name, x) * areas
-        return total
-
-    def pressing(self, name: str, x: Array) -> Array:
-        """Nominal pressures (n,) of an obstacle on the nodes that may touch it, MPa, >= 0."""
-        return np.maximum(-x[self.layout.part(name)], 0.0)
-
     def reaction(self, name: str, x: Array) -> float:
         """Axial force of a wall on the section, the sum of normal forces on the bore, N."""
         if name == AIR_WALL and self.parameters.opens:
@@ -233,34 +146,9 @@ class SealSystem:
         areas = tributary_areas(self.mesh.points, segments, nodes)
         return float(self.pressing(name, x) @ areas)
 
-    def housing_friction(self, x: Array) -> float:
-        """Axial force of friction of the housing on the section, to the air side, N."""
-        if not self.parameters.rubs:
-            return 0.0
-        nodes, segments = self.section.chains[WALLS[BORE]]
-        areas = tributary_areas(self.mesh.points, segments, nodes)
-        return float(x[self.layout.part(SHEAR[BORE])] @ areas)
-
-    def axial_force(self, x: Array) -> float:
-        """Force that the hold exerts on the section, to the air side, N."""
-        return 0.0 - float(x[self.layout.part(AXIAL)][0])
-
-    @property
-    def film_ends(self) -> Integers:
-        """Pressure unknowns at the sealed and the air end of the film, (15), for "fe" and "dg"."""
-        return self._ends(PRESSURE)
-
     def columns(self, block: str, field: str) -> slice:
         """Where the unknowns of a field stand in the dof map of a block."""
         return self.numbering.columns(self._block(block), field)
-
-    def contact_fields(self) -> tuple[Field, ...]:
-        """The fields that contact knows: film pressures are all zero in it."""
-        return tuple(field for field in self._fields if field.on != "film")
-
-    def film_fields(self) -> tuple[Field, ...]:
-        """The fields that the film alone has."""
-        return tuple(field for field in self._fields if field.on == "film")
 
     # --- loads ------------------------------------------------------------------------------------
 
@@ -346,35 +234,6 @@ class SealSystem:
 
     # --- other systems on the same section --------------------------------------------------------
 
-    def film_layer(self, x: Array) -> Layer:
-        """The film as the layer of the modified Newton iteration, near the state x.
-
-        Displacements of the arc and the moment are shared with the section; the pressures but
-        those at the ends are the film's own, whatever else its blocks know is prescribed. Where
-        the arc is at a wall, its multipliers are shared too: without the displacements of these
-        nodes nothing would determine them.
-        """
-        start, nodes = self.layout.part(DISPLACEMENT).start, self.mesh.arc_nodes
-        moment = self.layout.dofs(ROTATION)
-        shared = np.concatenate(
-            [start + 2 * nodes, start + 2 * nodes + 1, moment, self._walls_of_arc(x)]
-        )
-        own = [self.layout.dofs(field.name) for field in self.film_fields()]
-        inner = np.concatenate(own)
-        if self.parameters.conserving:  # side by side along the film: their matrix is a band
-            inner = np.stack([pressures[1:-1] for pressures in own], axis=1).ravel()
-        inner = inner[~np.isin(inner, self.film_ends)]
-        names = [block.name for block in self.blocks if block.layer]
-        return Layer.of(self.problem.assembler, names, shared, inner)
-
-    def contact_layer(self, x: Array) -> Layer:
-        """The contact with the rod as the layer, near the state x: see `film_layer`."""
-        start, nodes = self.layout.part(DISPLACEMENT).start, self.mesh.arc_nodes
-        others = self.layout.dofs(ROTATION), self.layout.dofs(ROD), self._walls_of_arc(x)
-        shared = np.concatenate([start + 2 * nodes, start + 2 * nodes + 1, *others])
-        loads = [block.name for block in self.blocks if block.group == "load" and block.layer]
-        return Layer.of(self.problem.assembler, [ROD, *loads], shared, np.empty(0, np.int64))
-
     def with_pressure(self, name: str, order: int) -> SealSystem:
         """The system with another pressure of this order on the same film thickness, last of all
         fields; its blocks are called after it.
@@ -390,17 +249,6 @@ class SealSystem:
         (pressure,) = [field for field in self._fields if field.name == PRESSURE]
         fields = (*self._fields, replace(pressure, name=name, order=order))
         return SealSystem.of(self.parameters, self.section, fields, (*self.blocks, *film))
-
-    def _walls_of_arc(self, x: Array) -> Integers:
-        """Multipliers (n,) of the walls at those nodes of the arc that touch them or are near."""
-        found = []
-        for name in (SEALED_WALL, AIR_WALL):
-            nodes = self.section.chains[WALLS[name]][0]
-            gap = self.obstacles[name].gap(self.deformed(x)[nodes])
-            near = np.isin(nodes, self.mesh.arc_nodes)
-            near &= gap < _AT_WALL * self.parameters.section_diameter
-            found.append(self.layout.dofs(name)[near])
-        return np.concatenate(found)
 
     # --- inside -----------------------------------------------------------------------------------
 
@@ -437,19 +285,12 @@ class SealSystem:
         return {name: values[name] for name in names}
 
     @property
-    def _fields(self) -> tuple[Field, ...]:
-        return tuple(unknowns.field for unknowns in self.numbering.unknowns.values())
-
-    @property
     def _film_blocks(self) -> list[Block]:
         return [block for block in self.blocks if block.group == "film"]
 
     def _block(self, name: str) -> Block:
         (found,) = [block for block in self.blocks if block.name == name]
         return found
-
-    def _ends(self, field: str) -> Integers:
-        return self.layout.dofs(field)[[0, -1]]
 
 
 def _contact_constants(

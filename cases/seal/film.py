@@ -20,6 +20,7 @@ from softehl.cases.seal.contact import held_moment, held_place
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.grading import film_thickness
+from softehl.cases.seal.layers import film_layer
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings, Stage
@@ -194,7 +195,7 @@ class FastFilm:
         if system.parameters.conserving:
             iteration = replace(iteration, max_inner=_CAVITIES)
         corrector = SchurCorrector(linear, iteration, near=_NEAR, finish=finish)
-        return cls(system, system.film_layer(x), corrector)
+        return cls(system, film_layer(system, x), corrector)
 
     def weight(self, stage: Stage) -> Stage:
         """The stage from contact to film, to a loose tolerance: its states are not results."""

@@ -16,6 +16,7 @@ from softehl.cases.seal.contact import along, approach_stage, lies_in_corner
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.grading import inlet_length, slowest_films
+from softehl.cases.seal.layers import contact_layer
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed, laborious
 from softehl.cases.seal.pressure_newton import roughly
 from softehl.cases.seal.system import ROD
@@ -41,7 +42,7 @@ def nearing_stage(
     system: SealSystem, settings: PathSettings, offset: float, x: Array, linear: Condenser
 ) -> Stage:
     """`approach_stage` from the contact state x (n,) to an offset, mm."""
-    stage, layer = approach_stage(system, settings, offset), system.contact_layer(x)
+    stage, layer = approach_stage(system, settings, offset), contact_layer(system, x)
     corrector = SchurCorrector(linear, near=_NEAR, finish=Newton(max_iterations=1, linear=linear))
     lacking = np.asarray(system.layout.dofs(ROD))
 

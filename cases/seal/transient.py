@@ -14,6 +14,7 @@ from math import pi
 import numpy as np
 
 from softehl.cases.seal.equations import SealSystem
+from softehl.cases.seal.layers import film_layer
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.motion import Motion, RodFilm, differences
 from softehl.cases.seal.results import rough_numbers
@@ -110,7 +111,7 @@ class March:
         problem = self.system.film_problem(film)
         first = Instant(t, x, *self._content(x), self._fluxes(problem, x), np.zeros(2))
         self.behind = [first]
-        self._layer = self.system.film_layer(x)
+        self._layer = film_layer(self.system, x)
         return self._reading(problem, film, first, 0)
 
     def until(self, end: float, on_step: Callable[[Instant, Reading], None]) -> None:

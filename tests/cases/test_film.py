@@ -11,6 +11,7 @@ import pytest
 from softehl.cases.seal import film as seal_film
 from softehl.cases.seal.equations import build_system
 from softehl.cases.seal.film import METHOD, first_film
+from softehl.cases.seal.layers import film_layer
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathSettings
@@ -148,7 +149,7 @@ def test_a_film_that_ends_at_a_wall_leaves_no_multiplier_undetermined() -> None:
     film = first_film(system, PathSettings(), "out", x)
 
     def empty_rows(near: Array) -> int:
-        layered = Layered(system.film_problem(film), system.film_layer(near))
+        layered = Layered(system.film_problem(film), film_layer(system, near))
         inside = np.setdiff1d(np.arange(len(x)), layered.shared)
         rows: Array = abs(layered.body(x).tocsr()[inside][:, inside]).sum(axis=1)
         return int((np.asarray(rows).ravel() == 0.0).sum())
