@@ -21,23 +21,14 @@ from softehl.cases.seal.contact import (
 )
 from softehl.cases.seal.contact_results import unsealed
 from softehl.cases.seal.contact_store import ContactStore, stored_contact
-from softehl.cases.seal.contacts import Edge, contact_edges
-from softehl.cases.seal.drag import dragged, pushed
+from softehl.cases.seal.contacts import Edge
 from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.film_edges import between
-from softehl.cases.seal.grading import (
-    MOST_SEGMENTS,
-    PASSES,
-    graded_layout,
-    placed_layout,
-    reaches_wall,
-    slowest_films,
-    sweeps,
-)
+from softehl.cases.seal.film_layouts import FilmLayouts
+from softehl.cases.seal.grading import PASSES, graded_layout, placed_layout
 from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.loading import Loading, State
 from softehl.cases.seal.loads import Stroke
-from softehl.cases.seal.nearing import NearRod, without_rounding
+from softehl.cases.seal.nearing import NearRod
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import finer
@@ -182,57 +173,34 @@ class ContactRoute:
         """
         found: State | StageFailed = state
         for number in range(NEARER):
-            if isinstance(found, StageFailed) or not self._rod.needed(*found):
+            if isinstance(found, StageFailed):
                 break
-            near = self._rod.states(*found)
-            if isinstance(near, StageFailed):
+            layout = self._layouts.slow(*found, p)
+            if layout is None:
                 break
-            also = [edge for y in near[1:] for edge in contact_edges(found[0], y)]
-            layout = placed_layout(found[0], near[0], p, also=also)
             found = self._on(layout, p, found, PASSES + SEALS + number)
         return found
 
     def for_film(self, state: State, edges: Sequence[Edge]) -> State | StageFailed:
         """A contact state on a mesh that is fine at the edges of a film, too."""
         system, x = state
-        states = self._rod.states_or_here(system, x)
-        others = [edge for y in states[1:] for edge in contact_edges(system, y)]
-        more = between(edges, contact_edges(system, states[0]))
-        also, most = [*others, *edges, *more], 2 * MOST_SEGMENTS
-        layout = placed_layout(system, states[0], system.parameters, most, also)
-        new = build_system(system.parameters, layout)
+        new = build_system(system.parameters, self._layouts.film(system, x, edges))
         return self._loading.carried(system, x, new, "contact on the mesh of the film")
 
     def for_stroke(self, stroke: Stroke, state: State) -> State | None:
         """A contact state on a mesh for what films of a stroke move; None where they do not move
         it far, or no such state is found. See `drag`.
         """
-        layout = self._for_instroke(*state) if stroke == "in" else self._for_outstroke(*state)
+        layouts = self._layouts
+        layout = layouts.instroke(*state) if stroke == "in" else layouts.outstroke(*state)
         if layout is None:
             return None
         found = self._on(layout, state[0].parameters, state, MESH_OF_STROKE[stroke])
         return None if isinstance(found, StageFailed) else found
 
-    def _for_instroke(self, system: SealSystem, x: Array) -> Layout | None:
-        """Fine where films of the instroke have their inlet, many of its lengths from contact's."""
-        y = self._rod.states_or_here(system, x)[0]
-        offset = self.settings.offset if y is x else slowest_films(system, x)[0]
-        y = without_rounding(system, y)
-        moved = dragged(system, self.settings, offset, y, self.newton.linear)
-        if not sweeps(system, y, moved):
-            return None
-        return placed_layout(system, y, system.parameters, dragged=moved)
-
-    def _for_outstroke(self, system: SealSystem, x: Array) -> Layout | None:
-        """With an arc whose end the films of the outstroke do not push against the wall."""
-        push = pushed(system, self.settings, x, self.newton.linear)
-        if not reaches_wall(system, x, push):
-            return None
-        return placed_layout(system, x, system.parameters, pushed=push)
-
     @property
-    def _rod(self) -> NearRod:
-        return NearRod(self.settings, self.follow, self.newton)
+    def _layouts(self) -> FilmLayouts:
+        return FilmLayouts(NearRod(self.settings, self.follow, self.newton))
 
     def _sealed(self, p: ORing, state: State) -> State | StageFailed:
         """On the last of the graded meshes; on more where pressure ends outside the contact."""
