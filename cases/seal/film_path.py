@@ -92,7 +92,8 @@ class FilmPath:
         failed, begin = self._falling(fast, film, y, on_speed), False
         if failed is None or isinstance(y, StageFailed):
             return failed
-        if not failed.branch.points:  # it was not steady yet
+        begins = "shear" if p.shear_traction else "falling speed"
+        if begins in failed.stage.name and not failed.branch.points:  # it was not steady yet
             steady, begin = self.driver.follow(longer(first), y), True
             y = y if isinstance(steady, StageFailed) and self._cornered else steady
             failed = self._falling(fast, film, y, on_speed)

@@ -41,6 +41,10 @@ _SOONER = 1e3
 """How much sooner, at least, a film begins that is not solved where squeezing out begins: under a
 lip that is as flat as the rod it is thicker than the gap that contact leaves, and fills at once."""
 
+_ROUNDING = 1e-4
+"""Largest residual that rounding of the gap may leave: a film held for a time that is too short has
+no other state than the one it begins at, to all digits that the gap has."""
+
 _STEPS = StepRule(3.0, 0.05, 6.0, target_iterations=8)  # of log tau
 _CAREFUL = replace(_STEPS, largest=3.0)  # where one edge after the other lets its oil go
 
@@ -68,10 +72,11 @@ def thinning_stage(fast: FastFilm, film: FilmLoads, x: Array) -> tuple[Stage, Ar
     p = system.parameters
     unit = inlet_time(p, edge, film.speed)
     hold = gap_masses(system, x)
+    first = max(_shortest(p, edge, film), _unrounded(system, film, hold, x))
     stage = Stage(
         name="contact to film",
         problem_at=lambda _: system.film_problem(film),
-        start=log(_shortest(p, edge, film) / unit),
+        start=log(first / unit),
         stop=log(_LONG),
         steps=_STEPS,
         sealed_pressure=film.sealed_pressure,
@@ -93,14 +98,24 @@ def sooner(system: SealSystem, stage: Stage, film: FilmLoads, x: Array) -> Stage
     steepest = max(
         (e for e in contact_edges(system, x) if e.rise < inf), key=lambda other: other.rise
     )
-    least = log(_shortest(p, steepest, film) / inlet_time(p, edge, film.speed))
-    return replace(stage, start=min(stage.start - log(_SOONER), least), steps=_CAREFUL)
+    unit = inlet_time(p, edge, film.speed)
+    soon = min(exp(stage.start) * unit / _SOONER, _shortest(p, steepest, film))
+    least = _unrounded(system, film, gap_masses(system, x), x)
+    return replace(stage, start=log(max(soon, least) / unit), steps=_CAREFUL)
 
 
 def _shortest(p: ORing, edge: Edge, film: FilmLoads) -> float:
     """The first tau, s, by an edge of the contact."""
     thicker = film.rod_offset / (MULTIPLE * film_thickness(p, [edge], film.speed))
     return _SHORT * inlet_time(p, edge, film.speed) / max(thicker, 1.0) ** 3
+
+
+def _unrounded(system: SealSystem, film: FilmLoads, hold: csc_array[np.float64], x: Array) -> float:
+    """Least tau, s, by `_ROUNDING`. hold: see `gap_masses`."""
+    problem = system.film_problem(film)
+    rounding = hold @ np.spacing(np.abs(x))
+    rounding[problem.fixed] = 0.0
+    return problem.norm(rounding) / _ROUNDING
 
 
 def longer(stage: Stage) -> Stage:

@@ -73,6 +73,23 @@ def test_a_film_that_is_not_solved_at_its_first_time_begins_sooner() -> None:
     assert sooner(system, stage, film, gentle).start < stage.start - log(1e4)
 
 
+def test_a_film_does_not_begin_where_rounding_is_all_that_moves() -> None:
+    """The film of a thin oil is so much thinner than the gap that it would begin at once."""
+    system, x = contact()
+    p = system.parameters.model_copy(update={"viscosity": 1e-11})
+    system = system.moved(p, system.section)
+    film = thinned_film(system, SETTINGS, "out", x)
+    linear = PathDriver(Silent()).newton.linear
+    assert film is not None
+    assert isinstance(linear, Condenser)
+    stage, start = thinning_stage(FastFilm.of(system, linear, x), film, x)
+    assert sooner(system, stage, film, x).start == stage.start
+    for earlier, status in ((0.0, Status.CONVERGED), (9.0, Status.DIVERGED)):
+        assert stage.corrector
+        solution = stage.corrector.solve(stage.problem_at(stage.start - earlier), start)
+        assert solution.status is status
+
+
 def relaxed(tau: float) -> tuple[Relaxed, Array]:
     """The problem of a time over that of the inlet, and the start of the path."""
     fast, film = thin(loads())
