@@ -25,6 +25,7 @@ from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
 
 _CORNERED = 2.0  # shear moduli
+_STALLED = 1e-2
 
 WEDGED = 2
 """Nodes that touch each wall where the groove holds the section without help."""
@@ -247,6 +248,14 @@ def lies_in_corner(system: SealSystem) -> bool:
     """Whether the sealed pressure holds a round section in the corner between rod and wall."""
     p = system.parameters
     return not system.section.layout.flat and p.sealed_pressure > _CORNERED * p.shear_modulus
+
+
+def stalls(system: SealSystem) -> float:
+    """Residual from which Newton's method goes on where modified iterations do not.
+
+    In a corner nodes of the section touch and leave the walls from one iterate to the next.
+    """
+    return _STALLED if lies_in_corner(system) else 0.0
 
 
 def along(system: SealSystem, newton: Newton) -> Corrector | None:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.cases.seal.coarser_films import CoarserFilms
-from softehl.cases.seal.contact import held_moment, held_place
+from softehl.cases.seal.contact import held_moment, held_place, stalls
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.grading import film_thickness
@@ -194,7 +194,9 @@ class FastFilm:
         iteration = ModifiedNewton()
         if system.parameters.conserving:
             iteration = replace(iteration, max_inner=_CAVITIES)
-        corrector = SchurCorrector(linear, iteration, near=_NEAR, finish=finish)
+        corrector = SchurCorrector(
+            linear, iteration, near=_NEAR, finish=finish, stalled=stalls(system)
+        )
         return cls(system, film_layer(system, x), corrector)
 
     def weight(self, stage: Stage) -> Stage:

@@ -84,6 +84,9 @@ class FilmPath:
             y = self.driver.follow(sooner(self.system, first, film, x), start)
         if isinstance(y, StageFailed) and self._cornered:
             y = self._onward(first, y, roughly(self.driver.newton))
+            if not isinstance(y, StageFailed):  # which the fast way did not see
+                fast = self.modified(y) or fast
+                first, _ = thinning_stage(fast, film, x)
         thick = _POCKET * film_thickness(p, contact_edges(self.system, x), film.speed)
         if not isinstance(y, StageFailed) and self._traps(film, x, y, thick):
             y = StageFailed(first, Branch((), Status.DIVERGED, "oil is trapped"))
@@ -109,7 +112,11 @@ class FilmPath:
             return None
         if not self._cornered or (found and self.tolerance is not None):
             return failed
-        return self._falling(fast, film, y, on_speed, onward=True, begin=begin)
+        stage = shear_stage(self.system, self.settings, film)
+        sheared = self._onward(stage, failed, self._rough, y if begin else None)
+        if isinstance(sheared, StageFailed):
+            return sheared
+        return self._fallen(self.modified(sheared) or fast, film, sheared, on_speed)
 
     def _slower_first(self, film: FilmLoads, y: Array, on_speed: OnSpeed) -> StageFailed | None:
         """Films from slower ones than the first, y (n,), on: they have less shear stress.
@@ -146,16 +153,21 @@ class FilmPath:
         on_speed: OnSpeed,
         *,
         onward: bool = False,
-        begin: bool = False,
     ) -> StageFailed | None:
         """From the first film y (n,), if there is one, to shear, then to falling speed.
 
-        onward, begin: see `_sheared`.
+        onward: see `_sheared`.
         """
+        if self.system.parameters.shear_traction and not isinstance(y, StageFailed):
+            stage = shear_stage(self.system, self.settings, film)
+            y = self._sheared(fast, stage, y, onward=onward)
+        return self._fallen(fast, film, y, on_speed)
+
+    def _fallen(
+        self, fast: FastFilm, film: FilmLoads, y: Followed, on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """From a film y (n,) with its shear stress, if there is one, to falling speed."""
         system, settings, p = self.system, self.settings, self.system.parameters
-        if p.shear_traction and not isinstance(y, StageFailed):
-            stage = shear_stage(system, settings, film)
-            y = self._sheared(fast, stage, y, onward=onward, begin=begin)
         if not isinstance(y, StageFailed):
             left = tuple(u for u in p.speeds if u <= film.speed)
             stage = speed_stage(system, settings, film, left, on_speed)
@@ -167,21 +179,12 @@ class FilmPath:
                 return self._slower_in_corner(film, sheared, left, on_speed)
         return y if isinstance(y, StageFailed) else None
 
-    def _sheared(
-        self,
-        fast: FastFilm,
-        stage: Stage,
-        x: Array,
-        *,
-        onward: bool = False,
-        begin: bool = False,
-    ) -> Followed:
+    def _sheared(self, fast: FastFilm, stage: Stage, x: Array, *, onward: bool = False) -> Followed:
         """The shear stage from x (n,), at once if that leads there; by Newton's method from where
         the fast way ends.
 
         Where shear pulls corners of the section off the groove or into it the fast way stalls.
-        onward: whether Newton's method goes on in a corner, where it takes long; begin: and whether
-        it may also begin where the fast way did.
+        onward: whether Newton's method goes on in a corner, where it takes long.
         """
         y = self.driver.follow(fast.shear(replace(stage, start=stage.stop)), x)
         if isinstance(y, StageFailed):
@@ -189,7 +192,7 @@ class FilmPath:
         if not isinstance(y, StageFailed):
             return y
         if self._cornered:
-            return self._onward(stage, y, self._rough, x if begin else None) if onward else y
+            return self._onward(stage, y, self._rough) if onward else y
         if y.branch.points and self.laboriously and self.tolerance is None:
             last = y.branch.points[-1]
             y = self.driver.follow(replace(stage, start=last.parameter), last.solution.x)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from softehl.cases.seal.contact import along, approach_stage, lies_in_corner
+from softehl.cases.seal.contact import along, approach_stage, lies_in_corner, stalls
 from softehl.cases.seal.contacts import contact_edges
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.grading import inlet_length, slowest_films
@@ -43,7 +43,8 @@ def nearing_stage(
 ) -> Stage:
     """`approach_stage` from the contact state x (n,) to an offset, mm."""
     stage, layer = approach_stage(system, settings, offset), contact_layer(system, x)
-    corrector = SchurCorrector(linear, near=_NEAR, finish=Newton(max_iterations=1, linear=linear))
+    finish, stalled = Newton(max_iterations=1, linear=linear), stalls(system)
+    corrector = SchurCorrector(linear, near=_NEAR, finish=finish, stalled=stalled)
     lacking = np.asarray(system.layout.dofs(ROD))
 
     def problem_at(t: float) -> Propped:

@@ -13,6 +13,7 @@ from softehl.runtime.solve.solution import Solution, Status
 
 _NEAR_ROUNDING = 10.0  # times the tolerance, or what rounding may make of it
 _FINISHING_STEPS = 3  # exact Newton steps after an iteration that ended near the solution
+_STALLED_STEPS = 8  # and after one that ended where it does not go on
 
 
 @dataclass(eq=False)
@@ -54,7 +55,9 @@ class SchurCorrector:
     too slow gets up to `renewals` new ones: made at its last iterate and continued from there if
     the residual is at most `near`, else made at the last solution and begun again. finish: exact
     Newton steps where rounding keeps the modified iteration from the tolerance before it would
-    keep Newton's method.
+    keep Newton's method. stalled: residual from which Newton's method goes on where new
+    condensations do not help, as where contact elsewhere on the body comes and goes from one
+    iterate to the next.
     """
 
     linear: Condenser
@@ -63,6 +66,7 @@ class SchurCorrector:
     near: float = 0.0
     renewals: int = 2
     finish: Newton | None = None
+    stalled: float = 0.0
     tangent: StaleTangent = field(default_factory=StaleTangent)
 
     def with_tolerance(self, tolerance: float) -> SchurCorrector:
@@ -80,6 +84,8 @@ class SchurCorrector:
             solution = self._refined(problem, solution)
         elif self._limited_by_rounding(solution):
             solution = self._finished(problem, solution)
+        elif self._stalled(solution):
+            solution = self._finished(problem, solution, self.iteration.tolerance, _STALLED_STEPS)
         if solution.converged:
             tangent.accepted = solution.x
             tangent.outdated = rate > self.stale
@@ -132,6 +138,11 @@ class SchurCorrector:
         limit = _NEAR_ROUNDING * iteration.stagnation * iteration.tolerance
         return failed and rounding and solution.residual_norms[-1] <= limit
 
+    def _stalled(self, solution: Solution) -> bool:
+        """Whether a slow iteration ended so near that Newton's method can go on."""
+        failed = solution.status in (Status.MAX_ITERATIONS, Status.DIVERGED)
+        return failed and self.finish is not None and solution.residual_norms[-1] <= self.stalled
+
     def _refined(self, problem: LayeredProblem, solution: Solution) -> Solution:
         """The solution, after exact Newton steps if rounding kept it from the tolerance."""
         norms = solution.residual_norms
@@ -142,10 +153,22 @@ class SchurCorrector:
             return _continued(solution, exact)
         return _continued(solution, exact, solution.x)
 
-    def _finished(self, problem: LayeredProblem, solution: Solution) -> Solution:
-        """The solution that exact Newton steps reach by their own rules, else the failure."""
+    def _finished(
+        self,
+        problem: LayeredProblem,
+        solution: Solution,
+        tolerance: float | None = None,
+        steps: int = _FINISHING_STEPS,
+    ) -> Solution:
+        """The solution that exact Newton steps reach by their own rules, else the failure.
+
+        tolerance: None for that of `finish`.
+        """
         assert self.finish is not None
-        exact = replace(self.finish, max_iterations=_FINISHING_STEPS).solve(problem, solution.x)
+        finish = replace(self.finish, max_iterations=steps)
+        if tolerance is not None:
+            finish = replace(finish, tolerance=tolerance)
+        exact = finish.solve(problem, solution.x)
         if not exact.converged:
             return _continued(solution, exact, solution.x)
         return replace(_continued(solution, exact), status=exact.status, message=exact.message)

@@ -370,6 +370,42 @@ def test_newton_ends_what_rounding_holds_up(error: float, converged: bool) -> No
         assert solution.residual_norms[-1] <= 1e-7
 
 
+class Walled(Chain):
+    """A chain with a stiff wall at a node of its body, which no condensation has seen."""
+
+    stiffness, node = 50.0, 3
+
+    def residual(self, x: Array) -> Array:
+        r = super().residual(x)
+        r[self.node] += self.stiffness * (max(x[self.node], 0.0) - max(self._place(), 0.0))
+        return r
+
+    def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
+        r, A = super().linearise(x)
+        wall = np.zeros(N)
+        wall[self.node] = self.stiffness * (x[self.node] > 0.0)
+        return r, csc_array(A + csc_array(np.diag(wall)))
+
+    def _place(self) -> float:
+        return float(answer(self.load)[self.node])
+
+
+@pytest.mark.parametrize(("stalled", "converged"), [(0.0, False), (1e-9, False), (1e2, True)])
+def test_newton_goes_on_where_a_wall_of_the_body_stalls_the_iteration(
+    stalled: float, converged: bool
+) -> None:
+    problem = Walled(-1.0)  # the node touches the wall at the answer
+    assert answer(-1.0)[Walled.node] > 0.0
+    finish = Newton(max_iterations=1)
+    solution = SchurCorrector(SuperLU(), near=1e3, finish=finish, stalled=stalled).solve(
+        problem, 0.9 * answer(-1.0)
+    )
+    assert solution.converged is converged
+    if converged:
+        assert solution.x == pytest.approx(answer(-1.0), abs=1e-8)
+        assert solution.factorisations > 3  # with those of what stalled
+
+
 def test_rounding_does_not_outdate_a_condensation() -> None:
     corrector = SchurCorrector(SuperLU(), ModifiedNewton(), finish=Newton(max_iterations=1))
     first = corrector.solve(Rough(), np.zeros(N))
