@@ -50,7 +50,7 @@ def reynolds_segment(name: str = "film", law: rheology.Law = rheology.newtonian)
     nodal_h = nodal_thickness(m, X, u, R_rod)
     h = m.define("h", shapes.interpolate(N, nodal_h), interface=True)
     r = m.define("r", R_rod + h)
-    slope = m.define("slope", p_xi / z_xi)
+    slope = m.define("slope", p_xi / along(m, z_xi, r_xi))
     eta = m.define("eta", viscosity(eta_0, alpha, p))
     middle, driving = flow("", U, h, eta, slope)
     q = m.define("q", flux(U, h, conductance(h, eta), driving))
@@ -81,6 +81,17 @@ def reynolds_segment(name: str = "film", law: rheology.Law = rheology.newtonian)
     )
     m.offer(pseudo_load=True, fields_rate=True)
     return m.finish()
+
+
+def along(m: Model, z_xi: sp.Symbol, r_xi: sp.Symbol) -> sp.Symbol:
+    """Half the length of a segment along the rod; its own where it stands upright.
+
+    In a film it is z_xi but for the tenth power of its slope. A segment on a wall has no length
+    along the rod, and beyond it a negative one: oil is to meet a resistance there, not an infinite
+    one of either sign.
+    """
+    upright = r_xi**2 / (z_xi**2 + r_xi**2)
+    return m.define("along", sp.sqrt(z_xi**2 + r_xi**2 * upright**4))
 
 
 def viscosity(eta_0: Any, alpha: Any, p: Any) -> Any:

@@ -10,8 +10,13 @@ from softehl.runtime.arrays import Array, Flags, Integers
 
 
 def element_means(values: Array, weights: Array) -> Array:
-    """Weighted mean (n,) over the points of each element; values and weights (n, points)."""
-    return np.asarray((values * weights).sum(axis=1) / weights.sum(axis=1))
+    """Weighted mean (n,) over the points of each element; values and weights (n, points).
+
+    The mean itself where the weights are zero, as along the rod on a segment that stands upright.
+    """
+    total = weights.sum(axis=1)
+    sums, means = (values * weights).sum(axis=1), values.mean(axis=1)
+    return np.asarray(np.divide(sums, total, out=means, where=total != 0.0))
 
 
 def relative_spread(values: Array) -> float:

@@ -213,3 +213,30 @@ def test_weights_scale_the_tractions_and_leave_the_reynolds_rows() -> None:
     np.testing.assert_allclose(results[0.3, 1.0][:count], 0.3 * full[:count], rtol=1e-13)
     np.testing.assert_allclose(results[1.0, 0.0][1:count:2], full[1:count:2], rtol=1e-13)
     assert np.abs(results[1.0, 0.0][0:count:2] - full[0:count:2]).max() > 1e-6
+
+
+def resisting(degrees: float, length: float = 1e-3) -> float:
+    """Flux between the ends of a segment at a slope for a unit difference of pressures, U = 0."""
+    middle, half = 0.02, 0.5 * length * np.array([np.cos(a := np.radians(degrees)), np.sin(a)])
+    nodes = np.array([[-half[0], ROD + middle - half[1], half[0], ROD + middle + half[1]]])
+    parameters = (ROD, 0.0, 1e-8, 0.0, 0.0, 0.0, 0.0)
+    part = Part("film", nodes, np.arange(6)[None], parameters, rule=rules.film_rule(1))
+    rows, _ = part.elements(np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]))
+    return -float(rows[0, 4])
+
+
+def test_a_gentle_segment_is_as_long_as_the_rod_says() -> None:
+    """Along the rod its length is the cosine's, but for the tenth power of its slope."""
+    for degrees in (1.0, 5.0, 10.0):
+        angle = np.radians(degrees)
+        wedge = 1.0 + (0.5e-3 * np.sin(angle) / 0.02) ** 2  # mean of h^3 over that of a level one
+        ratio = resisting(degrees) * np.cos(angle) / (wedge * resisting(0.0))
+        assert ratio == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_segment_on_a_wall_resists_like_any_other() -> None:
+    """Upright, and a little beyond, where its length along the rod is zero and negative."""
+    beyond = [resisting(a) for a in (80.0, 89.9, 90.0, 90.1, 100.0)]
+    assert min(beyond) > 0.0
+    assert max(beyond) < 1.2 * min(beyond)
+    assert beyond[2] == pytest.approx(resisting(0.0), rel=1e-3)

@@ -59,7 +59,7 @@ def film_points(
         r = one * r1 + two * r2
         h = r - rod_radius
         p = mp.fdot(basis, pressures)
-        slope = mp.fdot(slopes, pressures) / half_z
+        slope = mp.fdot(slopes, pressures) / _along(half_z, half_r)
         eta = eta_0 * mp.exp(alpha * p)
         middle, driving = thinned(speed, h, eta, slope, parameters[7:])
         yield FilmPoint(
@@ -80,6 +80,12 @@ def film_points(
             driving=driving,
             n_ds=(weight * half_r, -weight * half_z),
         )
+
+
+def _along(half_z: Number, half_r: Number) -> Number:
+    """Half the length along the rod; towards that of the segment itself where it stands upright."""
+    sine = half_r / mp.hypot(half_z, half_r)
+    return mp.hypot(half_z, half_r * sine**4)
 
 
 def residual_film(

@@ -20,6 +20,11 @@ def test_element_means_use_the_weights() -> None:
     assert means.tolist() == [1.5, 2.0]
 
 
+def test_element_means_without_weights_are_those_of_the_points() -> None:
+    means = element_means(np.array([[1.0, 3.0], [2.0, 4.0]]), np.array([[0.0, 0.0], [1.0, 3.0]]))
+    assert means.tolist() == [2.0, 3.5]
+
+
 def test_relative_spread() -> None:
     assert relative_spread(np.array([-9.0, -11.0, -10.0])) == pytest.approx(0.2)
     assert relative_spread(np.zeros(3)) == 0.0
