@@ -28,7 +28,7 @@ from softehl.cases.seal.grading import PASSES, graded_layout, placed_layout
 from softehl.cases.seal.layout import Layout
 from softehl.cases.seal.loading import Loading, State
 from softehl.cases.seal.loads import Stroke
-from softehl.cases.seal.nearing import NearRod
+from softehl.cases.seal.nearing import LastNear, NearRod
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.refinement import finer
@@ -59,7 +59,8 @@ class ContactRoute:
     """Routes to a contact state.
 
     follow: solves a stage from a start. newton: corrector of stored states. contacts: states of
-    uniform meshes that runs leave for each other. trail: what is kept of the last path.
+    uniform meshes that runs leave for each other. trail: what is kept of the last path. near: and
+    of the last states with the rod near.
     """
 
     settings: PathSettings
@@ -67,6 +68,7 @@ class ContactRoute:
     newton: Newton = field(default_factory=Newton)
     contacts: ContactStore = field(default_factory=ContactStore)
     trail: Trail = field(default_factory=Trail)
+    near: LastNear = field(default_factory=LastNear)
 
     def contact(self, p: ORing) -> State | StageFailed:
         """The system of a case, uniform or graded, and its unknowns in contact under p_s."""
@@ -200,7 +202,7 @@ class ContactRoute:
 
     @property
     def _layouts(self) -> FilmLayouts:
-        return FilmLayouts(NearRod(self.settings, self.follow, self.newton))
+        return FilmLayouts(NearRod(self.settings, self.follow, self.newton, self.near))
 
     def _sealed(self, p: ORing, state: State) -> State | StageFailed:
         """On the last of the graded meshes; on more where pressure ends outside the contact."""

@@ -29,7 +29,7 @@ from softehl.cases.seal.path import (
 from softehl.cases.seal.pockets import fed, traps
 from softehl.cases.seal.pressure_newton import roughly
 from softehl.cases.seal.results import film_numbers
-from softehl.cases.seal.thinning import longer, sooner, thinning_stage
+from softehl.cases.seal.thinning import longer, settled, sooner, thinning_stage
 from softehl.cases.seal.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
@@ -76,32 +76,64 @@ class FilmPath:
 
     def thinned(self, film: FilmLoads, x: Array, on_speed: OnSpeed) -> StageFailed | None:
         """All films of a stroke, the first by squeezing out what is in contact at x; see `fast`."""
-        fast, p = self.modified(x), self.system.parameters
+        fast, first, y = self._squeezed(film, x)
+        if isinstance(y, StageFailed):
+            return y
+        if self.system.parameters.shear_traction:
+            film = replace(film, shear=1.0)
+        failed = self._falling(fast, film, y, on_speed)
+        ways = (self._longer, self._at_rest) if self._cornered and film.shear else (self._longer,)
+        for steady in ways:
+            if not _not_begun(failed, film):
+                break
+            z = steady(first, film, y)
+            if not isinstance(z, StageFailed):
+                y, fast = z, (self.modified(z) or fast) if self._cornered else fast
+                failed = self._falling(fast, film, y, on_speed)
+            elif not self._cornered:
+                return z
+        if failed is None or "shear" not in failed.stage.name:
+            return failed
+        return self._sheared_slower(fast, film, y, failed, on_speed)
+
+    def _squeezed(self, film: FilmLoads, x: Array) -> tuple[FastFilm, Stage, Followed]:
+        """The first film, squeezed out from the contact state x (n,); its stage, and what goes on
+        from it.
+        """
+        fast = self.modified(x)
         assert fast
         first, start = thinning_stage(fast, film, x)
         y = self.driver.follow(first, start)
         if isinstance(y, StageFailed) and not y.branch.points:
             y = self.driver.follow(sooner(self.system, first, film, x), start)
         if isinstance(y, StageFailed) and self._cornered:
-            y = self._onward(first, y, roughly(self.driver.newton))
-            if not isinstance(y, StageFailed):  # which the fast way did not see
+            z = self._onward(first, y, roughly(self.driver.newton))
+            y = next((late for late in (settled(z), settled(y)) if late is not None), z)
+            if not isinstance(y, StageFailed):  # which the fast way has not seen
                 fast = self.modified(y) or fast
                 first, _ = thinning_stage(fast, film, x)
-        thick = _POCKET * film_thickness(p, contact_edges(self.system, x), film.speed)
+        edges = contact_edges(self.system, x)
+        thick = _POCKET * film_thickness(self.system.parameters, edges, film.speed)
         if not isinstance(y, StageFailed) and self._traps(film, x, y, thick):
             y = StageFailed(first, Branch((), Status.DIVERGED, "oil is trapped"))
-        if p.shear_traction:
-            film = replace(film, shear=1.0)
-        failed, begin = self._falling(fast, film, y, on_speed), False
-        if failed is None or isinstance(y, StageFailed):
-            return failed
-        begins = "shear" if p.shear_traction else "falling speed"
-        if begins in failed.stage.name and not failed.branch.points:  # it was not steady yet
-            steady, begin = self.driver.follow(longer(first), y), True
-            y = y if isinstance(steady, StageFailed) and self._cornered else steady
-            failed = self._falling(fast, film, y, on_speed)
-        if failed is None or isinstance(y, StageFailed) or "shear" not in failed.stage.name:
-            return failed
+        return fast, first, y
+
+    def _longer(self, first: Stage, film: FilmLoads, y: Array) -> Followed:
+        """A film y (n,) that is not steady, squeezed out for longer."""
+        return self.driver.follow(longer(first), y)
+
+    def _at_rest(self, first: Stage, film: FilmLoads, y: Array) -> Followed:
+        """The steady film without shear by Newton's method."""
+        stage = shear_stage(self.system, self.settings, film)
+        return self.driver.follow(laborious(replace(stage, stop=stage.start), self._rough), y)
+
+    def _sheared_slower(
+        self, fast: FastFilm, film: FilmLoads, y: Array, failed: StageFailed, on_speed: OnSpeed
+    ) -> StageFailed | None:
+        """Films of a stroke whose first one, y (n,), does not bear its shear stress.
+
+        Slower ones first; then Newton's method goes on where the shear stage failed.
+        """
         found = list[float]()
 
         def tell(at: FilmLoads, point: Point) -> None:
@@ -112,8 +144,7 @@ class FilmPath:
             return None
         if not self._cornered or (found and self.tolerance is not None):
             return failed
-        stage = shear_stage(self.system, self.settings, film)
-        sheared = self._onward(stage, failed, self._rough, y if begin else None)
+        sheared = self._onward(shear_stage(self.system, self.settings, film), failed, self._rough)
         if isinstance(sheared, StageFailed):
             return sheared
         return self._fallen(self.modified(sheared) or fast, film, sheared, on_speed)
@@ -211,16 +242,12 @@ class FilmPath:
         newton = replace(self.driver.newton, max_iterations=_LABORIOUS)
         return along(self.system, roughly(newton))
 
-    def _onward(
-        self, stage: Stage, failed: StageFailed, corrector: Corrector | None, x: Array | None = None
-    ) -> Followed:
-        """From the last state of a failed stage, or else from its beginning, x (n,), if given."""
-        start = stage.start
-        if failed.branch.points:
-            start, x = failed.reached, failed.branch.last.x
-        if x is None:
+    def _onward(self, stage: Stage, failed: StageFailed, corrector: Corrector | None) -> Followed:
+        """From the last state of a failed stage, if there is one."""
+        if not failed.branch.points:
             return failed
-        return self.driver.follow(laborious(replace(stage, start=start), corrector), x)
+        way = laborious(replace(stage, start=failed.reached), corrector)
+        return self.driver.follow(way, failed.branch.last.x)
 
     def onward(
         self, film: FilmLoads, x: Array, speeds: tuple[float, ...], on_speed: OnSpeed
@@ -317,6 +344,12 @@ class FilmPath:
                 return y
             x = y
         return None
+
+
+def _not_begun(failed: StageFailed | None, film: FilmLoads) -> bool:
+    """Whether what follows the first film failed at its start: it was not steady yet."""
+    begins = "shear" if film.shear else "falling speed"
+    return failed is not None and begins in failed.stage.name and not failed.branch.points
 
 
 def _untold(film: FilmLoads, point: Point) -> None:

@@ -8,7 +8,7 @@ contact of the arc as the layer these changes concern a small matrix only.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -97,16 +97,27 @@ def rod_brought_near(
     return follow(replace(stage, corrector=along(system, newton)), x)
 
 
+@dataclass
+class LastNear:
+    """The contact state that was last asked for its states near the rod, and these."""
+
+    system: SealSystem | None = None
+    x: Array | None = None
+    states: list[Array] | StageFailed = field(default_factory=list)
+
+
 @dataclass(frozen=True)
 class NearRod:
     """Contact states with the rod where slow films have it, for the meshes of these films.
 
-    follow: solves a stage from a start.
+    follow: solves a stage from a start. last: what was found last, or why nothing was: the meshes
+    of both strokes begin with what the one before them ended with.
     """
 
     settings: PathSettings
     follow: Callable[[Stage, Array], Followed]
     newton: Newton
+    last: LastNear = field(default_factory=LastNear)
 
     def needed(self, system: SealSystem, x: Array) -> bool:
         """Whether the edges of the contact x (n,) move by inlets when the rod comes nearer."""
@@ -118,6 +129,13 @@ class NearRod:
 
     def states(self, system: SealSystem, x: Array) -> list[Array] | StageFailed:
         """From the contact state x (n,), that of the thinnest film first."""
+        last = self.last
+        if last.system is not system or last.x is None or not np.array_equal(last.x, x):
+            last.system, last.x, last.states = system, x, self._states(system, x)
+        return last.states
+
+    def _states(self, system: SealSystem, x: Array) -> list[Array] | StageFailed:
+        """See `states`."""
         found = list[Array]()
         for offset in slowest_films(system, x):
             near = self._neared(system, offset, x)

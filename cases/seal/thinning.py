@@ -23,7 +23,7 @@ from softehl.cases.seal.film import FastFilm, film_on, start_speed, stays
 from softehl.cases.seal.grading import MULTIPLE, film_thickness, inlet_time
 from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathSettings, Stage
+from softehl.cases.seal.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.system import DISPLACEMENT
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.rules import content_rule, pressure_nodes
@@ -37,6 +37,9 @@ _LONGER = 1e9
 """The same where the film is not steady by then: above three shear moduli the pressure hardly rises
 from the flatter edge, and what is held off there takes long to leave."""
 
+_SETTLED = 1e2
+"""The same after which a film may be steady but for what is held off far from its way."""
+
 _SOONER = 1e3
 """How much sooner, at least, a film begins that is not solved where squeezing out begins: under a
 lip that is as flat as the rod it is thicker than the gap that contact leaves, and fills at once."""
@@ -44,6 +47,8 @@ lip that is as flat as the rod it is thicker than the gap that contact leaves, a
 _ROUNDING = 1e-4
 """Largest residual that rounding of the gap may leave: a film held for a time that is too short has
 no other state than the one it begins at, to all digits that the gap has."""
+
+_NO_WIDTH = 1e-6
 
 _STEPS = StepRule(3.0, 0.05, 6.0, target_iterations=8)  # of log tau
 _CAREFUL = replace(_STEPS, largest=3.0)  # where one edge after the other lets its oil go
@@ -123,6 +128,14 @@ def longer(stage: Stage) -> Stage:
     return replace(stage, start=stage.stop, stop=log(_LONGER))
 
 
+def settled(thinned: Followed) -> Array | None:
+    """The last film (n,) of squeezing, if it was squeezed for so long that it may be steady."""
+    if not isinstance(thinned, StageFailed):
+        return thinned
+    late = thinned.branch.points and thinned.reached >= log(_SETTLED)
+    return thinned.branch.last.x if late else None
+
+
 def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
     """The contact state x (n,) with a film that has the pressures of the contact."""
     y, nodes = x.copy(), system.mesh.arc_nodes
@@ -134,7 +147,8 @@ def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
     sealed[:low] = p_s
     if 0 < low < len(dz):
         sealed[low] = p_s * dz[low - 1] / (dz[low - 1] + dz[low])
-    pressures = force / (2.0 * pi * r * width) + sealed
+    long = width > _NO_WIDTH * width.max()  # a node between segments on a wall has none
+    pressures = np.where(long, force / (2.0 * pi * r * np.where(long, width, 1.0)), 0.0) + sealed
     rows = system.pressure_dofs()
     y[rows] = np.stack([pressures[:-1], pressures[1:]], axis=1) @ _shapes(rows.shape[1] - 1).T
     return y

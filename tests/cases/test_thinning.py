@@ -18,13 +18,19 @@ from softehl.cases.seal.film import METHOD, FastFilm, shear_stage
 from softehl.cases.seal.film_path import FilmPath
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.method import run
-from softehl.cases.seal.nearing import neared, nearing_stage, without_rounding
+from softehl.cases.seal.nearing import NearRod, neared, nearing_stage, without_rounding
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
 from softehl.cases.seal.state import Silent
 from softehl.cases.seal.stroke_start import StrokeStart
 from softehl.cases.seal.system import DISPLACEMENT
-from softehl.cases.seal.thinning import gap_masses, sooner, thinned_film, thinning_stage
+from softehl.cases.seal.thinning import (
+    gap_masses,
+    pressed_film,
+    sooner,
+    thinned_film,
+    thinning_stage,
+)
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.propped import Propped
 from softehl.runtime.fem.relaxed import Relaxed
@@ -88,6 +94,33 @@ def test_a_film_does_not_begin_where_rounding_is_all_that_moves() -> None:
         assert stage.corrector
         solution = stage.corrector.solve(stage.problem_at(stage.start - earlier), start)
         assert solution.status is status
+
+
+def test_what_holds_no_length_of_the_rod_has_no_pressure_of_its_own() -> None:
+    """A node between two segments on a wall: its force is on no area of the rod."""
+    system, x = contact()
+    nodes = system.mesh.arc_nodes[-3:]
+    upright = x.copy()
+    z = system.deformed(x)[nodes[0], 0]
+    system.displacements(upright)[nodes, 0] += z - system.deformed(x)[nodes, 0]
+    assert np.isfinite(pressed_film(system, upright, 3.0)).all()
+
+
+def test_states_near_the_rod_are_found_once() -> None:
+    system, x = contact()
+    asked = list[str]()
+
+    def follow(stage: Stage, start: Array) -> Followed:
+        asked.append(stage.name)
+        return PathDriver(Silent()).follow(stage, start)
+
+    rod = NearRod(SETTINGS, follow, PathDriver(Silent()).newton)
+    first, times = rod.states(system, x), len(asked)
+    assert times > 0
+    assert rod.states(system, x.copy()) is first
+    assert len(asked) == times
+    rod.states(system, x + 1e-12)  # another state
+    assert len(asked) > times
 
 
 def relaxed(tau: float) -> tuple[Relaxed, Array]:
