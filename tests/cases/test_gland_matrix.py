@@ -47,11 +47,11 @@ def test_a_ring_in_a_corner_has_its_films(number: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "speeds"), [(225, SPEEDS), (12, SPEEDS[2:])])
-def test_a_rod_that_leaves_a_corner_has_its_films(number: int, speeds: tuple[float, ...]) -> None:
-    """4.3 shear moduli, carried with patience, and 4.6, with shear stress from 10 mm/s on."""
-    found = solved(number, limit=600.0, stroke="out", speeds=speeds)
-    assert [state["verdict"] for state in found["states"]] == [OK] * len(speeds)
+@pytest.mark.parametrize("number", [225, 12])
+def test_a_rod_that_leaves_a_corner_has_its_films(number: int) -> None:
+    """4.3 shear moduli, carried with patience, and 4.6, with the end of its arc on the wall."""
+    found = solved(number, limit=600.0, stroke="out")
+    assert [state["verdict"] for state in found["states"]] == [OK] * len(SPEEDS)
 
 
 def test_the_arc_of_a_thick_film_is_made_longer() -> None:
