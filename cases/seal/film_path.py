@@ -225,8 +225,7 @@ class FilmPath:
         if self._cornered:
             return self._onward(stage, y, self._rough) if onward else y
         if y.branch.points and self.laboriously and self.tolerance is None:
-            last = y.branch.points[-1]
-            y = self.driver.follow(replace(stage, start=last.parameter), last.solution.x)
+            y = self.driver.follow(replace(stage, start=y.reached), y.branch.last.x)
         return y
 
     @property

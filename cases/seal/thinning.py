@@ -49,6 +49,7 @@ _ROUNDING = 1e-4
 no other state than the one it begins at, to all digits that the gap has."""
 
 _NO_WIDTH = 1e-6
+"""Of the widest part of the arc around a node, below which it is between segments on a wall."""
 
 _STEPS = StepRule(3.0, 0.05, 6.0, target_iterations=8)  # of log tau
 _CAREFUL = replace(_STEPS, largest=3.0)  # where one edge after the other lets its oil go
@@ -147,8 +148,8 @@ def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
     sealed[:low] = p_s
     if 0 < low < len(dz):
         sealed[low] = p_s * dz[low - 1] / (dz[low - 1] + dz[low])
-    long = width > _NO_WIDTH * width.max()  # a node between segments on a wall has none
-    pressures = np.where(long, force / (2.0 * pi * r * np.where(long, width, 1.0)), 0.0) + sealed
+    wide = width > _NO_WIDTH * width.max()
+    pressures = np.divide(force, 2.0 * pi * r * width, out=np.zeros_like(r), where=wide) + sealed
     rows = system.pressure_dofs()
     y[rows] = np.stack([pressures[:-1], pressures[1:]], axis=1) @ _shapes(rows.shape[1] - 1).T
     return y

@@ -82,10 +82,8 @@ class SchurCorrector:
         rate = self._rate(solution)
         if solution.converged:
             solution = self._refined(problem, solution)
-        elif self._limited_by_rounding(solution):
-            solution = self._finished(problem, solution)
-        elif self._stalled(solution):
-            solution = self._finished(problem, solution, self.iteration.tolerance, _STALLED_STEPS)
+        elif finish := self._going_on(solution):
+            solution = self._finished(problem, solution, finish)
         if solution.converged:
             tangent.accepted = solution.x
             tangent.outdated = rate > self.stale
@@ -138,10 +136,17 @@ class SchurCorrector:
         limit = _NEAR_ROUNDING * iteration.stagnation * iteration.tolerance
         return failed and rounding and solution.residual_norms[-1] <= limit
 
-    def _stalled(self, solution: Solution) -> bool:
-        """Whether a slow iteration ended so near that Newton's method can go on."""
+    def _going_on(self, solution: Solution) -> Newton | None:
+        """Newton's method as it goes on from a failed iteration, None where that ended too far."""
         failed = solution.status in (Status.MAX_ITERATIONS, Status.DIVERGED)
-        return failed and self.finish is not None and solution.residual_norms[-1] <= self.stalled
+        if not failed or self.finish is None:
+            return None
+        if self._limited_by_rounding(solution):
+            return replace(self.finish, max_iterations=_FINISHING_STEPS)
+        if solution.residual_norms[-1] > self.stalled:
+            return None
+        tolerance = self.iteration.tolerance
+        return replace(self.finish, max_iterations=_STALLED_STEPS, tolerance=tolerance)
 
     def _refined(self, problem: LayeredProblem, solution: Solution) -> Solution:
         """The solution, after exact Newton steps if rounding kept it from the tolerance."""
@@ -153,21 +158,8 @@ class SchurCorrector:
             return _continued(solution, exact)
         return _continued(solution, exact, solution.x)
 
-    def _finished(
-        self,
-        problem: LayeredProblem,
-        solution: Solution,
-        tolerance: float | None = None,
-        steps: int = _FINISHING_STEPS,
-    ) -> Solution:
-        """The solution that exact Newton steps reach by their own rules, else the failure.
-
-        tolerance: None for that of `finish`.
-        """
-        assert self.finish is not None
-        finish = replace(self.finish, max_iterations=steps)
-        if tolerance is not None:
-            finish = replace(finish, tolerance=tolerance)
+    def _finished(self, problem: LayeredProblem, solution: Solution, finish: Newton) -> Solution:
+        """The solution that exact Newton steps reach by their own rules, else the failure."""
         exact = finish.solve(problem, solution.x)
         if not exact.converged:
             return _continued(solution, exact, solution.x)
