@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import array
+import fcntl
 import importlib
+import os
+import stat
 import sys
+import termios
 import time
 from functools import cache
 from types import TracebackType
-from typing import Any
+from typing import Any, TextIO
 
 
 class MissingPetsc(ValueError):  # noqa: N818 (named after what it is)
@@ -15,6 +20,7 @@ class MissingPetsc(ValueError):  # noqa: N818 (named after what it is)
 
 
 _TOGETHER = 1.0  # seconds within which an error of all processes is one
+_READ = 10.0  # seconds at most until the launcher has read the line of an error
 
 
 _EXPLAINED = (ValueError, ArithmeticError, RuntimeError, OSError)
@@ -73,6 +79,7 @@ def _leave(
     if comm.size > 1 and not together:
         who = f"process {comm.rank} of {comm.size} failed, all end: "
         print(f"softehl: {who}{_line(error)}", file=sys.stderr, flush=True)
+        _await_reader(sys.stderr)
         comm.Abort(1)
     elif comm.size > 1 and comm.rank == 0 and issubclass(kind, _EXPLAINED):
         print(f"softehl: {_line(error)}", file=sys.stderr, flush=True)
@@ -86,6 +93,20 @@ def _everywhere(comm: Any) -> bool:
             return False
         time.sleep(0.01)
     return True
+
+
+def _await_reader(stream: TextIO) -> None:
+    """Wait until the launcher has read the stream, a pipe: MPI_Abort drops what is unread."""
+    unread, end = array.array("i", [0]), time.monotonic() + _READ
+    try:
+        out = stream.fileno()
+        while stat.S_ISFIFO(os.fstat(out).st_mode) and time.monotonic() < end:
+            fcntl.ioctl(out, termios.FIONREAD, unread)
+            if not unread[0]:
+                return
+            time.sleep(0.01)
+    except (OSError, ValueError):  # nothing to wait for: closed, or no file at all
+        return
 
 
 def _line(error: BaseException) -> str:
