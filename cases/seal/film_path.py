@@ -103,18 +103,17 @@ class FilmPath:
         fast = self.modified(x)
         assert fast
         first, start = thinning_stage(fast, film, x)
+        thin = film_thickness(self.system.parameters, contact_edges(self.system, x), film.speed)
         y = self.driver.follow(first, start)
         if isinstance(y, StageFailed) and not y.branch.points:
             y = self.driver.follow(sooner(self.system, first, film, x), start)
         if isinstance(y, StageFailed) and self._cornered:
-            z = self._onward(first, y, roughly(self.driver.newton))
+            z = self._onward(first, y, roughly(self.driver.newton, thin))
             y = next((late for late in (settled(z), settled(y)) if late is not None), z)
             if not isinstance(y, StageFailed):  # which the fast way has not seen
                 fast = self.modified(y) or fast
                 first, _ = thinning_stage(fast, film, x)
-        edges = contact_edges(self.system, x)
-        thick = _POCKET * film_thickness(self.system.parameters, edges, film.speed)
-        if not isinstance(y, StageFailed) and self._traps(film, x, y, thick):
+        if not isinstance(y, StageFailed) and self._traps(film, x, y, _POCKET * thin):
             y = StageFailed(first, Branch((), Status.DIVERGED, "oil is trapped"))
         return fast, first, y
 
@@ -125,7 +124,7 @@ class FilmPath:
     def _at_rest(self, first: Stage, film: FilmLoads, y: Array) -> Followed:
         """The steady film without shear by Newton's method."""
         stage = shear_stage(self.system, self.settings, film)
-        return self.driver.follow(laborious(replace(stage, stop=stage.start), self._rough), y)
+        return self.driver.follow(laborious(replace(stage, stop=stage.start), self._rough(y)), y)
 
     def _sheared_slower(
         self, fast: FastFilm, film: FilmLoads, y: Array, failed: StageFailed, on_speed: OnSpeed
@@ -144,7 +143,7 @@ class FilmPath:
             return None
         if not self._cornered or (found and self.tolerance is not None):
             return failed
-        sheared = self._onward(shear_stage(self.system, self.settings, film), failed, self._rough)
+        sheared = self._onward(shear_stage(self.system, self.settings, film), failed)
         if isinstance(sheared, StageFailed):
             return sheared
         return self._fallen(self.modified(sheared) or fast, film, sheared, on_speed)
@@ -223,7 +222,7 @@ class FilmPath:
         if not isinstance(y, StageFailed):
             return y
         if self._cornered:
-            return self._onward(stage, y, self._rough) if onward else y
+            return self._onward(stage, y) if onward else y
         if y.branch.points and self.laboriously and self.tolerance is None:
             y = self.driver.follow(replace(stage, start=y.reached), y.branch.last.x)
         return y
@@ -235,18 +234,21 @@ class FilmPath:
         """
         return self.quick and self.laboriously and lies_in_corner(self.system)
 
-    @property
-    def _rough(self) -> Corrector | None:
-        """What solves films on the way of such a section."""
+    def _rough(self, x: Array, share: float = 1.0) -> Corrector | None:
+        """What solves films on the way of such a section, as thin as so much of the film x (n,)."""
         newton = replace(self.driver.newton, max_iterations=_LABORIOUS)
-        return along(self.system, roughly(newton))
+        thinnest = share * float(self.system.arc_film(x)[1].min())
+        return along(self.system, roughly(newton, thinnest))
 
-    def _onward(self, stage: Stage, failed: StageFailed, corrector: Corrector | None) -> Followed:
+    def _onward(
+        self, stage: Stage, failed: StageFailed, corrector: Corrector | None = None
+    ) -> Followed:
         """From the last state of a failed stage, if there is one."""
         if not failed.branch.points:
             return failed
-        way = laborious(replace(stage, start=failed.reached), corrector)
-        return self.driver.follow(way, failed.branch.last.x)
+        x = failed.branch.last.x
+        way = laborious(replace(stage, start=failed.reached), corrector or self._rough(x))
+        return self.driver.follow(way, x)
 
     def onward(
         self, film: FilmLoads, x: Array, speeds: tuple[float, ...], on_speed: OnSpeed
@@ -334,7 +336,8 @@ class FilmPath:
         system, settings, newton = self.system, self.settings, self.driver.newton
         for speed in speeds:
             way = speed_stage(system, settings, film, (speed,), _untold)
-            y = self.driver.follow(laborious(way, self._rough), x)
+            thinner = (speed / film.speed) ** 0.6  # as h* is
+            y = self.driver.follow(laborious(way, self._rough(x, thinner)), x)
             film = replace(film, speed=speed)
             if not isinstance(y, StageFailed):
                 there = speed_stage(system, settings, film, (speed,), on_speed)

@@ -64,7 +64,10 @@ narrower there than half of those films."""
 
 _UPRIGHT = 85.0
 """A surface as steep as this lies on a wall. The arc ends before it: a film that rises along it has
-no length, and on a finer mesh the section may touch the wall nearer to the rod."""
+no length, and on a finer mesh the section may touch the wall nearer to the rod. Not that of films
+that pull the section off the wall: if it ends at a gap of less than _CLOSED of REACH it goes on."""
+
+_CLOSED = 0.5
 
 _FAR_SHORT, _GENTLE = 0.8, 35.0
 """An arc that ends at a gap of less than so much of what it is to have is made longer, where its
@@ -112,8 +115,8 @@ def placed_layout(
     most: segments at density 1 that it may get; a state that shows the edges only roughly is no
     reason for many. also: edges elsewhere that are to be fine too. dragged: how far the slowest
     film of the instroke moves its edge outward, mm, where that matters: the arc gets twice as many
-    segments, to be as fine wherever faster films move it to. pushed: how far the first film of the
-    outstroke moves the arc towards the wall of the air side, mm.
+    segments, to be as fine wherever faster films move it to, and goes on up the wall. pushed: how
+    far the first film of the outstroke moves the arc towards the wall of the air side, mm.
     """
     s, edges = system.section.places, contact_edges(system, x)
     most_ends = uniform_layout(p).bounds(system.section.layout)
@@ -121,6 +124,8 @@ def placed_layout(
         _way_out(system, x, s, 0, most_ends[0]),
         _way_out(system, x, s, 1, most_ends[1], CLEAR * pushed),
     )
+    if dragged > 0.0:
+        ends = ends[0], min(_up_wall(system, x, ends[1]), max(most_ends[1], ends[1]))
     seen = system.section.layout.held(
         system.mesh, system.pressing(ROD, x), system.pressing(BORE, x), p.sealed_pressure
     )
@@ -264,6 +269,19 @@ def _way_out(
     free = min(_free(system, x, side), max(room[-1], 0.0) / np.cos(steep[-1]))
     longer = min((reach - h[-1]) / np.sin(steep[-1]), abs(bound - s[-1]), free)
     return float(s[-1] + np.copysign(longer, bound - s[-1]))
+
+
+def _up_wall(system: SealSystem, x: Array, end: float) -> float:
+    """Where on the outline (mm) the gap is REACH, beyond the air end of an arc that is too narrow
+    there; else that `end`.
+    """
+    mesh, s = system.mesh, system.section.places
+    outline = system.deformed(x)[mesh.boundary, 1] - system.rod_radius
+    places = np.append(s, s[-1] + mesh.places[mesh.arc + 1 :] - mesh.places[mesh.arc])
+    if np.interp(end, places, outline) >= _CLOSED * REACH:
+        return end
+    wide = int(np.argmax((outline >= REACH) & (places > end)))
+    return float(np.interp(REACH, outline[wide - 1 : wide + 1], places[wide - 1 : wide + 1]))
 
 
 def _free(system: SealSystem, x: Array, side: int) -> float:

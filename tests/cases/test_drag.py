@@ -19,6 +19,7 @@ from softehl.cases.seal.grading import (
     COVERED,
     FINEST,
     MULTIPLE,
+    REACH,
     SWEPT,
     film_thickness,
     inlet_length,
@@ -142,6 +143,21 @@ def test_the_arc_ends_where_the_outstroke_leaves_room_before_the_wall() -> None:
         assert wall - there == pytest.approx(room, rel=1e-6)
     free = placed_layout(system, x, p).bounds(system.section.layout)[1]
     assert free > last
+
+
+def test_the_arc_of_an_instroke_goes_up_the_wall_it_is_pulled_off() -> None:
+    system, x = contact()
+    z, h = system.arc_film(x)
+    ends = {}
+    for name, gap, drag in (("wide", 0.1, 1e-3), ("closed", 0.03, 1e-3), ("out", 0.03, 0.0)):
+        room = system.parameters.air_wall - float(np.interp(gap, h[-4:], z[-4:]))
+        layout = placed_layout(system, x, system.parameters, pushed=room / CLEAR, dragged=drag)
+        ends[name] = layout.bounds(system.section.layout)[1]
+    outline = system.deformed(x)[system.mesh.boundary, 1] - system.rod_radius
+    s, beyond = system.section.places, system.mesh.places[system.mesh.arc + 1 :]
+    s = np.append(s, s[-1] + beyond - system.mesh.places[system.mesh.arc])
+    gaps = {name: float(np.interp(end, s, outline)) for name, end in ends.items()}
+    assert gaps == pytest.approx({"wide": 0.1, "closed": REACH, "out": 0.03}, rel=1e-6)
 
 
 def test_no_segment_of_the_arc_lies_on_a_wall() -> None:
