@@ -61,13 +61,13 @@ class FilmLayouts:
         moved = dragged(system, settings, offset, y, linear)
         if not sweeps(system, y, moved):
             return None
-        return placed_layout(system, y, system.parameters, dragged=moved)
+        return placed_layout(system, y, system.parameters, dragged=moved, upward=True)
 
     def outstroke(self, system: SealSystem, x: Array) -> Layout | None:
-        """With an arc whose end the films of the outstroke do not push against the wall; None where
-        they do not.
+        """With an arc that goes up the wall of the air side, against which the films of the
+        outstroke push its end; None where they do not.
         """
         push = pushed(system, self.rod.settings, x, self.rod.newton.linear)
         if not reaches_wall(system, x, push):
             return None
-        return placed_layout(system, x, system.parameters, pushed=push)
+        return placed_layout(system, x, system.parameters, upward=True)

@@ -64,8 +64,9 @@ narrower there than half of those films."""
 
 _UPRIGHT = 85.0
 """A surface as steep as this lies on a wall. The arc ends before it: a film that rises along it has
-no length, and on a finer mesh the section may touch the wall nearer to the rod. Not that of films
-that pull the section off the wall: if it ends at a gap of less than _CLOSED of REACH it goes on."""
+no length, and on a finer mesh the section may touch the wall nearer to the rod. That of films that
+pull the section off the wall, or push it against it, goes on if its gap is less than _CLOSED of
+REACH there: a segment on a wall has an equation."""
 
 _CLOSED = 0.5
 
@@ -85,8 +86,8 @@ MULTIPLE = 1.75
 """About h* in `film_thickness`, whatever the ring."""
 
 CLEAR = 1.25
-"""Room between an arc and the wall of the air side, in what the outstroke takes of it: a segment on
-the wall has no length along the rod, and a film there no equation."""
+"""Room between an arc and the wall of the air side, in what the outstroke takes of it, below which
+the arc is one that goes up the wall."""
 
 SWEPT, COVERED = 4.0, 1.2
 """Inlets by which the film moves its edge from which on what it sweeps has a mesh of its own, with
@@ -105,7 +106,7 @@ def placed_layout(
     most: int = MOST_SEGMENTS,
     also: Sequence[Edge] = (),
     dragged: float = 0.0,
-    pushed: float = 0.0,
+    upward: bool = False,
 ) -> Layout:
     """The layout of a case whose arc reaches as far as a film may matter in the contact state x.
 
@@ -115,16 +116,16 @@ def placed_layout(
     most: segments at density 1 that it may get; a state that shows the edges only roughly is no
     reason for many. also: edges elsewhere that are to be fine too. dragged: how far the slowest
     film of the instroke moves its edge outward, mm, where that matters: the arc gets twice as many
-    segments, to be as fine wherever faster films move it to, and goes on up the wall. pushed: how
-    far the first film of the outstroke moves the arc towards the wall of the air side, mm.
+    segments, to be as fine wherever faster films move it to. upward: whether an arc that ends at
+    the wall of the air side goes on up that wall.
     """
     s, edges = system.section.places, contact_edges(system, x)
     most_ends = uniform_layout(p).bounds(system.section.layout)
     ends = (
         _way_out(system, x, s, 0, most_ends[0]),
-        _way_out(system, x, s, 1, most_ends[1], CLEAR * pushed),
+        _way_out(system, x, s, 1, most_ends[1]),
     )
-    if dragged > 0.0:
+    if upward:
         ends = ends[0], min(_up_wall(system, x, ends[1]), max(most_ends[1], ends[1]))
     seen = system.section.layout.held(
         system.mesh, system.pressing(ROD, x), system.pressing(BORE, x), p.sealed_pressure
@@ -229,13 +230,10 @@ _APART = 2.0
 its edges are elsewhere, far away where the surface lies nearly along the rod."""
 
 
-def _way_out(
-    system: SealSystem, x: Array, s: Array, side: int, bound: float, clear: float = 0.0
-) -> float:
+def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) -> float:
     """Where on the arc (mm) an end of the film is to be: side 0 the sealed, 1 the air end.
 
-    At most at `bound`, which may lie beyond the arc. clear: room between its air end and the wall
-    there, mm.
+    At most at `bound`, which may lie beyond the arc.
     """
     p = system.parameters
     z, h = system.arc_film(x)
@@ -246,9 +244,6 @@ def _way_out(
         z, h, s, first = -z[::-1], h[::-1], s[::-1], len(s) - 1 - touching[0]
     else:
         first = touching[-1]
-    room = np.full(len(z), np.inf)
-    if clear > 0.0:
-        room = p.air_wall - clear - z
     films = FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds))
     reach = max(REACH, films)
     steep = np.arctan2(np.diff(h), np.diff(z))
@@ -262,12 +257,10 @@ def _way_out(
             return float(0.5 * (s[end - 1] + s[end]) if on_wall else s[end])
         if h[i + 1] >= reach:
             return float(np.interp(reach, h[i : i + 2], s[i : i + 2]))
-        if room[i + 1] < 0.0 and i > first:
-            return float(np.interp(0.0, -room[i : i + 2], s[i : i + 2]))
     if h[-1] >= _FAR_SHORT * reach or not 0.0 < steep[-1] < np.radians(_GENTLE):
         return float(s[-1])
-    free = min(_free(system, x, side), max(room[-1], 0.0) / np.cos(steep[-1]))
-    longer = min((reach - h[-1]) / np.sin(steep[-1]), abs(bound - s[-1]), free)
+    wanted = (reach - h[-1]) / np.sin(steep[-1])
+    longer = min(wanted, abs(bound - s[-1]), _free(system, x, side))
     return float(s[-1] + np.copysign(longer, bound - s[-1]))
 
 

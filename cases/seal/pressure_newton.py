@@ -19,7 +19,7 @@ _PATIENT = 30
 def roughly(newton: Newton, thinnest: float = _THICK) -> Newton:
     """Newton's method for states on the way, which are no results.
 
-    thinnest: of a film, mm, 0 if unknown: its flux, too, is to be right to a few per cent.
+    thinnest: of a film, mm, 0 if unknown: its flux, too, is to be right to a per cent.
 
     On a fine mesh half of the iterations go from there to what rounding leaves. A residual that is
     above that and does not fall is no rounding.

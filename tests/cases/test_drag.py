@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from softehl.cases.seal import grading
 from softehl.cases.seal.contact import contact_problem, lies_in_corner
 from softehl.cases.seal.contact_route import ContactRoute
 from softehl.cases.seal.contacts import contact_edges
@@ -15,7 +16,6 @@ from softehl.cases.seal.drag import dragged, pushed
 from softehl.cases.seal.equations import SealSystem
 from softehl.cases.seal.film import film_on, start_speed
 from softehl.cases.seal.grading import (
-    CLEAR,
     COVERED,
     FINEST,
     MULTIPLE,
@@ -28,6 +28,8 @@ from softehl.cases.seal.grading import (
 )
 from softehl.cases.seal.loads import Stroke
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.pressure_newton import roughly
+from softehl.cases.seal.scales import film_flux
 from softehl.cases.seal.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
@@ -118,6 +120,19 @@ def test_what_it_sweeps_is_as_fine_as_the_inlets_there() -> None:
     assert FINEST < COVERED < SWEPT
 
 
+def test_a_state_on_the_way_is_right_to_a_per_cent_of_a_thin_film_too() -> None:
+    newton = Newton()
+    for h in (1e-4, 1e-5, 2e-6):  # mm
+        flux, speed = 0.5 * 10.0 * h, 10.0
+        allowed = [
+            film_flux(speed) * found.tolerance for found in (roughly(newton, h), roughly(newton))
+        ]
+        assert allowed[0] == pytest.approx(0.01 * flux)
+        assert allowed[1] > 0.09 * flux
+    assert roughly(newton, 0.005) == roughly(newton, 0.0) == roughly(newton)
+    assert roughly(newton, 1e-12).tolerance == newton.tolerance
+
+
 def test_the_outstroke_pushes_as_one_linear_solution_says() -> None:
     system, x = contact()
     share, arc = 0.02, system.mesh.arc_nodes
@@ -129,35 +144,21 @@ def test_the_outstroke_pushes_as_one_linear_solution_says() -> None:
     assert way / (2.0 * share) != pytest.approx(found, rel=0.05)
 
 
-def test_the_arc_ends_where_the_outstroke_leaves_room_before_the_wall() -> None:
+@pytest.mark.parametrize(
+    ("closed", "upward", "found"), [(0.1, True, 0.1), (0.03, True, REACH), (0.03, False, 0.03)]
+)
+def test_an_arc_that_ends_narrow_at_a_wall_goes_up_the_wall(
+    closed: float, upward: bool, found: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     system, x = contact()
-    p = system.parameters
-    z, _ = system.arc_film(x)
-    wall = p.groove_centre + 0.5 * p.groove_width
-    before = system.section.places[-1]
-    for room in (wall - z[-1] + 0.01, wall - z[-1] + 0.02):
-        layout = placed_layout(system, x, p, pushed=room / CLEAR)
-        last = layout.bounds(system.section.layout)[1]
-        assert last < before
-        there = float(np.interp(last, system.section.places, z))
-        assert wall - there == pytest.approx(room, rel=1e-6)
-    free = placed_layout(system, x, p).bounds(system.section.layout)[1]
-    assert free > last
-
-
-def test_the_arc_of_an_instroke_goes_up_the_wall_it_is_pulled_off() -> None:
-    system, x = contact()
-    z, h = system.arc_film(x)
-    ends = {}
-    for name, gap, drag in (("wide", 0.1, 1e-3), ("closed", 0.03, 1e-3), ("out", 0.03, 0.0)):
-        room = system.parameters.air_wall - float(np.interp(gap, h[-4:], z[-4:]))
-        layout = placed_layout(system, x, system.parameters, pushed=room / CLEAR, dragged=drag)
-        ends[name] = layout.bounds(system.section.layout)[1]
-    outline = system.deformed(x)[system.mesh.boundary, 1] - system.rod_radius
-    s, beyond = system.section.places, system.mesh.places[system.mesh.arc + 1 :]
-    s = np.append(s, s[-1] + beyond - system.mesh.places[system.mesh.arc])
-    gaps = {name: float(np.interp(end, s, outline)) for name, end in ends.items()}
-    assert gaps == pytest.approx({"wide": 0.1, "closed": REACH, "out": 0.03}, rel=1e-6)
+    (_, h), s, mesh = system.arc_film(x), system.section.places, system.mesh
+    end = float(np.interp(closed, h[-4:], s[-4:]))
+    monkeypatch.setattr(grading, "_way_out", lambda *at: end if at[3] == 1 else 0.0)
+    layout = placed_layout(system, x, system.parameters, upward=upward)
+    outline = system.deformed(x)[mesh.boundary, 1] - system.rod_radius
+    places = np.append(s, s[-1] + mesh.places[mesh.arc + 1 :] - mesh.places[mesh.arc])
+    last = layout.bounds(system.section.layout)[1]
+    assert np.interp(last, places, outline) == pytest.approx(found, rel=1e-6)
 
 
 def test_no_segment_of_the_arc_lies_on_a_wall() -> None:

@@ -54,6 +54,13 @@ def test_a_rod_that_leaves_a_corner_has_its_films(number: int) -> None:
     assert [state["verdict"] for state in found["states"]] == [OK] * len(SPEEDS)
 
 
+@pytest.mark.slow
+def test_a_rod_that_pulls_a_ring_off_its_wall_has_its_films() -> None:
+    # without an arc that goes up the wall none: 500 s
+    found = solved(12, limit=1200.0, stroke="in")
+    assert [state["verdict"] for state in found["states"]] == [OK] * len(SPEEDS)
+
+
 def test_the_arc_of_a_thick_film_is_made_longer() -> None:
     # on the first mesh its film seems to be a quarter of the 13 um that it is
     found = solved(55, 60.0, error_estimate=False, stroke="out", speeds=(1000.0,))
