@@ -93,6 +93,10 @@ SWEPT, COVERED = 4.0, 1.2
 """Inlets by which the film moves its edge from which on what it sweeps has a mesh of its own, with
 segments of so many inlets of the film whose edge is there."""
 
+PASSED = 0.4
+"""Growth outside the sealed edge of such a mesh, as a share of that of other meshes: the exit dip
+of the instroke passes over these segments as the speed falls, and was one or two of them wide."""
+
 _THIRDS = 3  # of segments at density 1: meshes exist for thirds of a density
 _PLACED_COARSEST, _FLAT_COARSEST = 12, 24
 """As COARSEST, of an arc that the contact places: on a round section, on one that may have flats,
@@ -116,8 +120,8 @@ def placed_layout(
     most: segments at density 1 that it may get; a state that shows the edges only roughly is no
     reason for many. also: edges elsewhere that are to be fine too. dragged: how far the slowest
     film of the instroke moves its edge outward, mm, where that matters: the arc gets twice as many
-    segments, to be as fine wherever faster films move it to. upward: whether an arc that ends at
-    the wall of the air side goes on up that wall.
+    segments, to be as fine wherever faster films move it to, and where their exit dips are. upward:
+    whether an arc that ends at the wall of the air side goes on up that wall.
     """
     s, edges = system.section.places, contact_edges(system, x)
     most_ends = uniform_layout(p).bounds(system.section.layout)
@@ -137,7 +141,8 @@ def placed_layout(
     spots = []
     for edge in (*edges, *also):
         k = min(edge.rise / steepest, 1.0) ** 0.5
-        rates = RATE * k**0.5, RATE * min(1.0 / k, 1.5)
+        outside = RATE * k**0.5 * (PASSED if dragged > 0.0 and edge.sealed else 1.0)
+        rates = outside, RATE * min(1.0 / k, 1.5)
         place = min(max(edge.place - ends[0], 0.0), length)
         spots.append(Spot(place, k**-0.3, rates if edge.sealed else rates[::-1]))
     if p.opens:

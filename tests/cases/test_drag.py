@@ -19,6 +19,7 @@ from softehl.cases.seal.grading import (
     COVERED,
     FINEST,
     MULTIPLE,
+    PASSED,
     REACH,
     SWEPT,
     film_thickness,
@@ -118,6 +119,22 @@ def test_what_it_sweeps_is_as_fine_as_the_inlets_there() -> None:
     assert found["with"] < 1.2 * COVERED
     assert found["without"] > 2.0 * found["with"]
     assert FINEST < COVERED < SWEPT
+
+
+def test_where_its_exit_dip_passes_segments_grow_slowly() -> None:
+    system, x = contact()
+    p = system.parameters.model_copy(update={"density": 2})
+    edge, way = contact_edges(system, x)[0], 3.0 * moved(system, x)
+    growth = {}
+    for name, drag in (("with", way), ("without", 0.0)):
+        layout = placed_layout(system, x, p, dragged=drag)
+        first, _ = layout.bounds(system.section.layout)
+        s = layout.mesh(2).arc_places
+        outside = (s >= edge.place - first - 0.1) & (s <= edge.place - first - 0.02)  # mm
+        sizes, outer = np.diff(s[outside]), s[outside]
+        growth[name] = (sizes[0] - sizes[-1]) / (outer[-1] - outer[0])
+    assert edge.sealed
+    assert growth["with"] == pytest.approx(PASSED * growth["without"], rel=0.1)
 
 
 def test_a_state_on_the_way_is_right_to_a_per_cent_of_a_thin_film_too() -> None:
