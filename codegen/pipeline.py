@@ -42,6 +42,7 @@ from softehl.codegen.emit.schedule import Schedule, is_straight, schedule, strai
 from softehl.codegen.graph.graph import Routine
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
+from softehl.codegen.optimise.field import close_rational
 
 SHORT = 3000
 """Operations of one element up to which writing the loop over its points out is tried."""
@@ -179,7 +180,6 @@ def _printer(target: Target, operations: int) -> ModuleType:
 
 
 def _points(definition: Definition) -> list[list[Fraction]]:
-    """Rows (coordinates..., weight) of the model's rule, to 60 digits."""
-    scale = 10**60
+    """Rows (coordinates..., weight) of the model's rule, to 60 digits or more."""
     rows = zip(definition.rule.points, definition.rule.weights, strict=True)
-    return [[Fraction(int(x.evalf(70) * scale), scale) for x in (*p, w)] for p, w in rows]
+    return [[close_rational(x) for x in (*p, w)] for p, w in rows]

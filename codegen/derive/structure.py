@@ -14,7 +14,7 @@ from softehl.codegen.derive.invariants import (
     through_invariants,
 )
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.traverse import reachable, strip, substitute
+from softehl.codegen.graph.traverse import always, reachable, strip, substitute
 from softehl.codegen.language.definition import Definition
 
 
@@ -93,14 +93,8 @@ def _guarded_coefficients(root: Node, sources: Sequence[Node]) -> bool:
     An interface would take such a coefficient out of its branch.  What is no polynomial, as the
     logarithm of a volume ratio, stands above all interfaces and stays where it is.
     """
-    always: set[Node] = set()
-    stack = [root]
-    while stack:
-        n = stack.pop()
-        if n not in always:
-            always.add(n)
-            stack += n.args[:1] if n.op is Op.BRANCH else n.args
+    unguarded = set(always([root]))
     degree = degrees([root], sources, ())
     polynomials = [n for n in degree if 0 < degree[n] < ABOVE]
-    below = (n for n in reachable(polynomials) if n.op in _PARTIAL and n not in always)
+    below = (n for n in reachable(polynomials) if n.op in _PARTIAL and n not in unguarded)
     return any(n.op is not Op.POW or n.payload not in WHOLE for n in below)

@@ -285,6 +285,8 @@ class Graph:
         """A function of one argument: SQRT, CBRT, RCBRT = 1/CBRT, LOG, EXP, SIN, ..."""
         if op is Op.LOG and a is self.one:
             return self.zero
+        if op is Op.LOG and a.op is Op.EXP:
+            return a.args[0]
         if op is Op.EXP and a is self.zero:
             return self.one
         if a is self.zero and op in ODD:

@@ -48,6 +48,18 @@ def reachable(roots: Iterable[Node], stop: Callable[[Node], bool] | None = None)
     return [seen[i] for i in sorted(seen)]
 
 
+def always(roots: Iterable[Node]) -> list[Node]:
+    """Nodes that are computed whichever side is taken of every branch, ids ascending."""
+    seen: dict[int, Node] = {}
+    stack = list(roots)
+    while stack:
+        n = stack.pop()
+        if n.id not in seen:
+            seen[n.id] = n
+            stack += n.args[:1] if n.op is Op.BRANCH else n.args
+    return [seen[i] for i in sorted(seen)]
+
+
 def operations(roots: Iterable[Node]) -> int:
     """Number of run-time operations below `roots` (each shared value counted once)."""
     free = (Op.SUM, Op.ITEM)

@@ -14,9 +14,16 @@ import mpmath
 
 from softehl.codegen.graph.arithmetic import number
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op
-from softehl.codegen.graph.traverse import Recursion, operations, reachable, recursion, rewrite
+from softehl.codegen.graph.traverse import (
+    Recursion,
+    always,
+    operations,
+    reachable,
+    recursion,
+    rewrite,
+)
 from softehl.codegen.optimise.factors import chain, factor, product, uses
-from softehl.codegen.optimise.signatures import merge_equal
+from softehl.codegen.optimise.identity import merge_equal
 from softehl.codegen.optimise.sums import common_sums
 
 Roots = list[Node]
@@ -62,15 +69,29 @@ def fold(g: Graph, roots: Roots) -> Roots:
 
 
 def powers(g: Graph, roots: Roots) -> Roots:
-    """Powers as products, square roots and cube roots that share one reciprocal."""
+    """Powers as products, square roots and cube roots that share one reciprocal.
+
+    x^(2/3) is x r^2 with r = x^(-1/3), which has no value at x = 0: there it is 0 by a branch,
+    unless the kernel divides by x or takes its logarithm in any case.
+    """
+    inverted = {n.args[0] for n in always(roots) if _fails_at_zero(n)}
 
     def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
         if n.op is not Op.POW:
             return g.rebuild(n.op, args, n.payload)
-        assert isinstance(n.payload, Fraction)
-        return _power(g, args[0], n.payload)
+        e = n.payload
+        assert isinstance(e, Fraction)
+        value = _power(g, args[0], e)
+        if e.denominator == 3 and e > 0 and n.args[0] not in inverted:
+            return g.branch(g.compare(Op.EQ, args[0], g.zero), g.zero, value)
+        return value
 
     return rewrite(g, roots, rule)
+
+
+def _fails_at_zero(n: Node) -> bool:
+    negative = isinstance(n.payload, Fraction) and n.op is Op.POW and n.payload < 0
+    return negative or n.op in (Op.RECIP, Op.LOG)
 
 
 def _power(g: Graph, a: Node, e: Fraction) -> Node:
@@ -82,7 +103,7 @@ def _power(g: Graph, a: Node, e: Fraction) -> Node:
             base = g.call(Op.SQRT, g.recip(a) if negative else a)
         case 3, True:
             base = g.call(Op.RCBRT, a)
-        case 3, False:  # a r^2 with r = a^(-1/3): one kind of root for both signs
+        case 3, False:  # one kind of root for both signs
             r = g.call(Op.RCBRT, a)
             base = g.mul(a, g.mul(r, r))
         case _:
@@ -112,8 +133,12 @@ def invariants_first(g: Graph, roots: Roots) -> Roots:
 
 
 def inverses(g: Graph, roots: Roots) -> Roots:
-    """1/x next to x^(-1/3) is its third power: two multiplications for a division."""
-    rooted = {n.args[0] for n in reachable(roots) if n.op is Op.RCBRT}
+    """1/x next to x^(-1/3) is its third power: two multiplications for a division.
+
+    A negative x has no such root.  Only roots that are taken whichever way branches go count:
+    where they have no value, neither has the kernel.
+    """
+    rooted = {n.args[0] for n in always(roots) if n.op is Op.RCBRT}
 
     def rule(g: Graph, n: Node, args: tuple[Node, ...]) -> Node:
         if n.op is Op.RECIP and n.args[0] in rooted:
