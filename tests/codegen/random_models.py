@@ -32,7 +32,26 @@ class OutsideError(ArithmeticError):
 # ------------------------------------------------------------------------------------- expressions
 
 
-def _grow(child: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+_WIDE_ONE: list[Callable[[Any], Any]] = [
+    lambda a: 1 + 9 / (1 + sp.exp((1000 - a) / 10)),
+    lambda a: sp.tanh(50 * (a + 2)),
+    lambda a: sp.asin(sp.sin(a)),
+    lambda a: sp.acos(sp.cos(a) / 2),
+    lambda a: sp.atan(a / 3),
+    lambda a: sp.sqrt(a**2 - 10 * a + 26),
+    lambda a: (1 - sp.exp(-((a + 2) ** 2))) ** 2,
+    lambda a: sp.sign(a + 50) * a,
+    lambda a: sp.erf(a / 20),
+]
+_WIDE_TWO: list[Callable[[Any, Any], Any]] = [
+    sp.atan2,
+    lambda a, b: a * sp.Heaviside(b - 100, 0),
+    lambda a, b: sp.Piecewise((a, a < -20), (b, a < 7), (a * b, True)),
+]
+"""Functions that are constant, smooth or one-sided near the state of rest and not far from it."""
+
+
+def _grow(child: st.SearchStrategy[Any], wide: bool = False) -> st.SearchStrategy[Any]:
     one: list[Callable[[Any], Any]] = [
         lambda a: a**2,
         lambda a: a**3,
@@ -58,6 +77,7 @@ def _grow(child: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
         lambda a, b: sp.Piecewise((b / a, a > Q(1, 10)), (a * b, True)),
         lambda a, b: sp.Piecewise((sp.sqrt(a), a > 0), (b, True)),
     ]
+    one, two = (_WIDE_ONE + one, _WIDE_TWO + two) if wide else (one, two)
     return st.one_of(
         st.tuples(st.sampled_from(one), child).map(lambda t: t[0](t[1])),
         st.tuples(st.sampled_from(two), child, child).map(lambda t: t[0](t[1], t[2])),
@@ -70,11 +90,13 @@ def _grow(child: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     )
 
 
-def expressions(symbols: tuple[Any, ...], leaves: int = 6) -> st.SearchStrategy[Any]:
+def expressions(
+    symbols: tuple[Any, ...], leaves: int = 6, *, wide: bool = False
+) -> st.SearchStrategy[Any]:
     """Expressions over `symbols` with real values wherever they are evaluated."""
     numbers = st.sampled_from([Q(1, 3), Q(2), Q(-3, 2), Q(7, 5)])
     leaf = st.one_of(st.sampled_from(symbols), st.sampled_from(symbols), numbers)
-    grown = st.recursive(leaf, _grow, max_leaves=leaves)
+    grown = st.recursive(leaf, lambda child: _grow(child, wide), max_leaves=leaves)
     return grown.filter(lambda e: not e.has(sp.zoo, sp.nan, sp.oo, sp.I))
 
 
@@ -116,13 +138,13 @@ A, C, B, TOTAL = (sp.Symbol(s, real=True) for s in ("named_a", "named_c", "insid
 
 
 @st.composite
-def recipes(draw: st.DrawFn) -> Recipe:
+def recipes(draw: st.DrawFn, wide: bool = False) -> Recipe:
     """Every symbol of a model is used, so that no derivative vanishes for want of a dependence."""
     basis = (*UNKNOWNS, K)
-    a, c = draw(expressions(basis)), draw(expressions((*basis, A), 4))
-    b = draw(expressions((*UNKNOWNS, XI, A), 4))
-    integrand = draw(expressions((*basis, XI, B, C), 5)) + B * XI + B
-    outer = draw(expressions((*basis, C, TOTAL), 5))
+    a, c = draw(expressions(basis, wide=wide)), draw(expressions((*basis, A), 4, wide=wide))
+    b = draw(expressions((*UNKNOWNS, XI, A), 4, wide=wide))
+    integrand = draw(expressions((*basis, XI, B, C), 5, wide=wide)) + B * XI + B
+    outer = draw(expressions((*basis, C, TOTAL), 5, wide=wide))
     flag = st.booleans()
     return Recipe(
         named=((A, a + UNKNOWNS[0] / 7, draw(flag)), (C, c + A * UNKNOWNS[1] / 5, draw(flag))),
@@ -130,7 +152,7 @@ def recipes(draw: st.DrawFn) -> Recipe:
         integrand=integrand,
         potential=outer + TOTAL + C + A * K + sum(u**2 for u in UNKNOWNS) / 4,
         exception=draw(st.sampled_from(["", "", "constant", "constant inside", "given"])),
-        given=draw(expressions(basis, 3)),
+        given=draw(expressions(basis, 3, wide=wide)),
         unroll=draw(flag),
     )
 
@@ -188,6 +210,8 @@ class Meaning:
 
 def _without_extrema(e: Any) -> Any:
     """Absolute values and extrema as branches: their derivative is that of the side taken."""
+    e = e.replace(sp.sign, lambda a: sp.Piecewise((-1, a < 0), (1, True)))
+    e = e.replace(sp.Heaviside, lambda a, _: sp.Piecewise((0, a < 0), (1, True)))
     e = e.replace(sp.Abs, lambda a: sp.Piecewise((-a, a < 0), (a, True)))
     for kind, less in ((sp.Max, True), (sp.Min, False)):
 
@@ -228,6 +252,9 @@ class Digits:
             return self._symbol(e, memo, xi)
         if e.is_Rational:
             v = mpmath.mpf(int(e.p)) / int(e.q)
+            return v, abs(v)
+        if e.is_NumberSymbol:
+            v = mpmath.mpf(sp.N(e, DIGITS + 5))
             return v, abs(v)
         if isinstance(e, sp.Piecewise):
             for value, condition in e.args:
@@ -288,6 +315,11 @@ _CALLS: dict[type, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
     sp.exp: (mpmath.exp, mpmath.exp),
     sp.sin: (mpmath.sin, mpmath.cos),
     sp.cos: (mpmath.cos, mpmath.sin),
+    sp.tanh: (mpmath.tanh, lambda a: mpmath.sech(a) ** 2),
+    sp.asin: (mpmath.asin, lambda a: 1 / mpmath.sqrt(1 - a * a)),
+    sp.acos: (mpmath.acos, lambda a: 1 / mpmath.sqrt(1 - a * a)),
+    sp.atan: (mpmath.atan, lambda a: 1 / (1 + a * a)),
+    sp.erf: (mpmath.erf, lambda a: 2 * mpmath.exp(-a * a) / mpmath.sqrt(mpmath.pi)),
 }
 
 
@@ -306,7 +338,15 @@ def _operation(e: Any, pairs: list[Pair]) -> Pair:
             _distinct(best[0], other[0], best[1] + other[1])
             best = other if (other[0] > best[0]) == isinstance(e, sp.Max) else best
         return best
-    ((a, bound),) = pairs
+    if isinstance(e, sp.atan2):
+        (b, more), (a, bound) = pairs
+        _distinct(b, mpmath.mpf(0), more)
+        return mpmath.atan2(b, a), (abs(a) * more + abs(b) * bound) / (a * a + b * b) + 4
+    a, bound = pairs[0]
+    if isinstance(e, (sp.sign, sp.Heaviside)):
+        _distinct(a, mpmath.mpf(0), bound)
+        below = -1 if isinstance(e, sp.sign) else 0
+        return mpmath.mpf(1 if a > 0 else below), mpmath.mpf(0)
     if isinstance(e, sp.Abs):
         _distinct(a, mpmath.mpf(0), bound)
         return abs(a), bound
