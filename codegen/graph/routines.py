@@ -259,23 +259,37 @@ def isotropic(name: str, inputs: int, energy: Node, order: int = 0) -> Isotropic
 
 
 def symmetric(value: Node, unknowns: Sequence[Node]) -> bool:
-    """True when `value` does not change under exchanges of `unknowns` (at one random point)."""
+    """True when `value` does not change under exchanges of `unknowns`.
+
+    It is compared at random points between 1/64 and 64, where a function that is one-sided far
+    from 1 shows it; points without a real value are left out.
+    """
     rng = random.Random(0)
-    known: dict[Node, Any] = {}
+    inputs = [n for n in reachable([value]) if n.op in (Op.INPUT, Op.SUM, Op.ITEM)]
     with mpmath.workdps(30):
-        point = [mpmath.mpf(rng.uniform(0.5, 1.5)) for _ in unknowns]
-        found = []
-        for k in range(len(unknowns)):
-            swapped = [*point[k:], *point[:k]] if k else list(reversed(point))
-            for order in (point, swapped):
-                at = dict(zip(unknowns, order, strict=True))
-                for n in reachable([value]):
-                    if n.op in (Op.INPUT, Op.SUM, Op.ITEM) and n not in at:
-                        at[n] = known.setdefault(n, mpmath.mpf(rng.uniform(0.5, 1.5)))
-                    elif n not in at and n.op is not Op.CALL:
-                        at[n] = number(n, [at[a] for a in n.args])
-                found.append(at[value])
-        return all(abs(v - found[0]) <= 1e-20 * (1 + abs(found[0])) for v in found)
+        for width in (0.5, 2, 4, 6, 6, 6, 6, 6):
+            point = [mpmath.mpf(2) ** rng.uniform(-width, width) for _ in unknowns]
+            at = {n: mpmath.mpf(2) ** rng.uniform(-width, width) for n in inputs}
+            turns = [list(reversed(point))]
+            turns += [[*point[k:], *point[:k]] for k in range(len(unknowns))]
+            found = [_value_at(value, {**at, **dict(zip(unknowns, t, strict=True))}) for t in turns]
+            if any(v is None for v in found):
+                if any(v is not None for v in found):
+                    return False
+            elif any(abs(v - found[0]) > 1e-20 * (1 + abs(found[0])) for v in found):
+                return False
+    return True
+
+
+def _value_at(value: Node, at: dict[Node, Any]) -> Any:
+    """A value from those of the inputs; None where it is not real."""
+    for n in reachable([value]):
+        if n not in at and n.op is not Op.CALL:
+            try:
+                at[n] = number(n, [at[a] for a in n.args])
+            except (ArithmeticError, TypeError, ValueError):
+                return None
+    return None if isinstance(at[value], mpmath.mpc) else at[value]
 
 
 def upper(i: int, j: int) -> int:

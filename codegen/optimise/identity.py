@@ -151,7 +151,13 @@ class _Values:
         return self.bits.setdefault(key, 1 << len(self.bits))
 
 
+_EXPONENTS = {
+    Op.RECIP: Fraction(-1),
+    Op.SQRT: Fraction(1, 2),
+    Op.CBRT: Fraction(1, 3),
+    Op.RCBRT: Fraction(-1, 3),
+}
+
+
 def _exponent(n: Node) -> Fraction:
-    known = {Op.RECIP: -1, Op.SQRT: Fraction(1, 2), Op.CBRT: Fraction(1, 3)}
-    known[Op.RCBRT] = Fraction(-1, 3)
-    return n.payload if isinstance(n.payload, Fraction) else Fraction(known[n.op])
+    return n.payload if isinstance(n.payload, Fraction) else _EXPONENTS[n.op]

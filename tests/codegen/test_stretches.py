@@ -137,6 +137,8 @@ def test_what_is_no_isotropic_energy_is_refused() -> None:
         stretches(lambda x, y, z: x + 2 * y + z)
     with pytest.raises(ModelError, match="exchanged"):
         stretches(lambda x, y, z: (x - y) * (y - z) * (z - x))
+    with pytest.raises(ModelError, match="exchanged"):  # only where a stretch is above 3
+        stretches(lambda x, y, z: x + y + z + sp.Max(x - 3, 0) ** 2)
     m = Model("flat", nodes=1, rule=quadrature.point_rule())
     with pytest.raises(ModelError, match=r"C has shape \(2, 2\), must be \(3, 3\)"):
         m.principal("W", sp.eye(2), lambda x, y, z: x + y + z)
