@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -49,7 +49,7 @@ def linear_forms(d: Definition) -> Structure | None:
     named: dict[Node, Node] = {}
     replacement = {z: _named(g, value, named) for z, value in interface.rewritten.items()}
     (root,), new = substitute(g, [root], replacement)
-    constant = tuple(new[kept[c]] for c in d.constant)
+    constant = _left(new, (kept[c] for c in d.constant if c in kept))
     return Structure(root, constant, interface, tuple(named.values()))
 
 
@@ -58,14 +58,22 @@ def quadratic_values(d: Definition, s: Structure) -> Structure:
     g = d.graph
     reduced = through_invariants(g, [s.root], s.forms, s.constant)
     if reduced is not None:
-        constant = tuple(reduced.images[c] for c in s.constant)
+        constant = _left(reduced.images, s.constant)
         (root,), squares = reduced.roots, reduced.squares
         return replace(s, root=root, constant=constant, squares=squares, invariants=True)
     found = quadratic_interface([s.root], s.forms, s.constant)
     named = {q: g.name(f"q{k}", q) for k, q in enumerate(found)}
     (root,), new = substitute(g, [s.root], named)
-    constant = tuple(new[c] for c in s.constant)
+    constant = _left(new, s.constant)
     return replace(s, root=root, constant=constant, squares=tuple(named.values()))
+
+
+def _left(new: Mapping[Node, Node], constant: Iterable[Node]) -> tuple[Node, ...]:
+    """What became of constant values; one that is now inside a named form needs no freezing.
+
+    Forms have coefficients that do not depend on the unknowns.
+    """
+    return tuple(new[c] for c in constant if c in new)
 
 
 def found_in(d: Definition) -> Structure | None:

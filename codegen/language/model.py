@@ -79,9 +79,9 @@ class Model:
         }
         self._interface: list[Node] = []
         self._given: dict[Node, dict[Node, Node]] = {}
-        self._constant: list[Node] = []
         self._fields: list[tuple[str, Node]] = []
-        self._potential: Node | None = None
+        self._potentials: list[tuple[Node, list[Node]]] = []
+        self._factors = 0
         self._product = False
         self._norms = 0
         self._design = (False, False)
@@ -222,6 +222,8 @@ class Model:
                 raise ModelError(
                     f"history: {name} is no point data; there are {', '.join(known) or 'none'}"
                 )
+            if name in [n for n, _ in self._history]:
+                raise ModelError(f"history: {name} is given twice in model {self.name}")
             self._history.append((name, self._lower(value)))
 
     def require(self, *conditions: Any) -> None:
@@ -376,26 +378,38 @@ class Model:
         return self._name(name, node, integrand, known=False)
 
     def potential(self, expression: Any, *, constant: Iterable[Any] = ()) -> None:
-        """The residual is the gradient of `expression` with the `constant` symbols frozen."""
-        self._constant = [self._lower(s) for s in constant]
-        self._potential = self._lower(expression)
-        if self._potential.varying:
+        """The residual is the gradient of `expression` with the `constant` symbols frozen.
+
+        Further potentials and weak forms add up.
+        """
+        value, frozen = self._lower(expression), [self._lower(s) for s in constant]
+        if value.varying:
             raise ModelError(
                 f"the potential of {self.name} varies with the point: wrap it in integral(...)"
             )
+        self._potentials.append((value, frozen))
 
     def weak_form(self, terms: Sequence[tuple[Any, Any]]) -> None:
-        """Residual = integral of sum(factor * variation of varied) over (factor, varied)."""
+        """Residual = integral of sum(factor * variation of varied) over (factor, varied).
+
+        Further weak forms and potentials add up.
+        """
         density = sp.Integer(0)
         frozen = []
-        for k, (factor, varied) in enumerate(terms):
-            frozen.append(self.define(f"factor_{k}", factor, interface=True))
+        for factor, varied in terms:
+            label = f"factor_{self._factors}"
+            self._factors += 1
+            frozen.append(self.define(label, factor, interface=True))
             density += frozen[-1] * varied
-        self.potential(self.integral("virtual_work", density), constant=frozen)
+        work = f"virtual_work_{len(self._potentials)}" if self._potentials else "virtual_work"
+        self.potential(self.integral(work, density), constant=frozen)
 
     def fields(self, **values: Any) -> None:
-        """Quantities to be evaluated at the quadrature points for post-processing."""
-        self._fields = [(name, self._lower(value)) for name, value in values.items()]
+        """Quantities to be evaluated at the quadrature points; further calls add more."""
+        for name, value in values.items():
+            if name in [n for n, _ in self._fields]:
+                raise ModelError(f"the field {name} is given twice in model {self.name}")
+            self._fields.append((name, self._lower(value)))
 
     def offer(
         self,
@@ -412,21 +426,23 @@ class Model:
         and product; left out, all but the product.  `product` adds the tangent times a vector.
         `pseudo_load` adds the derivative of the residual along a variation of coordinates, data
         and parameters, `fields_rate` that of the fields: for sensitivities of what a study
-        computes.  `derivatives` lists symbols of parameters, data or coordinates.
+        computes.  `derivatives` lists symbols of parameters, data or coordinates.  Further calls
+        add up.
         """
         known = [str(t) for t in Task if t not in (Task.PSEUDO_LOAD, Task.FIELDS_RATE)]
-        self._design = pseudo_load, fields_rate
+        self._design = self._design[0] or pseudo_load, self._design[1] or fields_rate
         for t in tasks or ():
             if t not in known:
                 raise ModelError(f"no task {t!r}; there are {', '.join(known)}")
-        self._tasks = None if tasks is None else (*tasks, *([Task.PRODUCT] if product else []))
-        self._product = product or Task.PRODUCT in (tasks or ())
+        if tasks is not None:
+            self._tasks = (*(self._tasks or ()), *tasks)
+        self._product |= product or Task.PRODUCT in (tasks or ())
         nodes = [(str(s), self._lower(s)) for s in derivatives]
         for name, n in nodes:
             source = n.payload.array if isinstance(n.payload, Input) else ""
             if source not in ("parameters", "data", "coordinates"):
                 raise ModelError(f"{name} is no parameter, datum or coordinate to derive by")
-        self._derivatives = nodes
+        self._derivatives += [pair for pair in nodes if pair not in self._derivatives]
 
     def example(self, **values: float) -> None:
         """Values near which the model makes sense, by name; the check of its kernel starts there.
@@ -441,9 +457,11 @@ class Model:
 
     def finish(self) -> Definition:
         """The frozen definition of the model."""
-        if self._potential is None:
-            raise ModelError(f"model {self.name} has neither a potential nor a weak form")
-        self._check_use(self._potential)
+        potential, constant = self._total()
+        self._check_use(potential)
+        chosen = self._tasks
+        if chosen is not None and self._product:
+            chosen = (*chosen, Task.PRODUCT)
         definition = Definition(
             name=self.name,
             doc=self.doc,
@@ -457,8 +475,8 @@ class Model:
             rule=self.rule,
             unroll=self.unroll,
             graph=self.graph,
-            potential=self._potential,
-            constant=tuple(self._constant),
+            potential=potential,
+            constant=constant,
             given=self._given,
             directions=tuple(self._directions),
             interface=tuple(self._interface),
@@ -468,7 +486,7 @@ class Model:
             fields_rate=self._design[1],
             derivatives=tuple(self._derivatives),
             example=tuple(self._example.items()),
-            tasks=self._tasks,
+            tasks=chosen,
             conditions=tuple(self._conditions),
             nodal=tuple(self._nodal),
             components=self._components or 2,
@@ -476,7 +494,7 @@ class Model:
             history=tuple(name for name, _ in self._history),
         )
 
-        chosen = definition.tasks or ()
+        chosen = chosen or ()
         if Task.ENERGY in chosen and not definition.conservative:
             raise ModelError(f"no energy for {self.name}: its residual is not the gradient of one")
         if any(self._design) and definition.given:
@@ -488,6 +506,25 @@ class Model:
         if Task.FIELDS in chosen and not definition.fields:
             raise ModelError(f"no task fields for {self.name}: it declares none")
         return definition
+
+    def _total(self) -> tuple[Node, tuple[Node, ...]]:
+        """The sum of all potentials and weak forms, and what is frozen in it."""
+        if not self._potentials:
+            raise ModelError(f"model {self.name} has neither a potential nor a weak form")
+        total = self.graph.zero
+        constant = dict.fromkeys(n for _, frozen in self._potentials for n in frozen)
+        for value, frozen in self._potentials:
+            total = self.graph.add(total, value)
+            shared = set(constant) - set(frozen)
+            # what lies below a frozen value is frozen with it
+            met = [n for n in reachable([value], stop=frozen.__contains__) if n in shared]
+            if met:
+                label = next((str(s) for s, n in self._bound.items() if n is met[0]), "a value")
+                raise ModelError(
+                    f"{label} is constant in one potential of {self.name} and varies in another: "
+                    f"freeze a name of its own, m.define('{label}_frozen', {label})"
+                )
+        return total, tuple(constant)
 
     def _check_use(self, potential: Node) -> None:
         """Every unknown enters the potential, every other argument it or a field."""
