@@ -61,11 +61,15 @@ class _Stream:
 
 @contextmanager
 def readers_that_leave() -> Iterator[None]:
-    """Let nothing but the output be lost where a reader of stdout or stderr leaves."""
+    """Let nothing but the output be lost where a reader of stdout or stderr leaves.
+
+    A stream that is closed from the start, as by `>&-`, is None in Python.
+    """
     before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = _Stream(before[0]), _Stream(before[1])
-    try:
-        yield
-        sys.stdout.flush()
-    finally:
-        sys.stdout, sys.stderr = before
+    with open(os.devnull, "w") as nobody:
+        sys.stdout, sys.stderr = (_Stream(nobody if s is None else s) for s in before)
+        try:
+            yield
+            sys.stdout.flush()
+        finally:
+            sys.stdout, sys.stderr = before

@@ -33,6 +33,8 @@ from softehl.codegen.language.names import named
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """What a model may be called: it is part of the names of C functions."""
+LONGEST = 200
+"""Letters of the name of a model: file systems take 255, with `_design.c` and the like."""
 
 __all__ = ["Argument", "Definition", "Model"]
 
@@ -57,6 +59,10 @@ class Model:
         if not NAME.fullmatch(name):
             raise ModelError(
                 f"a model is called {name!r}; use letters, digits and underscores, a letter first"
+            )
+        if len(name) > LONGEST:
+            raise ModelError(
+                f"the name {name[:20]}... of a model has {len(name)} letters, allowed are {LONGEST}"
             )
         self.name, self.nodes, self.rule, self.unroll = name, nodes, rule, unroll
         self.doc = " ".join((doc or "").split())

@@ -5,6 +5,7 @@ solves a case loads no SymPy and `softehl --help` loads nothing at all.
 """
 
 import importlib
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -158,9 +159,11 @@ def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "
     """
     from softehl.runtime import kernels
 
-    if isinstance(source, str) and not source.endswith(".py") and not Path(source).is_dir():
+    # os.path: a name that is too long for a file is none
+    folder_given = isinstance(source, (str, Path)) and os.path.isdir(source)
+    if isinstance(source, str) and not source.endswith(".py") and not folder_given:
         return kernels.load_kernel(source)
-    if isinstance(source, (str, Path)) and Path(source).is_dir():
+    if isinstance(source, (str, Path)) and folder_given:
         return kernels.kernel_in(Path(source).resolve(), name)
     from softehl.codegen.tools import library
 

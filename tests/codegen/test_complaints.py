@@ -14,7 +14,7 @@ import pytest
 
 import softehl
 from softehl.codegen.tools import build, cache, cli
-from softehl.runtime.kernels import StaleKernelsError
+from softehl.runtime.kernels import MissingKernelsError, StaleKernelsError
 
 MODEL = build.GENERATED.parent / "tests" / "codegen" / "pages" / "penalty_spring.py"
 NO_SYMPY = """
@@ -130,6 +130,36 @@ def test_a_folder_that_cannot_be_made(
 def test_a_name_that_is_not_utf8(capsys: pytest.CaptureFixture[str]) -> None:
     name = os.fsdecode(b"mine-\xff.py")
     assert "is not UTF-8: rename it" in refused(capsys, name)
+
+
+@pytest.mark.parametrize("words", [["mine.py"], ["mine.py", "--target", "ufcx", "--out", "a"]])
+def test_a_model_whose_name_no_file_can_have(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    long = "a" * 500
+    text = Path("mine.py").read_text().replace('Model("', f'Model("{long}')
+    Path("mine.py").write_text(text)
+    said = refused(capsys, *words)
+    assert "mine.py:" in said
+    assert "of a model has 5" in said
+    assert said.endswith("letters, allowed are 200\n")
+
+
+def test_a_file_whose_name_is_too_long(capsys: pytest.CaptureFixture[str]) -> None:
+    long = "a" * 500
+    assert len(refused(capsys, f"{long}.py")) < 200
+    assert softehl.main(["report", long]) == 2
+    assert "holds no run" in capsys.readouterr().err
+    with pytest.raises(MissingKernelsError, match="no kernel 'aaa"):
+        softehl.load_kernel(long)
+
+
+@pytest.mark.parametrize("closed", [">&-", ">&- 2>&-"])
+@pytest.mark.parametrize("words", ["kernels", "keys oring", "--help"])
+def test_streams_that_are_closed_are_no_matter(words: str, closed: str) -> None:
+    command = f"'{sys.executable}' -m softehl {words} {closed}"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
 
 
 # ----------------------------------------------------------------------- damage of a user's folder

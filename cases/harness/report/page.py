@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
@@ -23,7 +24,7 @@ _MISSING = "softehl report needs Bokeh and openpyxl: pip install 'softehl[report
 
 def read_finished(folder: Path, shipped: Mapping[str, str]) -> FinishedRun:
     """The run in a folder.  Raises BadInput where there is none that can be read."""
-    if not (folder / "run.json").exists():
+    if not os.path.exists(folder / "run.json"):  # no error of a name that is too long
         raise BadInput(f"{folder} holds no run (there is no run.json); allowed: the DIR of a run")
     try:
         content = read_json(folder / "run.json")
