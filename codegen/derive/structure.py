@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 
 from softehl.codegen.derive.interfaces import Interface, linear_interface
 from softehl.codegen.derive.invariants import (
@@ -13,6 +12,7 @@ from softehl.codegen.derive.invariants import (
     quadratic_interface,
     through_invariants,
 )
+from softehl.codegen.graph.domain import WHOLE
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.traverse import always, reachable, strip, substitute
 from softehl.codegen.language.definition import Definition
@@ -90,9 +90,7 @@ def _named(g: Graph, form: Node, named: dict[Node, Node]) -> Node:
     return named.setdefault(form, g.name(f"z{len(named)}", form))
 
 
-WHOLE = frozenset(map(Fraction, range(1, 10)))
-"""Exponents of powers that are products: they have a value everywhere."""
-_PARTIAL = frozenset({Op.RECIP, Op.POW, Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP})
+_PARTIAL = frozenset({Op.RECIP, Op.POW, Op.POWER, Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP})
 
 
 def _guarded_coefficients(root: Node, sources: Sequence[Node]) -> bool:

@@ -36,14 +36,14 @@ _MASKS = {
     Op.OR: "{} | {}",
     Op.NOT: "~{}",
 }
-_OF_TWO = frozenset({Op.ATAN2})
-_IN_HEADER = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS})
+_OF_TWO = frozenset({Op.ATAN2, Op.POWER})
+_IN_HEADER = frozenset({Op.SQRT, Op.CBRT, Op.RCBRT, Op.LOG, Op.EXP, Op.SIN, Op.COS, Op.POWER})
 
 
 def wrappers(text: str) -> list[str]:
     """Functions of vectors that `text` calls and that the header does not have."""
     kinds = {False: "SOFTEHL_LANEWISE({})\n", True: "SOFTEHL_LANEWISE2({})\n"}
-    needed = [op for op in sorted(FUNCTIONS - _IN_HEADER | _OF_TWO) if f"softehl_v{op}(" in text]
+    needed = [op for op in sorted((FUNCTIONS | _OF_TWO) - _IN_HEADER) if f"softehl_v{op}(" in text]
     return [kinds[op in _OF_TWO].format(op) for op in needed]
 
 

@@ -23,6 +23,7 @@ _FORMATS: dict[Op, str] = {
     Op.SIN: "sin({})",
     Op.COS: "cos({})",
     Op.ATAN2: "atan2({}, {})",
+    Op.POWER: "pow({}, {})",
     **{op: f"{op}({{}})" for op in sorted(ELEMENTARY)},
     Op.LT: "{} < {}",
     Op.LE: "{} <= {}",

@@ -127,6 +127,13 @@ static inline V softehl_vpow(V a, double e)
     return out;
 }
 
+static inline V softehl_vpower(V a, V e)
+{
+    V out;
+    for (int l = 0; l < SOFTEHL_LANES; ++l) out[l] = pow(a[l], e[l]);
+    return out;
+}
+
 static inline M softehl_mask(int set)
 {
     return (M)softehl_splat(0.0) - (long long)(set != 0);
@@ -269,6 +276,7 @@ typedef long long M;
 #define softehl_lane(a, l) (a)
 #define softehl_vfabs(a) fabs(a)
 #define softehl_vpow(a, e) pow(a, e)
+#define softehl_vpower(a, e) pow(a, e)
 #define softehl_vrcbrt(a) softehl_rcbrt(a)
 #define softehl_vexp(a) exp(a)
 #define softehl_vlog(a) log(a)

@@ -39,6 +39,7 @@ _OPERATIONS: dict[Op, Callable[..., Number]] = {
     Op.ERF: mpmath.erf,
     Op.ERFC: mpmath.erfc,
     Op.ATAN2: mpmath.atan2,
+    Op.POWER: lambda a, e: a**e,
     Op.LT: lambda a, b: a < b,
     Op.LE: lambda a, b: a <= b,
     Op.EQ: lambda a, b: a == b,

@@ -42,6 +42,7 @@ _UNARY: dict[Op, Callable[[Number], Number]] = {
 }
 _BINARY: dict[Op, Callable[[Number, Number], Number]] = {
     Op.ATAN2: mpmath.atan2,
+    Op.POWER: lambda a, e: a**e,
     Op.ADD: lambda a, b: a + b,
     Op.SUB: lambda a, b: a - b,
     Op.MUL: lambda a, b: a * b,

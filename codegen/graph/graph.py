@@ -53,6 +53,7 @@ class Op(StrEnum):
     ERF = "erf"
     ERFC = "erfc"
     ATAN2 = "atan2"
+    POWER = "power"
     LT = "lt"
     LE = "le"
     EQ = "eq"
@@ -151,6 +152,7 @@ class Graph:
             Op.RECIP: self.recip,
             Op.BRANCH: self.branch,
             Op.SUM: self.sum,
+            Op.POWER: self.general_power,
         }
 
     def __len__(self) -> int:
@@ -280,6 +282,12 @@ class Graph:
             assert isinstance(inner, Fraction)
             return self.power(a.args[0], inner * e)
         return self.node(Op.POW, (a,), e)
+
+    def general_power(self, a: Node, exponent: Node) -> Node:
+        """Power whose exponent is a value; as C has it: of a < 0 for whole exponents only."""
+        if exponent.op is Op.CONST:
+            return self.power(a, exponent.value)
+        return self.node(Op.POWER, (a, exponent))
 
     def call(self, op: Op, a: Node) -> Node:
         """A function of one argument: SQRT, CBRT, RCBRT = 1/CBRT, LOG, EXP, SIN, ..."""

@@ -38,6 +38,10 @@ def partials(g: Graph, n: Node) -> Partials:
             x = n.args[1]
             scale = g.recip(g.add(g.mul(a, a), g.mul(x, x)))
             return [(a, g.mul(x, scale)), (x, g.neg(g.mul(a, scale)))]
+        case Op.POWER:
+            e = n.args[1]
+            slope = g.mul(e, g.general_power(a, g.sub(e, g.one)))
+            return [(a, slope), (e, g.mul(n, g.call(Op.LOG, a)))]
         case _:
             return [(a, _derivative_of_call(g, n, a))]
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.graph.domain import Domain, decidable
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.traverse import Recursion, recursion
 
@@ -91,6 +92,7 @@ class Lowering:
         self.g = graph
         self.bound = bound
         self._memo: dict[Any, Node] = {}
+        self.domain = Domain(graph)
         self._rules: list[tuple[Any, Callable[[Any], Recursion[Node]]]] = [
             (sp.Add, self._add),
             (sp.Mul, self._mul),
@@ -202,7 +204,9 @@ class Lowering:
         if isinstance(exponent, sp.Rational):
             return self.g.power(base, Fraction(int(exponent.p), int(exponent.q)))
         power = yield self._lower(exponent)
-        return self.g.call(Op.EXP, self.g.mul(power, self.g.call(Op.LOG, base)))
+        if e.base.is_positive or self.domain.positive(base):
+            return self.g.call(Op.EXP, self.g.mul(power, self.g.call(Op.LOG, base)))
+        return self.g.general_power(base, power)
 
     def _pieces(self, e: Any) -> Recursion[Node]:
         if len(e.args) > PIECES:
@@ -218,7 +222,24 @@ class Lowering:
         if len(pairs) == 1:
             raise ModelError(f"a branch without a last condition: {whole}; end it with (.., True)")
         decides, then = (yield self._lower(condition)), (yield self._lower(value))
-        return self.g.branch(decides, then, (yield self._piecewise(pairs[1:], whole)))
+        rest = yield self._piecewise(pairs[1:], whole)
+        return self._decided(decides, self.g.branch(decides, then, rest))
+
+    def _decided(self, condition: Node, value: Node) -> Node:
+        """`value`, or not-a-number where its condition compares what is not-a-number.
+
+        The power of three is so in the first and second derivatives, too.
+        """
+        if value.op is not Op.BRANCH:
+            return value
+        otherwise = value.args[2] if value.args[0] is condition else None
+        known, differences = decidable(self.g, self.domain, condition, otherwise)
+        if known is None:
+            return value
+        total = self.g.zero
+        for d in differences:
+            total = self.g.add(total, d)
+        return self.g.branch(known, value, self.g.power(total, 3))
 
     def _extremum(self, e: Any) -> Recursion[Node]:
         result = yield self._lower(e.args[0])
@@ -226,7 +247,7 @@ class Lowering:
             other = yield self._lower(a)
             less = self.g.compare(Op.LT, result, other)
             pair = (other, result) if isinstance(e, sp.Max) else (result, other)
-            result = self.g.branch(less, *pair)
+            result = self._decided(less, self.g.branch(less, *pair))
         return result
 
     def _absolute(self, e: Any) -> Recursion[Node]:
@@ -248,7 +269,8 @@ class Lowering:
         above = yield self._lower(values[2])
         zero = self.g.zero
         upper = self.g.branch(self.g.compare(Op.LT, zero, a), above, at)
-        return self.g.branch(self.g.compare(Op.LT, a, zero), below, upper)
+        less = self.g.compare(Op.LT, a, zero)
+        return self._decided(less, self.g.branch(less, below, upper))
 
     def _relation(self, e: Any) -> Recursion[Node]:
         a, b = (yield self._lower(e.lhs)), (yield self._lower(e.rhs))
