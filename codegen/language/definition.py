@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.codegen.language.record import Record
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,8 @@ class Definition:
     """Of every unknown its name without number, and its node or None."""
     history: tuple[str, ...] = ()
     """Point data that the last fields are the new values of."""
+    record: Record = field(default_factory=Record, repr=False, compare=False)
+    """The page as written, by which kernels are checked; nothing is derived from it."""
 
     @property
     def coordinate_width(self) -> int:

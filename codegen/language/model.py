@@ -30,6 +30,7 @@ from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import Entries, fraction
 from softehl.codegen.language.lower import Lowering, ModelError, page_line
 from softehl.codegen.language.names import named
+from softehl.codegen.language.record import Integral, Record
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """What a model may be called: it is part of the names of C functions."""
@@ -70,6 +71,7 @@ class Model:
         self._bound: dict[sp.Symbol, Node] = {}
         self._symbols: dict[str, Any] = {}
         self._lower = Lowering(self.graph, self._bound)
+        self._record = Record()
         self._coordinates: tuple[str, ...] = ()
         self._unknowns: list[str] = []
         self._interpolated: str | None = None
@@ -230,6 +232,7 @@ class Model:
                 )
             if name in [n for n, _ in self._history]:
                 raise ModelError(f"history: {name} is given twice in model {self.name}")
+            self._record.history.append((f"new_{name}", value))
             self._history.append((name, self._lower(value)))
 
     def require(self, *conditions: Any) -> None:
@@ -290,7 +293,9 @@ class Model:
             self._interface.append(node)
         if derivative is not None:
             self._given[node] = {self._lower(s): self._lower(e) for s, e in derivative.items()}
-        return self._name(name, node, expression, given=derivative)
+        return self._record.define(
+            self._name(name, node, expression, given=derivative), sp.sympify(expression)
+        )
 
     def norm(self, values: Any) -> Any:
         """Length of a scalar, list or matrix: the root of the sum of its squares.
@@ -340,7 +345,11 @@ class Model:
                 raise ModelError(f"{name}: unknown {k} does not occur in the equations")
         args = [*system.external, *(self._lower(e) for e in begin.values)]
         below = [*found.values, *begin.values]
-        return self._named(name, begin, self.graph.run(routine, args), below)
+        solution = self._named(name, begin, self.graph.run(routine, args), below)
+        self._record.implicit(
+            found.values, unknowns.values, begin.values, Entries.of(solution).values
+        )
+        return solution
 
     def principal(self, name: str, C: Any, energy: Callable[[Any, Any, Any], Any]) -> sp.Symbol:
         """An isotropic energy of the principal stretches: energy(lambda_1, lambda_2, lambda_3).
@@ -361,7 +370,10 @@ class Model:
         routine = isotropic(name, 6 + len(system.external), system.values[0])
         args = [*(self._lower(C[i, j]) for i, j in SYMMETRIC), *system.external]
         node = self.graph.name(name, self.graph.run(routine, args)[0])
-        return self._name(name, node, [*C, written], known=False)
+        symbol: sp.Symbol = self._record.principal(
+            self._name(name, node, [*C, written], known=False), written, squares.values, C
+        )
+        return symbol
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Derivatives of a scalar by one named symbol, a list or a matrix of them, e.g. P = dW/dF.
@@ -376,18 +388,26 @@ class Model:
         if local and any(n.op is Op.SUM for n in reachable([root], stop=sources.__contains__)):
             raise ModelError(f"{name}: {value} depends on an integral; give it a name of its own")
         slopes = gradient(self.graph, root, sources, given=self._given, flat=local)
-        return self._named(name, symbols, [slopes[s] for s in sources], [value, *symbols.values])
+        below = [value, *symbols.values]
+        derivatives = self._named(name, symbols, [slopes[s] for s in sources], below)
+        self._record.slopes(value, symbols.values, Entries.of(derivatives).values)
+        return derivatives
 
     def integral(self, name: str, integrand: Any) -> sp.Symbol:
         """Quadrature of `integrand` over the parent element."""
         node = self.graph.sum(self._lower(integrand * self.weight))
-        return self._name(name, node, integrand, known=False)
+        symbol: sp.Symbol = self._record.define(
+            self._name(name, node, integrand, known=False), Integral(integrand)
+        )
+        return symbol
 
     def potential(self, expression: Any, *, constant: Iterable[Any] = ()) -> None:
         """The residual is the gradient of `expression` with the `constant` symbols frozen.
 
         Further potentials and weak forms add up.
         """
+        constant = list(constant)
+        self._record.potentials.append((expression, tuple(constant)))
         value, frozen = self._lower(expression), [self._lower(s) for s in constant]
         if value.varying:
             raise ModelError(
@@ -415,6 +435,7 @@ class Model:
         for name, value in values.items():
             if name in [n for n, _ in self._fields]:
                 raise ModelError(f"the field {name} is given twice in model {self.name}")
+            self._record.fields.append((name, value))
             self._fields.append((name, self._lower(value)))
 
     def offer(
@@ -498,6 +519,7 @@ class Model:
             components=self._components or 2,
             places=tuple(self._places),
             history=tuple(name for name, _ in self._history),
+            record=self._record,
         )
 
         chosen = chosen or ()
@@ -588,4 +610,6 @@ class Model:
         if self._bound.get(self._symbols.setdefault(label, symbol), node) is not node:
             raise ModelError(f"the name {label} is used twice in model {self.name}")
         self._bound[symbol] = node
+        if isinstance(node.payload, Input):
+            self._record.inputs[symbol] = (node.payload.array, node.payload.index)
         return symbol

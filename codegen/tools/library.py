@@ -10,7 +10,7 @@ is not seen to change by `folder_of`; `softehl generate` runs it in any case.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import Field, dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -160,8 +160,15 @@ def _told(value: Any) -> str:
     return "\n".join([*lines, _entries(value, place.__getitem__)])
 
 
+def _counts(f: Field[Any]) -> bool:
+    return f.compare and f.name[0] != "_"
+
+
 def _entries(value: Any, shown: Callable[[Node], str]) -> str:
-    """A value as text, nodes as `shown`; what a record notes for itself (_name) does not count."""
+    """A value as text, nodes as `shown`.
+
+    What a record notes for itself (_name) or does not compare does not count.
+    """
     from softehl.codegen.graph.graph import Graph, Node
 
     if isinstance(value, Node):
@@ -171,7 +178,7 @@ def _entries(value: Any, shown: Callable[[Node], str]) -> str:
     elif isinstance(value, (tuple, list)):
         inside = [_entries(v, shown) for v in value]
     elif is_dataclass(value):
-        named = {f.name: getattr(value, f.name) for f in fields(value) if f.name[0] != "_"}
+        named = {f.name: getattr(value, f.name) for f in fields(value) if _counts(f)}
         inside = [type(value).__name__, _entries(named, shown)]
     else:
         return "" if isinstance(value, Graph) else repr(value)
