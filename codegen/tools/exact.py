@@ -269,6 +269,26 @@ class Evaluation:
         plus, minus = (self._with(s, q, (by,), [x + t * h], (value,))[0] for t in (1, -1))
         return (plus - minus) / (2 * h)
 
+    def real(self) -> bool:
+        """Whether potentials and fields have real values."""
+        page = self.evaluator.program
+        try:
+            for slot, _ in page.potentials:
+                self.value(slot)
+            for q in range(len(self.rows)):
+                for slot in page.fields:
+                    self.value(slot, q)
+        except NotRealError:
+            return False
+        return True
+
+    def value(self, slot: int, q: int = 0) -> Number:
+        """A value; `NotRealError` if there is none."""
+        v = self.rows[q][slot]
+        if v is None or isinstance(v, bool):
+            raise NotRealError
+        return v
+
     # local equations ----------------------------------------------------------------------------
 
     def _solve(self, s: Step, row: Row, q: int) -> Vector:
@@ -314,13 +334,6 @@ class Evaluation:
         }
         made.run(self.evaluator.depending(frozenset(moves), roots))
         return made
-
-    def value(self, slot: int, q: int = 0) -> Number:
-        """A value; `NotRealError` if there is none."""
-        v = self.rows[q][slot]
-        if v is None or isinstance(v, bool):
-            raise NotRealError
-        return v
 
 
 def _slopes(residual: Callable[[Vector], Vector], at: Vector, h: Number) -> list[Vector]:

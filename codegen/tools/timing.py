@@ -9,7 +9,7 @@ from time import thread_time
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import samples
-from softehl.codegen.tools.verify import Batch
+from softehl.codegen.tools.batch import Batch
 
 ELEMENTS = 64
 """All in one state: a batch that stays in the cache."""

@@ -200,7 +200,7 @@ class _Builder:
         if e.is_Number or isinstance(e, BooleanAtom) or e in (sp.pi, sp.E):
             return self._add("number", (), _constant(e))
         if isinstance(e, Relational):
-            self.switches.append(Switch(at[0], at[1], str(e), True))
+            self.switches.append(Switch(at[0], at[1], f"{e.lhs} > {e.rhs}", True))
             return self._add(e.rel_op, at)
         simple = {
             **{sp.Add: "sum", sp.Mul: "product", sp.And: "and", sp.Or: "or", sp.Not: "not"},
