@@ -12,6 +12,14 @@ from softehl.codegen.graph.graph import Node, Op
 
 Number = Any
 
+
+def arctangent(y: Number, x: Number) -> Number:
+    """Angle of (x, y); mpmath has no words of its own for complex operands."""
+    if isinstance(x, mpmath.mpc) or isinstance(y, mpmath.mpc):
+        raise ValueError("atan2 of a complex number")
+    return mpmath.atan2(y, x)
+
+
 _OPERATIONS: dict[Op, Callable[..., Number]] = {
     Op.NAME: lambda a: a,
     Op.ADD: lambda a, b: a + b,
@@ -38,7 +46,7 @@ _OPERATIONS: dict[Op, Callable[..., Number]] = {
     Op.ATANH: mpmath.atanh,
     Op.ERF: mpmath.erf,
     Op.ERFC: mpmath.erfc,
-    Op.ATAN2: mpmath.atan2,
+    Op.ATAN2: arctangent,
     Op.POWER: lambda a, e: a**e,
     Op.LT: lambda a, b: a < b,
     Op.LE: lambda a, b: a <= b,

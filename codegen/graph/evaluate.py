@@ -8,6 +8,7 @@ from typing import Any
 
 import mpmath
 
+from softehl.codegen.graph.arithmetic import arctangent
 from softehl.codegen.graph.evaluate_routines import results
 from softehl.codegen.graph.graph import Input, Node, Op, Place, Routine
 from softehl.codegen.graph.traverse import Recursion, reachable, recursion
@@ -41,7 +42,7 @@ _UNARY: dict[Op, Callable[[Number], Number]] = {
     Op.NOT: lambda a: not a,
 }
 _BINARY: dict[Op, Callable[[Number, Number], Number]] = {
-    Op.ATAN2: mpmath.atan2,
+    Op.ATAN2: arctangent,
     Op.POWER: lambda a, e: a**e,
     Op.ADD: lambda a, b: a + b,
     Op.SUB: lambda a, b: a - b,

@@ -16,6 +16,7 @@ from softehl.codegen.tools.location import CacheError
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.codegen.tools.samples import NoStateError
 from softehl.codegen.tools.trace import show as show_trace
+from softehl.codegen.tools.verify import SECONDS
 
 CHECKOUT = (GENERATED.parent / "pyproject.toml").exists()
 """Whether this is a source checkout: what is installed is never written to."""
@@ -27,11 +28,12 @@ def generate(
     trace: str | None = None,
     target: str = Target.SIMD,
     out: Path | None = None,
+    seconds: float = SECONDS,
 ) -> int:
     """See `_generate`; says what is wrong in one line."""
     try:
         _require_printable(*models, *([out] if out else []))
-        return _generate(models, check, trace, Target(target), out)
+        return _generate(models, check, trace, Target(target), out, seconds)
     except (ModelFileError, NoStateError, BuildError, CacheError) as error:
         return _refused(str(error))
     except OSError as error:
@@ -52,7 +54,12 @@ def _refused(message: str) -> int:
 
 
 def _generate(
-    models: Sequence[Path], check: bool, trace: str | None, target: Target, out: Path | None
+    models: Sequence[Path],
+    check: bool,
+    trace: str | None,
+    target: Target,
+    out: Path | None,
+    seconds: float,
 ) -> int:
     """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1).
 
@@ -66,7 +73,7 @@ def _generate(
             return cli_files.write_target(models, target, out)
         return targets.write((make() for make in ALL.values()), target, out)
     if models:
-        return cli_files.generate(models, out=out, check=check, trace=trace)
+        return cli_files.generate(models, out=out, check=check, trace=trace, seconds=seconds)
     if out is not None:
         return _refused("--out needs a MODEL.py or a --target")
     if trace is not None:

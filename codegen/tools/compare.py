@@ -27,6 +27,8 @@ BOUND = 1e-10
 """Largest relative error that is rounding; a wrong derivative is off by far more."""
 ROWS = 8
 FLOOR = 1e-6
+SHOWN = 5
+"""Unreached places that are named; of others their number is told."""
 ROUNDINGS = 1000
 """A kernel has other operations than its page, and their errors add up."""
 LOST = 1e-6
@@ -39,7 +41,8 @@ class Report:
 
     errors: the largest of each task. compared: states. unreal, unsolved, unclear: states left out
     because the page has no real value there, a local iteration has no solution, or doubles cannot
-    hold the result. missing: what no state met, in words. late: whether time was short.
+    hold the result. missing: what no state met, in words; tasks: those that were compared at no
+    state. late: whether time was short.
     """
 
     errors: dict[str, float] = field(default_factory=dict)
@@ -48,7 +51,34 @@ class Report:
     unsolved: int = 0
     unclear: int = 0
     missing: list[str] = field(default_factory=list)
+    tasks: list[str] = field(default_factory=list)
     late: bool = False
+
+
+    def told(self, seconds: float) -> str:
+        """How far the check went, in one line."""
+        left = {
+            "without a real value": self.unreal,
+            "without a local solution": self.unsolved,
+            "where rounding hides the result": self.unclear,
+        }
+        words = [f"compared with its page at {self.compared - self.unclear} states"]
+        out = [f"{count} {what}" for what, count in left.items() if count]
+        words += [f"left out: {', '.join(out)}"] if out else []
+        if self.missing:
+            more = len(self.missing) - SHOWN
+            shown = self.missing[:SHOWN] + ([f"{more} more"] if more > 0 else [])
+            words.append(f"not reached: {', '.join(shown)}")
+        if self.late:
+            words.append(f"not all states in {seconds:g} s: --check-seconds gives more")
+        return "; ".join(words)
+
+    def untold(self, seconds: float) -> str:
+        """Tasks that could not be compared, and what to do."""
+        why = f"the {seconds:g} s of --check-seconds are too few"
+        if not self.late:
+            why = "rounding hides them at all states; name better ones with m.example(...)"
+        return f"{', '.join(self.tasks)} could not be compared: {why}"
 
 
 class Comparison:
@@ -111,8 +141,10 @@ class Comparison:
                 error = view.error(task)
                 if not error <= BOUND:
                     allowed = self._rounding(view, task, far=far)
-                    unclear = unclear or allowed is None
-                    error = 0.0 if allowed is None else error / (1 + allowed / BOUND)
+                    if allowed is None:
+                        unclear = True
+                        continue
+                    error /= 1 + allowed / BOUND
                 self.report.errors[task] = max(self.report.errors.get(task, 0.0), error)
         except NotRealError:
             self.report.unreal += 1
@@ -123,6 +155,8 @@ class Comparison:
 
     def _rounding(self, view: _View, task: str, *, far: bool) -> float | None:
         """The error that rounding explains; None if it explains any."""
+        if far and view.noise(task) > LOST:
+            return None
         try:
             page = Page(self.rounded, view.page.state)
             spread = view.spread(task, page)
@@ -153,6 +187,13 @@ class _View:
         scale = self.scales(task, exact)
         changes = [abs(a - b) / s for a, b, s in zip(given, exact, scale, strict=True)]
         return max(changes, default=0.0)
+
+    def noise(self, task: str) -> float:
+        """Error of the exact values, which have digits to lose, over the smallest scale."""
+        if task in (abi.Task.ENERGY, *abi.AT_POINTS):
+            return 0.0
+        order = 1 if task == abi.Task.RESIDUAL else 2
+        return self.page.noise(order) / min(self.scales(task, self.expected(task, self.page)))
 
     def moving(self) -> set[int]:
         """Rows of the residual that are not zero."""
@@ -263,7 +304,7 @@ def _double(v: Any) -> float:
     return value
 
 
-def idle(d: Definition, moving: set[int], size: int) -> Iterator[str]:
-    """Rows of the residual that were zero at every state, in words."""
-    for k in sorted(set(range(size)) - moving):
-        yield f"row {d.unknowns[k] if k < len(d.unknowns) else k} is zero everywhere"
+def idle(comparison: Comparison) -> Iterator[str]:
+    """Rows of the residual that a page fills and that were zero at every state, in words."""
+    for k in sorted(comparison.program.moved() - comparison.moving):
+        yield f"the residual of {comparison.d.unknowns[k]} other than zero"

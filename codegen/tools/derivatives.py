@@ -73,6 +73,12 @@ class Page:
             for rows in zip(plus, minus, strict=True)
         ]
 
+    @_in_digits
+    def noise(self, order: int) -> float:
+        """Error of a derivative of this order by differences: digits that cancel."""
+        n = self.evaluator.arithmetic
+        return float(self.here.largest() * n.near / n.step**order)
+
     def _numbers(self, values: Sequence[float]) -> Vector:
         return [self.evaluator.arithmetic.number(v) for v in values]
 

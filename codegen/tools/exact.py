@@ -269,6 +269,14 @@ class Evaluation:
         plus, minus = (self._with(s, q, (by,), [x + t * h], (value,))[0] for t in (1, -1))
         return (plus - minus) / (2 * h)
 
+    def largest(self) -> Number:
+        """Largest part of a potential: what the digits of a difference are counted from."""
+        steps, found = self.evaluator.program.steps, []
+        for slot, _ in self.evaluator.program.potentials:
+            parts = [a for a in steps[slot].args if steps[slot].name in ("sum", "integral")]
+            found += [self.value(k, q) for k in (slot, *parts) for q in range(len(self.rows))]
+        return max(map(abs, found))
+
     def real(self) -> bool:
         """Whether potentials and fields have real values."""
         page = self.evaluator.program
@@ -311,7 +319,7 @@ class Evaluation:
             if changed <= least or (before is not None and 2 * changed > before <= 1e6 * least):
                 self.solved[s.slot, q] = found, inverse
                 return found
-            if changed > n.coarse**0.25 * size:
+            if changed > n.close * size:
                 inverse = None
         raise NotRealError
 

@@ -81,7 +81,9 @@ class Explorer:
             for f in self._steered(known[0], wanted):
                 yield f.state
                 wanted -= f.meets
-        self.missing = sorted(wanted)
+        conditions = [self.program.switches[k].condition for k, _ in sorted(wanted)]
+        pairs = zip(sorted(wanted), conditions, strict=True)
+        self.missing = [t for t, condition in pairs if condition or t[1] == "near"]
         yield from self._near([*known, *self.pool])
         yield from (f.state for f in self.pool[:FAR])
 
@@ -92,8 +94,7 @@ class Explorer:
         text = switch.text if len(switch.text) < 60 else switch.text[:57] + "..."
         if switch.condition:
             return f"{text} {'true' if side == 'above' else 'false'}"
-        words = {"below": "below -4", "near": "near 0", "above": "above 4"}
-        return f"{text} with an argument {words[side]}"
+        return f"{text} where its argument is near 0"
 
     # probing ------------------------------------------------------------------------------------
 

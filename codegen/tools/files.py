@@ -30,16 +30,25 @@ REMEDY = "mend it with: softehl generate"
 
 
 def generate(
-    paths: Sequence[Path], *, out: Path | None = None, check: bool = False, trace: str | None = None
+    paths: Sequence[Path],
+    *,
+    out: Path | None = None,
+    check: bool = False,
+    trace: str | None = None,
+    seconds: float = verify.SECONDS,
 ) -> int:
     """Exit code: 0 done, 1 a tangent is off or (`check`) something is stale, 2 no such model.
 
+    The check of each kernel takes at most so many `seconds`.
     Raises `ModelFileError`, `NoStateError`, `BuildError`, `CacheError`, OSError.
     """
     groups = [(list(paths), out)] if out else [([p], default_folder(p)) for p in paths]
     if trace is not None:
         return _trace(paths, trace)
-    codes = [(_check if check else _generate)(files, folder) for files, folder in groups]
+    codes = [
+        _check(files, folder) if check else _generate(files, folder, seconds)
+        for files, folder in groups
+    ]
     if check and any(codes):
         where = f" --out {out}" if out else ""
         print(f"{REMEDY} {' '.join(map(str, paths))}{where}", file=sys.stderr)
@@ -61,14 +70,19 @@ def default_folder(path: Path) -> Path:
     return path.parent / "generated" / path.stem
 
 
-def _generate(paths: Sequence[Path], folder: Path) -> int:
+def _generate(paths: Sequence[Path], folder: Path, seconds: float) -> int:
     build.tuned()  # a missing compiler is better named before the derivation than after
     definitions, made = library.of_files(paths)
     changed = write(folder, made)
     names = " ".join(p.name for p in paths)
     print(f"{names}: {len(made.files) + 2} files in {folder}, {changed} of them new or changed")
-    errors, unchecked = _errors(paths, definitions, made)
+    reports, unchecked = _reports(paths, definitions, made, seconds)
+    errors = {name: r.errors for name, r in reports.items()}
     Console().print(_table(made, errors, _times(definitions, made)))
+    for name, report in reports.items():
+        print(f"{name}: {report.told(seconds)}")
+        if report.tasks:
+            unchecked.append(f"{name}: {report.untold(seconds)}")
     for d in (d for d in definitions if d.given):
         print(f"{d.name} gives derivatives of its own: residual and tangent were not compared")
     for d in definitions:
@@ -80,21 +94,24 @@ def _generate(paths: Sequence[Path], folder: Path) -> int:
     return max([2 * bool(unchecked), *(_judge(name, found) for name, found in errors.items())])
 
 
-def _errors(
-    paths: Sequence[Path], definitions: Sequence[Definition], made: library.Library
-) -> tuple[dict[str, dict[str, float]], list[str]]:
-    """Errors of each kernel and task, and why some kernels could not be checked."""
+def _reports(
+    paths: Sequence[Path],
+    definitions: Sequence[Definition],
+    made: library.Library,
+    seconds: float,
+) -> tuple[dict[str, verify.Report], list[str]]:
+    """What the check of each kernel found, and why some kernels could not be checked."""
     written = {name: d for p in paths for name, d in user.written_out(p).items()}
-    errors, unchecked = {}, []
+    reports, unchecked = {}, []
     for d in definitions:
         tasks = _entries(made.files)[d.name]["tasks"]
         try:
-            errors[d.name] = verify.errors(
-                d, tasks, made.folder / build.LIBRARY, written.get(d.name)
+            reports[d.name] = verify.check(
+                d, tasks, made.folder / build.LIBRARY, written.get(d.name), seconds
             )
         except NoStateError as error:
             unchecked.append(str(error))
-    return errors, unchecked
+    return reports, unchecked
 
 
 def _times(definitions: Sequence[Definition], made: library.Library) -> dict[str, dict[str, float]]:

@@ -82,9 +82,9 @@ def check(
     except OutOfTimeError:
         report.late = True
     report.unreal += explorer.unreal
-    report.missing += [t for t in tasks if t not in report.errors]
+    report.tasks = [t for t in tasks if t not in report.errors]
     report.missing += [explorer.text(t) for t in explorer.missing]
-    report.missing += idle(definition, comparison.moving, len(states[0].dofs))
+    report.missing += idle(comparison) if report.compared else []
     return report
 
 

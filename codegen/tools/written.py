@@ -66,6 +66,16 @@ class Program:
     fields: list[int] = field(default_factory=list)
     switches: list[Switch] = field(default_factory=list)
 
+    def moved(self) -> set[int]:
+        """Unknowns that the potentials see where they are not frozen, by number."""
+        found = set()
+        for slot, frozen in self.potentials:
+            for k in _needed(self.steps, [slot], stop=frozen):
+                s = self.steps[k]
+                if s.name == "input" and s.content[0] == "dofs":
+                    found.add(s.content[1])
+        return found
+
     def above(self, roots: Iterable[int]) -> list[Step]:
         """The operations of `main` that `roots` need, in order."""
         needed = _needed(self.steps, roots)
@@ -81,8 +91,14 @@ def program(d: Definition) -> Program:
     out.fields = [made(value) for _, value in (*d.record.fields, *d.record.history)]
     out.steps = made.steps
     out.main = [s for s in made.steps if not s.locals]
-    out.switches = [s for s in made.switches if not made.steps[s.slot].locals]
+    out.switches = [s for s in made.switches if _changes(out, s)]
     return out
+
+
+def _changes(p: Program, s: Switch) -> bool:
+    """Whether a switch depends on arguments, and on no local unknowns."""
+    operands = [p.steps[k] for k in (s.slot, s.other) if k is not None]
+    return not any(x.locals for x in operands) and any(x.depends or x.varying for x in operands)
 
 
 FUNCTIONS = {
@@ -268,9 +284,11 @@ class _Builder:
         return tuple(self.steps[k] for k in sorted(reached - set(sources)))
 
 
-def _needed(steps: Sequence[Step], roots: Iterable[int]) -> set[int]:
-    """Slots of all operations below `roots`, and they themselves."""
-    needed: set[int] = set()
+def _needed(
+    steps: Sequence[Step], roots: Iterable[int], stop: Iterable[int] = ()
+) -> set[int]:
+    """Slots of all operations below `roots`, and they themselves; none below `stop`."""
+    needed: set[int] = set(stop)
     waiting = list(roots)
     while waiting:
         slot = waiting.pop()

@@ -86,8 +86,20 @@ def _commands() -> "click.Group":
         type=click.Path(path_type=Path, file_okay=False),
         help="Folder for MODEL.py or --target  [default: generated/MODEL beside MODEL.py]",
     )
+    @click.option(
+        "--check-seconds",
+        type=click.FloatRange(min=0, min_open=True),
+        default=10.0,
+        show_default=True,
+        help="For comparing each kernel with its page.",
+    )
     def generate(
-        models: tuple[Path, ...], check: bool, trace: str | None, target: str, out: Path | None
+        models: tuple[Path, ...],
+        check: bool,
+        trace: str | None,
+        target: str,
+        out: Path | None,
+        check_seconds: float,
     ) -> int:
         """Derive, compile and check the kernels of your own models, in MODEL.py.
 
@@ -97,7 +109,7 @@ def _commands() -> "click.Group":
         with with_sympy():
             from softehl.codegen.tools.cli import generate
 
-            return generate(models, check, trace, target, out)
+            return generate(models, check, trace, target, out, check_seconds)
 
     @commands.command()
     def kernels() -> int:
