@@ -23,6 +23,7 @@ root_doc = "docs/index"
 include_patterns = [
     "docs/*.md",
     "docs/gallery/*.md",
+    "docs/validation/*.md",
     "benchmarks/README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",

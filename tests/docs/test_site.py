@@ -13,7 +13,8 @@ import softehl
 from tests.docs.pages import Reader, blocks
 
 ROOT = Path(__file__).parents[2]
-PLACES = ("*.md", "docs/*.md", "docs/gallery/*.md", "benchmarks/*.md")
+FOLDERS = ("gallery", "validation")
+PLACES = ("*.md", "docs/*.md", *(f"docs/{name}/*.md" for name in FOLDERS), "benchmarks/*.md")
 PAGES = sorted(page for place in PLACES for page in ROOT.glob(place))
 
 _FENCED = re.compile(r"^```.*?^```$|^ {4}.*?$|`[^`\n]*`", re.MULTILINE | re.DOTALL)
@@ -67,13 +68,26 @@ def test_links_are_found() -> None:
     assert "https://distributed.dask.org" in found["docs/many-curves.md"]
 
 
+def in_trees(page: Path) -> set[str]:
+    """Pages of its folder that a page has in its tables of contents."""
+    trees = "\n".join(re.findall(r"```\{toctree\}(.*?)```", page.read_text(), re.DOTALL))
+    return set(re.findall(r"^([\w-]+)$", trees, re.MULTILINE))
+
+
 def test_every_page_is_on_the_front_page() -> None:
-    front = (ROOT / "docs" / "index.md").read_text()
-    trees = "\n".join(re.findall(r"```\{toctree\}(.*?)```", front, re.DOTALL))
-    listed = set(re.findall(r"^([\w-]+)$", trees, re.MULTILINE))
+    front = ROOT / "docs" / "index.md"
     pages = {page.stem for page in (ROOT / "docs").glob("*.md")} - {"index"}
-    assert listed == pages
-    assert {f"{page}.md" for page in pages} <= set(links(ROOT / "docs" / "index.md"))
+    assert in_trees(front) == pages
+    assert {f"{page}.md" for page in pages} <= set(links(front))
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_every_page_of_a_folder_is_on_its_front_page(folder: str) -> None:
+    front = ROOT / "docs" / folder / "index.md"
+    pages = {page.stem for page in front.parent.glob("*.md")} - {"index"}
+    assert in_trees(front) == pages
+    assert {f"{page}.md" for page in pages} <= set(links(front))
+    assert f"\n{folder}/index\n" in (ROOT / "docs" / "index.md").read_text()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=is_named)
