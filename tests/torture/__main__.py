@@ -256,19 +256,29 @@ def _by_dask(work: Path, *command: str) -> Ended:
 
 
 GROUPS = (
-    (kills, 0.2, "kill -9 of a run", "no half file, nothing lost; resumed to the same curve"),
-    (sweeps, 0.1, "kill -9 of a sweep", "no half file; begun again it ends"),
+    (kills, 0.2, "kill -9 of a run", "no incomplete file, nothing lost; resumed to the same curve"),
+    (sweeps, 0.1, "kill -9 of a sweep", "no incomplete file; started again it ends"),
     (studies, 0.15, "kill -9 of a study of 200 runs", "resumed to the same table, byte by byte"),
     (engines, 0.05, "a study of 200 runs on processes, Dask, MPI", "equal tables, byte by byte"),
-    (pairs, 0.1, "two processes at once", "one of them, or both, right; the other says why not"),
+    (
+        pairs,
+        0.1,
+        "two processes at once",
+        "one of them or both are right; the other one says why it stops",
+    ),
     (
         damages,
         0.15,
         "a damaged file of a run",
-        "computed again or refused in one line; never believed",
+        "computed again or refused in one line; never used",
     ),
-    (caches, 0.15, "a damaged file of the cache", "healed without a word"),
-    (disks, 0.1, "full disks, folders that are none", "one line; what was there is still there"),
+    (caches, 0.15, "a damaged file of the cache", "made again, without a message"),
+    (
+        disks,
+        0.1,
+        "a full disk, a folder that cannot be used",
+        "an error of one line; existing files are unchanged",
+    ),
 )
 
 
