@@ -153,7 +153,7 @@ def leakage(store: Store, scope: Scope) -> Product:
         axes.legend()
 
     words = " What leaves in a cycle per unit of stroke and area; positive: the seal leaks."
-    caption = density_words(scope.mesh(16), 16) + words + " Hollow: no plain result."
+    caption = density_words(scope.mesh(16), 16) + words + " Hollow: not ok."
     return Product({"leakage": Table(LeakageRow.header(), cells)}, caption, draw, (4.6, 3.2))
 
 

@@ -142,7 +142,7 @@ def doubts(states: Sequence[State]) -> str:
         if not state.plain:
             found.setdefault(state.verdict, []).append(_short(state, states))
     named = [f"{verdict}: {', '.join(dict.fromkeys(names))}" for verdict, names in found.items()]
-    return f" Marked, not plain results - {'; '.join(named)}." if named else ""
+    return f" Marked, because not ok - {'; '.join(named)}." if named else ""
 
 
 def _short(state: State, among: Sequence[State]) -> str:

@@ -1,0 +1,147 @@
+"""The pages describe the program as it is, agree with it and with each other, in plain words."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import click
+import pytest
+
+from softehl.__main__ import _commands as program
+from softehl.cases.harness.case import load_case
+from softehl.cases.harness.parameters import keys_of
+from softehl.cases.seal import verdict
+from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.rubber import youngs_modulus
+from softehl.cases.shipped import SHIPPED
+from tests.docs.test_site import PAGES, ROOT, is_named
+
+TIMELESS = [page for page in PAGES if page.name != "CHANGELOG.md"]
+"""Pages that say what is; the change log says what was."""
+
+HISTORY = (
+    r"\b20\d\d-\d\d-\d\d\b",
+    r"\b\d{1,2} (January|February|March|April|May|June|July|August|September|October|November"
+    r"|December) \d{4}\b",
+    r"\bused to be\b",
+    r"\bare `?ok`? since\b",
+    r"\bBefore, ",
+    r"\b(before|had) and now\b",
+    r"\bthan before\b",
+    r"\|[^|\n]*\b(before|now|after)\b[^|\n]*\|[^|\n]*\b(before|now|after)\b[^|\n]*\|",  # of a table
+    r"\b(gland|number|X-ring|U-cup|trapezoid) \d+ \((\d|p_s)",
+)
+"""Signs of a diary."""
+
+PRIVATE = (
+    "plain result",
+    "without a word",
+    "that are none",
+    "stands behind",
+    "what was not said",
+    "## Rooms",
+    "Nobody differentiates",
+    "drawer",
+    "page of mathematics",
+    "takes no part",
+    "is believed",
+)
+"""Words of our own, and sentences that have to be guessed."""
+
+
+@pytest.mark.parametrize("page", TIMELESS, ids=is_named)
+def test_a_page_has_no_history(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    found = [match[0] for pattern in HISTORY for match in re.finditer(pattern, text)]
+    assert found == []
+
+
+@pytest.mark.parametrize("page", TIMELESS, ids=is_named)
+def test_a_page_has_standard_words(page: Path) -> None:
+    text = " ".join(page.read_text(encoding="utf-8").split(" "))
+    assert [words for words in PRIVATE if words in " ".join(text.split("\n"))] == []
+
+
+def commands() -> Iterator[tuple[str, list[str]]]:
+    """Page and words of every command line of a page."""
+    for page in TIMELESS:
+        text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+        for line in re.findall(
+            r"^(?: {4}|\$ |.*?mpiexec -n \d+ )(softehl .*)$", text, re.MULTILINE
+        ):
+            yield is_named(page), shlex.split(line, comments=True)
+
+
+def test_commands_have_options_and_keys_that_there_are() -> None:
+    group = program()
+    assert isinstance(group, click.Group)
+    keys = {
+        name: {k.name for k in keys_of(load_case(SHIPPED[name]).parameters)} for name in SHIPPED
+    }
+    seen = 0
+    for page, (_, name, *rest) in commands():
+        assert name in group.commands, f"{page}: softehl {name}"
+        known = {o for option in group.commands[name].params for o in option.opts}
+        for word in rest:
+            option = word.split("=")[0].strip("[]")
+            assert not option.startswith("--") or option in known, f"{page}: {name} {option}"
+        case = rest[0] if rest else ""
+        for flag, value in pairwise(rest):
+            if flag == "--set" and case in keys:
+                key = re.split(r"[=.]", value)[0]
+                assert key in keys[case], f"{page}: --set {key}"
+                seen += 1
+    assert seen > 50
+
+
+def row(page: str, start: str) -> str:
+    """The line of a page that begins so; `seal` pages say the limits of a verdict in a table."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    (line,) = [line for line in text.splitlines() if line.startswith(start)]
+    return line
+
+
+def test_limits_of_verdicts_are_those_of_the_code_on_both_pages() -> None:
+    exits = f"below {verdict.EXIT_FILMS:g} h\\* and below {verdict.END_GAP:g} mm"
+    low, high = verdict.INLET_RATIO
+    ratio = f"`inlet_ratio` outside {low:g} to {high:g}"
+    fewest, lobes = f"{verdict.FEWEST_INLET_SEGMENTS:g}", f"{verdict.FEWEST_OF_LOBES:g}"
+    near = f"outside {1 - verdict.NEXT_RATIO:g} to {1 + verdict.NEXT_RATIO:g}"
+    error = f"above {verdict.LARGEST_ERROR:g} %"
+    for page, start, words in (
+        ("limits.md", "| the gap at the exit end", (exits,)),
+        ("film-resolution.md", "| `clipped` |", (exits,)),
+        (
+            "limits.md",
+            "| an inlet that the mesh",
+            (ratio, f"fewer than {fewest} segments, {lobes}"),
+        ),
+        ("film-resolution.md", "| `under-resolved` too | graded", (ratio,)),
+        ("film-resolution.md", "| `under-resolved` | inlet", (f"< {fewest} (two lobes: {lobes}",)),
+        ("limits.md", "| the same of the second", (near,)),
+        ("limits.md", "| an estimated error above", (error,)),
+        ("film-resolution.md", "| `uncertain` |", (error,)),
+        ("film-resolution.md", "| `oscillating` |", (f"index > {verdict.STRONG_OSCILLATION:g}",)),
+        ("film-resolution.md", "| `collapsed` |", (f"U^{verdict.LARGEST_EXPONENT:g}",)),
+    ):
+        for said in words:
+            assert said in row(page, start), f"{page}: {said}"
+
+
+def test_a_hardness_has_one_modulus_on_all_pages() -> None:
+    """Gent's; the default rubber is named by its modulus."""
+    default = ORing().mu_1 + ORing().mu_2
+    found = 0
+    for page in TIMELESS:
+        text = " ".join(page.read_text(encoding="utf-8").split())
+        assert not re.search(rf"NBR 70[^.|]*\b{default:g}", text), is_named(page)
+        named = re.findall(r"(\d\d) Shore A(?: has)?(?: a shear modulus of)? (\d+\.\d+)", text)
+        for shore, modulus in named:
+            mine = youngs_modulus(float(shore)) / 3.0
+            assert float(modulus) == pytest.approx(mine, rel=5e-3), is_named(page)
+            found += 1
+    assert found >= 4
