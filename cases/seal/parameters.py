@@ -48,7 +48,9 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
     )
 
     density: Literal[1, 2, 4, 8, 16] = key(
-        2, "mesh density d: 27 d segments on the lubricated arc", bounds="1, 2, 4, 8 or 16"
+        2,
+        "mesh density d: 27 d segments on an arc that is given, 33 d or more on one that is found",
+        bounds="1, 2, 4, 8 or 16",
     )
     mesh: Literal["graded", "uniform", "file"] = key(
         "graded",
