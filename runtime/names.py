@@ -1,9 +1,10 @@
-"""Names that were not found: a hint at the one that was probably meant."""
+"""Names that were not found, functions of other arguments: hints at what was probably meant."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+import inspect
+from collections.abc import Callable, Iterable
 
 _AS_GOOD = 0.05
 """Names whose likeness differs by less are as likely: `pressure` may be `sealed_pressure`."""
@@ -30,3 +31,16 @@ def meant(given: object, known: Iterable[str]) -> str:
 def listed(known: Iterable[str]) -> str:
     """Names for a message, "none" where there are none."""
     return ", ".join(known) or "none"
+
+
+def misfit(function: Callable[..., object], *arguments: str) -> str:
+    """What a function takes, for a message, where it cannot be called with these; else ""."""
+    try:
+        takes = inspect.signature(function)
+    except (TypeError, ValueError):  # one that is built in does not tell
+        return ""
+    try:
+        takes.bind(*arguments)
+    except TypeError:
+        return f"a function of ({', '.join(arguments)}) is needed, this one takes {takes}"
+    return ""

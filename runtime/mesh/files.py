@@ -1,92 +1,84 @@
-"""Mesh files by meshio: physical groups and cell sets become named cells and sides, and back."""
+"""Mesh files: groups of cells become named cells and sides, and back; Gmsh's, others by meshio."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from softehl.runtime.arrays import Integers
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.io import write_text
+from softehl.runtime.mesh import gmsh
 from softehl.runtime.mesh.cells import BY_FILE, CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError
 
 _DEFECTS = (OSError, ValueError, KeyError, IndexError, TypeError, AssertionError, SystemExit)
 
+Names = Mapping[str, Mapping[str, Integers]]
+"""Name -> kind of cell -> numbers of cells of that kind."""
+
 
 def read(path: Path) -> Mesh:
     """See `Mesh.read`."""
-    import meshio  # late: it is slow to import
-
     if not path.is_file():
         raise MeshError(f"no mesh file {str(path)!r}")
     try:
-        found = meshio.read(path)
-    except (*_DEFECTS, meshio.ReadError) as error:
+        data = path.read_bytes() if path.suffix == ".msh" else b""
+        found = gmsh.parse(data) if data.startswith(b"$MeshFormat") else _by_meshio(path)
+    except _DEFECTS as error:
         words = " ".join(str(error).split()) or "not a mesh file that meshio knows"
         raise MeshError(f"{path}: {words}") from None
-    blocks = [(BY_FILE.get(block.type), np.asarray(block.data)) for block in found.cells]
-    for cell, block in zip((c for c, _ in blocks), found.cells, strict=True):
-        if cell is None:
+    return _mesh(path, found.points, found.cells, found.names)
+
+
+def _by_meshio(path: Path) -> gmsh.Content:
+    """Raises MeshError for cells that are not known, or what is wrong with the file."""
+    import meshio  # late: it is slow to import
+
+    try:
+        found = meshio.read(path)
+    except meshio.ReadError as error:
+        raise ValueError(str(error)) from None
+    cells: dict[str, list[Integers]] = {}
+    names: dict[str, dict[str, list[Integers]]] = {name: {} for name in found.cell_sets}
+    for number, block in enumerate(found.cells):
+        if block.type not in BY_FILE:
             known = ", ".join(BY_FILE)
-            raise MeshError(f"{path}: cells of kind {block.type!r} are not known; known: {known}")
-    return _mesh(path, np.asarray(found.points, dtype=np.float64), blocks, _names(found))
+            raise ValueError(f"cells of kind {block.type!r} are not known; known: {known}")
+        kind = BY_FILE[block.type].name
+        before = cells.setdefault(kind, [])
+        first = sum(map(len, before))
+        for name, members in found.cell_sets.items():
+            chosen = np.asarray(members[number], dtype=np.int64)
+            names[name].setdefault(kind, []).append(first + chosen)
+        before.append(np.asarray(block.data, dtype=np.int64))
+    return gmsh.Content(
+        np.asarray(found.points, dtype=np.float64),
+        {kind: np.concatenate(parts) for kind, parts in cells.items()},
+        {n: {k: np.unique(np.concatenate(v)) for k, v in m.items()} for n, m in names.items()},
+    )
 
 
-def _names(found: Any) -> dict[str, list[Integers]]:
-    """Name -> for each block of the file the numbers of its cells that have the name."""
-    named = {n: [np.asarray(i, dtype=np.int64) for i in s] for n, s in found.cell_sets.items()}
-    tags = found.cell_data.get("gmsh:physical")
-    for name, (tag, _) in getattr(found, "field_data", {}).items():
-        if tags is not None:
-            named[name] = [np.flatnonzero(np.asarray(block) == tag) for block in tags]
-    return {name: parts for name, parts in named.items() if not name.startswith("gmsh:")}
-
-
-def _mesh(path: Path, points: Any, blocks: list[Any], names: dict[str, list[Integers]]) -> Mesh:
-    """Cells of the highest dimension are the mesh; of one less they are sides."""
-    top = max((cell.dimension for cell, data in blocks if len(data)), default=0)
+def _mesh(path: Path, points: Array, cells: Mapping[str, Integers], names: Names) -> Mesh:
+    """Cells of the highest dimension are the mesh; named ones of one less are sides."""
+    top = max((CELLS[kind].dimension for kind, nodes in cells.items() if len(nodes)), default=0)
     if not top:
         raise MeshError(f"{path}: there are no cells")
     if points.shape[1] > top and not np.ptp(points[:, top:], axis=0).any():
         points = points[:, :top]
-    cells: dict[str, list[Integers]] = {}
-    first: list[int] = []
-    for cell, data in blocks:
-        before = cells.setdefault(cell.name, []) if cell.dimension == top else []
-        first.append(sum(map(len, before)))
-        before.append(data.astype(np.int64))
-    kinds = {name: np.concatenate(parts) for name, parts in cells.items()}
-    mesh = Mesh(np.ascontiguousarray(points), kinds)
     groups: dict[str, dict[str, Integers]] = {}
     sides: dict[str, dict[str, Integers]] = {}
-    for name, parts in names.items():
-        for (cell, data), start, chosen in zip(blocks, first, parts, strict=True):
+    for name, members in names.items():
+        for kind, chosen in members.items():
             if not len(chosen):
                 continue
-            if cell.dimension == top:
-                known = groups.setdefault(name, {})
-                known[cell.name] = _joined(known.get(cell.name), start + chosen)
-            elif cell.dimension == top - 1:
-                known = sides.setdefault(name, {})
-                faces = _outward(mesh, cell.name, data[chosen].astype(np.int64))
-                known[cell.name] = _joined(known.get(cell.name), faces)
-    return _used(Mesh(mesh.points, mesh.cells, groups, sides))
-
-
-def _joined(before: Integers | None, more: Integers) -> Integers:
-    return more if before is None else np.concatenate([before, more])
-
-
-def _outward(mesh: Mesh, kind: str, faces: Integers) -> Integers:
-    """Faces as the cells of the mesh have them, from outside; those inside stay as they are."""
-    known = mesh.boundary.get(kind)
-    if known is None:
-        return faces
-    corners = CELLS[kind].corners
-    place = {tuple(sorted(row[:corners])): k for k, row in enumerate(known.tolist())}
-    rows = [place.get(tuple(sorted(row[:corners]))) for row in faces.tolist()]
-    return np.array([f if k is None else known[k] for f, k in zip(faces, rows, strict=True)])
+            if CELLS[kind].dimension == top:
+                groups.setdefault(name, {})[kind] = chosen
+            elif CELLS[kind].dimension == top - 1:
+                sides.setdefault(name, {})[kind] = cells[kind][chosen]
+    main = {kind: nodes for kind, nodes in cells.items() if CELLS[kind].dimension == top}
+    return _used(Mesh(np.ascontiguousarray(points), main, groups, sides))
 
 
 def _used(mesh: Mesh) -> Mesh:
@@ -103,55 +95,29 @@ def _used(mesh: Mesh) -> Mesh:
 
 def write(mesh: Mesh, path: Path) -> None:
     """See `Mesh.write`: to Gmsh sides are cells of one dimension less, with names."""
-    import meshio
-
     points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dimension)))
     if path.suffix == ".msh":
-        found, options = _named(mesh, points), {"file_format": "gmsh22", "binary": False}
-    else:
-        cells = [(CELLS[kind].meshio, nodes) for kind, nodes in mesh.cells.items()]
-        found, options = meshio.Mesh(points, cells), {}
+        try:
+            write_text(path, gmsh.text(points, *_named(mesh)))
+        except OSError as error:
+            raise MeshError(f"cannot write {str(path)!r}: {error}") from None
+        return
+    import meshio
+
+    cells = [(CELLS[kind].meshio, nodes) for kind, nodes in mesh.cells.items()]
     try:
-        meshio.write(path, found, **options)
+        meshio.write(path, meshio.Mesh(points, cells))
     except (*_DEFECTS, meshio.WriteError) as error:
         raise MeshError(f"cannot write {str(path)!r}: {' '.join(str(error).split())}") from None
 
 
-def _named(mesh: Mesh, points: Any) -> Any:
-    """The mesh with its groups and sides, as meshio has it."""
-    import meshio
-
-    blocks = list(mesh.cells.items())
-    sets: dict[str, list[Integers]] = {}
-    for name, group in mesh.groups.items():
-        sets[name] = [group.get(kind, np.empty(0, dtype=np.int64)) for kind in mesh.cells]
-    for name, side in mesh.sides.items():
-        for kind, faces in side.items():
-            parts = sets.setdefault(name, [])
-            parts += [np.empty(0, dtype=np.int64)] * (len(blocks) - len(parts))
-            parts.append(np.arange(len(faces)))
-            blocks.append((kind, faces))
-    for parts in sets.values():
-        parts += [np.empty(0, dtype=np.int64)] * (len(blocks) - len(parts))
-    tags, field_data = _tags(blocks, sets)
-    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    cells = [(CELLS[kind].meshio, nodes) for kind, nodes in blocks]
-    return meshio.Mesh(points, cells, cell_data=data, field_data=field_data)
-
-
-def _tags(
-    blocks: list[tuple[str, Integers]], sets: dict[str, list[Integers]]
-) -> tuple[list[Integers], dict[str, Any]]:
-    """Gmsh's form of names: one number for each cell, a name for each number."""
-    tags = [np.zeros(len(nodes), dtype=np.int64) for _, nodes in blocks]
-    field_data = {}
-    for number, (name, parts) in enumerate(sets.items(), start=1):
-        dimension = 0
-        for (kind, _), tag, chosen in zip(blocks, tags, parts, strict=True):
-            if not len(chosen):
-                continue
-            if tag[chosen].any():
-                raise MeshError(f"a cell of {name!r} has another name too: Gmsh files hold one")
-            tag[chosen], dimension = number, CELLS[kind].dimension
-        field_data[name] = np.array([number, dimension])
-    return tags, field_data
+def _named(mesh: Mesh) -> tuple[dict[str, Integers], dict[str, dict[str, Integers]]]:
+    """The cells and the faces of sides, and the names of both."""
+    cells = dict(mesh.cells)
+    names = {name: dict(group) for name, group in mesh.groups.items()}
+    for name in mesh.sides:
+        for kind, faces in mesh.faces(name).items():
+            before = cells.get(kind, faces[:0])
+            names.setdefault(name, {})[kind] = len(before) + np.arange(len(faces))
+            cells[kind] = np.concatenate([before, faces])
+    return cells, names

@@ -18,8 +18,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
-from softehl.runtime.names import meant
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.faces import as_known, matched, once
+from softehl.runtime.names import meant, misfit
 
 Faces: TypeAlias = Mapping[str, Integers]
 """Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
@@ -28,7 +29,7 @@ Predicate = Callable[[Array], Flags]
 """Of places (n, dim): which of them are meant, (n,)."""
 
 
-_NEAR = 1e-9  # of the size of a mesh or cell: places closer than that are the same
+_NEAR = 1e-9  # of the size of a mesh: places closer than that are the same
 
 
 class MeshError(ValueError):
@@ -40,7 +41,8 @@ class Mesh:
     """Points and cells, with names.
 
     points: (n, dim) places of the nodes. cells: kind -> node numbers (m, k). groups: name -> kind
-    -> numbers of cells of that kind. sides: name -> faces, from outside counterclockwise.
+    -> numbers of cells of that kind. sides: name -> faces, in any order of their nodes; `faces`
+    gives them from outside counterclockwise.
     """
 
     points: Array
@@ -159,14 +161,22 @@ class Mesh:
     @cached_property
     def boundary(self) -> Faces:
         """Every face that belongs to one cell only."""
+        return {name: once(faces, CELLS[name].corners) for name, faces in self._cell_faces.items()}
+
+    @cached_property
+    def _cell_faces(self) -> Faces:
+        """The faces of every cell: those between two cells stand twice."""
         found: dict[str, list[Integers]] = {}
         for kind, nodes in self.cells.items():
             for face, local in CELLS[kind].side_nodes:
                 found.setdefault(face.name, []).append(nodes[:, list(local)])
-        return {name: _once(np.concatenate(parts), CELLS[name]) for name, parts in found.items()}
+        return {name: np.concatenate(parts) for name, parts in found.items()}
 
     def faces(self, where: str | Predicate) -> Faces:
-        """Faces of a named side, or those of the boundary all of whose nodes are meant."""
+        """Faces of a named side, or those of the boundary all of whose nodes are meant.
+
+        Those of the boundary have their nodes as seen from outside, others as they were given.
+        """
         if callable(where):
             return self._meant_faces(where, "the predicate")
         if where == "boundary" and where not in self.sides:
@@ -174,7 +184,30 @@ class Mesh:
         if where not in self.sides:
             known = ", ".join([*self.sides, "boundary"])
             raise MeshError(f"no side {where!r}{meant(where, self.sides)}; there are {known}")
-        return self.sides[where]
+        return {
+            kind: as_known(faces, self.boundary[kind], CELLS[kind].corners)
+            if kind in self.boundary
+            else faces
+            for kind, faces in self.sides[where].items()
+        }
+
+    def outer_faces(self, where: str | Predicate) -> Faces:
+        """The same, of one dimension less than the mesh.  Raises MeshError for a face between two
+        cells, which has no outside.
+        """
+        found = self.faces(where)
+        for kind, faces in found.items():
+            cell, every = CELLS[kind], self._cell_faces.get(kind)
+            if cell.dimension != self.dimension - 1:
+                raise MeshError(f"{kind} is no face of a mesh of {self.dimension} coordinates")
+            if every is None:
+                continue
+            between = matched(faces, self.boundary[kind], cell.corners) < 0
+            between &= matched(faces, every, cell.corners) >= 0
+            if between.any():
+                place = place_text(self.points[faces[between.argmax()]].mean(axis=0))
+                raise MeshError(f"the face at {place} lies between two cells: it has no outside")
+        return found
 
     def nodes(self, where: str | Predicate) -> Integers:
         """Numbers of the nodes of a side or group, or of those that are meant; sorted."""
@@ -216,18 +249,12 @@ class Mesh:
         Raises MeshError if the place lies outside the mesh.
         """
         self._require_place(place)
-        for kind, nodes in self.cells.items():
-            cell, places = CELLS[kind], self.points[nodes]
-            if cell.dimension != self.dimension:
-                continue
-            low, high = places.min(axis=1), places.max(axis=1)
-            margin = 0.1 * (high - low).max(axis=1, keepdims=True)
-            near = ((low - margin <= place) & (place <= high + margin)).all(axis=1)
-            for row in np.flatnonzero(near):
-                parent = _parent_place(cell, places[row], place)
-                if parent is not None:
-                    return nodes[row], cell.shape(parent[None])[0]
-        raise MeshError(f"{place_text(place)} lies outside the mesh")
+        from softehl.runtime.mesh.cell_at import cell_at
+
+        found = cell_at(self.points, self.cells, place, _NEAR * self._size)
+        if found is None:
+            raise MeshError(f"{place_text(place)} lies outside the mesh")
+        return found
 
     @cached_property
     def _size(self) -> float:
@@ -238,21 +265,13 @@ class Mesh:
             raise MeshError(f"a place has {self.dimension} coordinates, given {place.tolist()}")
 
     def check(self) -> None:
-        """Raise MeshError for a cell that is turned inside out: its number and place."""
-        for kind, nodes in self.cells.items():
-            cell = CELLS[kind]
-            if cell.dimension != self.dimension or not len(nodes):
-                continue
-            places = self.points[nodes]
-            smallest = jacobians(cell, places, cell.rule(2)[0]).min(axis=1)
-            worst = int(smallest.argmin())
-            if smallest[worst] <= 0.0:
-                count = int((smallest <= 0.0).sum())
-                raise MeshError(
-                    f"{count} of {len(nodes)} {kind} are turned inside out or flat, such as number "
-                    f"{worst} at {place_text(places[worst].mean(axis=0))}: number its nodes in the "
-                    "order of VTK (in the plane counterclockwise)"
-                )
+        """Raise MeshError for a cell that is turned inside out: its number and place.
+
+        Also for a cell, or a face of a side, that stands twice: it would count twice.
+        """
+        from softehl.runtime.mesh.checks import check
+
+        check(self)
 
     def _meant_faces(self, where: Predicate, name: str) -> Faces:
         inside = _told(where, self.points, name)
@@ -262,20 +281,10 @@ class Mesh:
         return {kind: faces for kind, faces in found.items() if len(faces)}
 
 
-def _parent_place(cell: Cell, places: Array, place: Array) -> Array | None:
-    """Parent coordinates of a place in a cell with nodes at `places`, None if it lies outside."""
-    xi = cell.nodes[: cell.corners].mean(axis=0)
-    for _ in range(20):
-        defect = cell.shape(xi[None])[0] @ places - place
-        slope = np.einsum("kd,kc->cd", cell.gradient(xi[None])[0], places)
-        step = np.linalg.lstsq(slope, defect, rcond=None)[0]
-        xi = xi - step
-        if np.abs(step).max() < 1e-13:
-            break
-    return xi if cell.holds(xi, _NEAR) else None
-
-
 def _told(where: Predicate, places: Array, name: str) -> Flags:
+    wrong = misfit(where, "x")
+    if wrong:
+        raise MeshError(f"{name}: {wrong}, x of shape (n, dim)")
     chosen = np.asarray(where(places))
     if chosen.shape != (len(places),) or chosen.dtype != np.bool_:
         raise MeshError(
@@ -283,13 +292,6 @@ def _told(where: Predicate, places: Array, name: str) -> Flags:
             f"({len(places)},); this one gave {chosen.dtype} of shape {chosen.shape}"
         )
     return chosen
-
-
-def _once(faces: Integers, kind: Cell) -> Integers:
-    """The rows whose corners occur only once."""
-    corners = np.sort(faces[:, : kind.corners], axis=1)
-    _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
-    return np.ascontiguousarray(faces[np.sort(first[count == 1])])
 
 
 def place_text(x: Array) -> str:

@@ -184,6 +184,41 @@ def test_what_is_refused(tmp_path: Path) -> None:
         Mesh(mesh.points, {"quad4": mesh.cells["quad4"] + 1})
     with pytest.raises(MeshError, match="no mesh file"):
         Mesh.read(tmp_path / "missing.msh")
+    quads = mesh.cells["quad4"]
+    with pytest.raises(MeshError, match=r"1 of 7 quad4 have the nodes of one before.*number 6"):
+        Mesh(mesh.points, {"quad4": np.vstack([quads, quads[:1, [1, 2, 3, 0]]])}).check()
+    twice = {"right": {"line2": mesh.sides["right"]["line2"][[0, 1, 0]]}}
+    with pytest.raises(MeshError, match=r"side 'right': 1 of 3 line2 have the nodes of one before"):
+        Mesh(mesh.points, mesh.cells, sides=twice).check()
+    with pytest.raises(MeshError, match="group 'g': the number of a quad4 stands twice"):
+        Mesh(mesh.points, mesh.cells, {"g": {"quad4": np.array([1, 1])}}).check()
     (tmp_path / "bad.msh").write_text("nothing of a mesh\n")
     with pytest.raises(MeshError, match=r"bad\.msh"):
         Mesh.read(tmp_path / "bad.msh")
+
+
+def test_a_side_looks_outwards_however_its_faces_are_numbered() -> None:
+    mesh = made("quad", 2)
+    turned = {"line3": mesh.sides["right"]["line3"][:, [1, 0, 2]]}
+    again = Mesh(mesh.points, mesh.cells, sides={"right": turned})
+    np.testing.assert_array_equal(again.faces("right")["line3"], mesh.sides["right"]["line3"])
+
+
+def test_places_on_lines_in_a_plane_and_surfaces_in_space() -> None:
+    """Two bars of different kinds, and a triangle in space; beside them is outside."""
+    points = np.array([[0.0, 0.0], [8.0, 6.0], [12.0, 6.0], [10.0, 7.0]])
+    bars = Mesh(points, {"line2": np.array([[0, 1]]), "line3": np.array([[1, 2, 3]])})
+    for place, expected in (((8, 6), 1), ((0, 0), 0), ((12, 6), 2), ((10, 7), 3)):
+        nodes, weights = bars.locate(np.array(place, dtype=float))
+        np.testing.assert_allclose(weights, nodes == expected, atol=1e-9)
+    nodes, weights = bars.locate(np.array([2.0, 1.5]))
+    np.testing.assert_allclose(weights @ points[nodes], [2.0, 1.5], atol=1e-12)
+    curved = bars.locate(np.array([9.0, 6.75]))
+    np.testing.assert_allclose(curved[1] @ points[curved[0]], [9.0, 6.75], atol=1e-9)
+    for beside in ([2.0, 1.6], [-0.1, -0.075], [10.0, 6.5]):
+        with pytest.raises(MeshError, match="outside the mesh"):
+            bars.locate(np.array(beside))
+    shell = Mesh(np.array([[0.0, 0, 0], [1, 0, 1], [0, 1, 1]]), {"tri3": np.array([[0, 1, 2]])})
+    np.testing.assert_allclose(shell.locate(np.array([0.25, 0.5, 0.75]))[1], [0.25, 0.25, 0.5])
+    with pytest.raises(MeshError, match="outside the mesh"):
+        shell.locate(np.array([0.25, 0.5, 0.7]))

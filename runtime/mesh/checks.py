@@ -1,0 +1,53 @@
+"""What is wrong with a mesh: cells that are turned inside out, cells or faces that stand twice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softehl.runtime.arrays import Integers
+from softehl.runtime.mesh.cells import CELLS, jacobians
+from softehl.runtime.mesh.faces import repeated
+from softehl.runtime.mesh.mesh import Mesh, MeshError, place_text
+
+
+def check(mesh: Mesh) -> None:
+    """See `Mesh.check`."""
+    for kind, nodes in mesh.cells.items():
+        _require_once(mesh, "", kind, nodes)
+    for name, side in mesh.sides.items():
+        for kind, faces in side.items():
+            _require_once(mesh, f"side {name!r}: ", kind, faces)
+    for name, group in mesh.groups.items():
+        for kind, chosen in group.items():
+            if len(np.unique(chosen)) < len(chosen):
+                raise MeshError(f"group {name!r}: the number of a {kind} stands twice")
+    for kind, nodes in mesh.cells.items():
+        _require_upright(mesh, kind, nodes)
+
+
+def _require_once(mesh: Mesh, where: str, kind: str, nodes: Integers) -> None:
+    """Raise MeshError for the same nodes twice: a stiffness or a load would count twice."""
+    again = repeated(nodes)
+    if again.any():
+        first = int(again.argmax())
+        raise MeshError(
+            f"{where}{int(again.sum())} of {len(nodes)} {kind} have the nodes of one before, such "
+            f"as number {first} at {place_text(mesh.points[nodes[first]].mean(axis=0))}: give "
+            "each once (two pages on the same cells are two calls of study.add)"
+        )
+
+
+def _require_upright(mesh: Mesh, kind: str, nodes: Integers) -> None:
+    cell = CELLS[kind]
+    if cell.dimension != mesh.dimension or not len(nodes):
+        return
+    places = mesh.points[nodes]
+    smallest = jacobians(cell, places, cell.rule(2)[0]).min(axis=1)
+    worst = int(smallest.argmin())
+    if smallest[worst] <= 0.0:
+        count = int((smallest <= 0.0).sum())
+        raise MeshError(
+            f"{count} of {len(nodes)} {kind} are turned inside out or flat, such as number "
+            f"{worst} at {place_text(places[worst].mean(axis=0))}: number its nodes in the "
+            "order of VTK (in the plane counterclockwise)"
+        )

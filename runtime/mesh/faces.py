@@ -1,0 +1,49 @@
+"""Faces and cells by their nodes: which stand alone, which twice, which way they look."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softehl.runtime.arrays import Flags, Integers
+
+
+def once(faces: Integers, corners: int) -> Integers:
+    """The rows whose corners, the first of their nodes, occur only once."""
+    _, first, count = np.unique(
+        np.sort(faces[:, :corners], axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.ascontiguousarray(faces[np.sort(first[count == 1])])
+
+
+def firsts(rows: Integers) -> tuple[Integers, Integers]:
+    """Of rows (n, k) with the same nodes in any order the first, in the order of the rows; and for
+    each row (n,) which of these it is.
+    """
+    keys = np.sort(rows, axis=1)
+    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    return first[order], place[inverse.ravel()]
+
+
+def matched(faces: Integers, known: Integers, corners: int) -> Integers:
+    """For each face (n,) the row of the known ones with the same corners, else -1."""
+    both = np.sort(np.concatenate([known, faces])[:, :corners], axis=1)
+    _, inverse = np.unique(both, axis=0, return_inverse=True)
+    inverse = inverse.ravel()
+    row = np.full(int(inverse.max(initial=-1)) + 1, -1)
+    row[inverse[: len(known)]] = np.arange(len(known))
+    return np.asarray(row[inverse[len(known) :]])
+
+
+def as_known(faces: Integers, known: Integers, corners: int) -> Integers:
+    """Faces with the nodes in the order of the known ones, where they are among them."""
+    row = matched(faces, known, corners)
+    return np.where((row >= 0)[:, None], known[row], faces) if len(known) else faces
+
+
+def repeated(rows: Integers) -> Flags:
+    """Which rows (n, k) have the nodes of a row before them."""
+    first, place = firsts(rows)
+    return np.asarray(first[place] != np.arange(len(rows)))
