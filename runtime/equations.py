@@ -41,7 +41,9 @@ def equations(statement: Statement) -> System:
         dict(statement.blocks),
         (*statement.conditions,),
         implied,
-        {name: _at_start(statement, name, numbering) for name in statement.start},
+        _at_start(statement, numbering),
+        statement=statement,
+        written=statement.count,
     )
 
 
@@ -74,12 +76,13 @@ def _require(name: str, nodes: Integers, numbering: Numbering, words: str, *, ev
         raise StudyError(f"{words}: no page has the unknown {name!r} there")
 
 
-def _at_start(statement: Statement, name: str, numbering: Numbering) -> Array:
-    """Values of an unknown at every node, (points,)."""
-    start = statement.start[name]
-    _require(name, start.nodes, numbering, f"start({name}=...)", every=False)
-    found = np.zeros(len(statement.mesh.points))
-    found[start.nodes] = start.values
+def _at_start(statement: Statement, numbering: Numbering) -> dict[str, Array]:
+    """Unknown -> its values at every node, (points,), nan where nothing was said."""
+    found: dict[str, Array] = {}
+    for start in statement.start:
+        _require(start.name, start.nodes, numbering, f"start({start.name}=...)", every=False)
+        values = found.setdefault(start.name, np.full(len(statement.mesh.points), np.nan))
+        values[start.nodes] = start.values
     return found
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softehl.runtime.begin import Beginning
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.result import Result
 from softehl.runtime.solve.arclength import Arclength
@@ -37,9 +38,10 @@ class ArcSteps:
     most: int
     on_step: Callable[[Result], object]
 
-    def run(self, system: System, until: Callable[[Result], bool]) -> LoadPath:
+    def run(self, system: System, start: Beginning, until: Callable[[Result], bool]) -> LoadPath:
         """What `Study.follow` says.  Raises NotConverged."""
-        state = [(system.at_rest(), system.histories())]  # after the last converged point
+        begin, x0, histories = start
+        state = [(x0, histories)]  # after the last converged point
         results: list[Result] = []
 
         def problem_at(t: float) -> Problem:
@@ -51,19 +53,19 @@ class ArcSteps:
             results.append(Result(system, problem, point, state[0][1]))
             self.on_step(results[-1])
 
-        problem, first_step = problem_at(self.step), FirstStep(self.newton)
+        problem, first_step = problem_at(begin + self.step), FirstStep(self.newton)
         with np.errstate(all="ignore"):
-            first = first_step.newton.solve(problem, state[0][0])
+            first = first_step.newton.solve(problem, x0)
         if not first.converged:
             raise NotConverged(first)
         first_step.check(problem, first)
-        scale = float(np.sqrt(np.mean((first.x - state[0][0]) ** 2))) / self.step
+        scale = float(np.sqrt(np.mean((first.x - x0) ** 2))) / self.step
         rule = StepRule(self.step, 1e-6 * self.step, self.step)
         path = Arclength(
             self.newton, rule, x_scale=scale or 1.0, max_points=self.most, name="load factor"
         )
         branch = path.follow(
-            problem_at, 0.0, state[0][0], until=lambda _: until(results[-1]), on_point=keep
+            problem_at, begin, x0, until=lambda _: until(results[-1]), on_point=keep
         )
         if not branch.converged:
             raise NotConverged(branch, results[-1] if results else None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from softehl.runtime.begin import SMALLEST, Beginning
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.result import Result
 from softehl.runtime.solve.continuation import Continuation
@@ -13,9 +14,6 @@ from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.system import System
-
-SMALLEST = 1e-6
-"""Of the whole load or time: a path is given up where steps become shorter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +24,9 @@ class LoadSteps:
     newton: Newton
     on_step: Callable[[Result], object]
 
-    def run(self, system: System, start: Result | None, until: float) -> Result:
+    def run(self, system: System, start: Beginning, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
-        share = system.share
-        x0 = system.at_rest() if start is None else share.own(start.x)
-        begin = 0.0 if start is None else start.t
-        histories = system.histories() if start is None else share.own_state(start.state)
+        begin, x0, histories = start
         state = [(x0, histories)]  # after the last converged step
         reached: list[Result] = []
         first_step = FirstStep(self.newton)
@@ -46,7 +41,7 @@ class LoadSteps:
             reached[:] = [Result(system, problem, point, state[0][1])]
             self.on_step(reached[0])
 
-        first = abs(until - begin) / self.steps
+        first = abs(until - begin) / self.steps or 1.0  # nowhere to go: one solution there
         rule = StepRule(first, min(SMALLEST, first), first)
         path = Continuation(first_step.newton, rule, name="load factor")
         branch = path.follow(problem_at, begin, until, x0, on_point=keep)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from hashlib import sha256
+from itertools import chain
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.begin import SMALLEST, beginning
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
-from softehl.runtime.share import Share
 from softehl.runtime.solve.held import FirstStep
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point, Solution
@@ -48,33 +50,65 @@ class Clock:
     @classmethod
     def begin(cls, system: System, start: Result | None, dt: float) -> Clock:
         """At time 0, or where `start` stands."""
-        if start is None:
-            return cls((0.0,), system.at_rest()[None], system.histories(), dt)
-        own = system.share.own_state(start.state)
-        return cls((start.t,), system.share.own(start.x)[None], own, dt)
+        t, x, histories = beginning(system, start)
+        return cls((t,), x[None], histories, dt)
 
-    def save(self, path: Path, share: Share) -> None:
-        """Write what a restart needs, on any number of processes, atomically."""
+    def require_before(self, until: float) -> None:
+        """Raise StudyError where the end is not after the start."""
+        if until - self.t <= _ROUNDING * abs(until):
+            raise StudyError(f"until = {until:g}: must be after the start, which is t = {self.t:g}")
+
+    def save(self, path: Path, system: System, asked: float) -> None:
+        """Write what a restart needs, on any number of processes, atomically.
+
+        asked: length of step that the march was asked for.
+        """
+        share = system.share
         state, states = share.whole_state(self.histories), share.whole(self.states)
         parts = {f"history {name}": values for name, values in state.items()}
-        arrays = {"times": np.array(self.times), "states": states, "dt": np.array(self.dt)}
+        steps = {"dt": np.array(self.dt), "asked": np.array(asked)}
         if share.first:
-            write_arrays(path, {**arrays, **parts})
+            arrays = {"times": np.array(self.times), "states": states, **steps, **parts}
+            write_arrays(path, {**arrays, **marks_of(system.everywhere)})
 
     @classmethod
-    def load(cls, path: Path, system: System) -> Clock:
-        """What `save` wrote.  Raises StudyError where it does not belong to the study."""
+    def load(cls, path: Path, system: System, asked: float) -> Clock:
+        """What `save` wrote, with the next step as long as is asked for, if that is another than
+        was asked for then.  Raises StudyError where it does not belong to the study.
+        """
         found = read_arrays(path)
         if found is None:
             raise StudyError(f"restart: {str(path)!r} is missing or damaged")
+        for mark, value in marks_of(system.everywhere).items():
+            if not np.array_equal(found.get(mark, ()), value):
+                raise StudyError(f"restart: {str(path)!r} is of another study: other {mark}")
         histories = {n[8:]: v for n, v in found.items() if n.startswith("history ")}
-        whole, share = system.everywhere, system.share
-        expected = {name: v.shape for name, v in whole.histories().items()}
-        shapes = {name: v.shape for name, v in histories.items()}
-        if found.get("states", np.empty((0, 0))).shape[1:] != (whole.size,) or shapes != expected:
-            raise StudyError(f"restart: {str(path)!r} holds another study")
-        states, times = share.own(found["states"]), tuple(found["times"].tolist())
-        return cls(times, states, share.own_state(histories), float(found["dt"]))
+        states, times = system.share.own(found["states"]), tuple(found["times"].tolist())
+        dt = float(found["dt"]) if found["asked"] == asked else asked
+        return cls(times, states, system.share.own_state(histories), dt)
+
+
+def marks_of(system: System) -> dict[str, Array]:
+    """What a checkpoint belongs to: what is told apart -> digest."""
+    nodal, layout = system.numbering.nodal, system.numbering.layout
+    parts: dict[str, list[object]] = {
+        "nodes or cells": [system.mesh.points, *chain(*sorted(system.mesh.cells.items()))],
+        "pages or elements": [
+            item
+            for block in system.blocks.values()
+            for item in (block.name, block.kernel.signature, sorted(block.shared), block.nodes)
+        ],
+        "unknowns": [layout.counts, *(name for name in layout.names if name in nodal)],
+    }
+    return {name: _digest(items) for name, items in parts.items()}
+
+
+def _digest(items: Iterable[object]) -> Array:
+    """The bytes of a hash, as numbers."""
+    found = sha256()
+    for item in items:
+        found.update(item.tobytes() if isinstance(item, np.ndarray) else repr(item).encode())
+    return np.frombuffer(found.digest(), dtype=np.uint8).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -83,12 +117,12 @@ class March:
 
     method: "euler" (backward, order 1) or "bdf2" (order 2, of variable steps). tolerance: largest
     local error of a step relative to the largest value of each unknown; None for equal steps.
-    smallest: step at which it is given up.
+    dt: length of step that is asked for.
     """
 
     method: Method
     tolerance: float | None
-    smallest: float
+    dt: float
     newton: Newton
 
     def run(
@@ -103,7 +137,7 @@ class March:
             result, clock = settings._step(system, clock, dt)
             first_step.check(result.problem, result.point.solution)
             if checkpoint is not None:
-                clock.save(checkpoint, system.share)
+                clock.save(checkpoint, system, self.dt)
             yield result
 
     def _step(self, system: System, clock: Clock, dt: float) -> tuple[Result, Clock]:
@@ -127,8 +161,8 @@ class March:
             break
         after = system.committed(problem, solution.x, clock.histories)
         following = min(factor, _GROWTH) * dt if self.tolerance is not None else wanted
-        if self.tolerance is None and wanted < clock.dt:
-            following = min(_GROWTH * wanted, clock.dt)
+        if self.tolerance is None and wanted < self.dt:
+            following = min(_GROWTH * wanted, self.dt)
         states = np.vstack([solution.x, clock.states])[:3]
         times = (step.t, *clock.times)[:3]
         reached = Result(system, problem, Point(step.t, solution), after)
@@ -168,7 +202,7 @@ class March:
         return float(_SAFETY * math.pow(self.tolerance / worst, 1.0 / (order + 1)))
 
     def _cut(self, dt: float, factor: float, solution: Solution) -> float:
-        if factor * dt < self.smallest:
+        if factor * dt < SMALLEST * self.dt:
             raise NotConverged(replace(solution, message=f"{solution.message}; dt = {dt:.3g}"))
         return factor * dt
 

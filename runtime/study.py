@@ -20,12 +20,13 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Integers
+from softehl.runtime.begin import beginning
 from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.follow import ArcSteps, LoadPath
 from softehl.runtime.kernels import Kernel
-from softehl.runtime.load import SMALLEST, LoadSteps
+from softehl.runtime.load import LoadSteps
 from softehl.runtime.march import Clock, March, Method
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
@@ -85,8 +86,9 @@ class Study:
         the name of one that ships. model: which, where the page has several. shared: unknowns
         without a node that are one for all elements, not one for each. given: parameters of the
         page (numbers, or functions of the load factor) and its data (a number, (n,) numbers or a
-        function of the elements' centres (n, dim)). On a side, a page of one node has an element
-        at each node. Raises StudyError, MeshError, or what is wrong with the page.
+        function of the elements' centres (n, dim)). Two are not given: `dt` is the length of a step
+        of `march`, `rate` comes from `Model.rates`. On a side, a page of one node has an element at
+        each node. Raises StudyError, MeshError, or what is wrong with the page.
         """
         blocks = self._statement.blocks
         if name in blocks:
@@ -102,7 +104,10 @@ class Study:
         f(x (n, dim), t) gives the load itself.
         where: a side or a predicate of faces; a tuple of coordinates or node numbers for forces.
         """
-        for name, value in components.items():
+        words = f"load({shown(where)})"
+        read.named(words, components, "u_x=1")
+        for name, given in components.items():
+            value = read.amount(words, name, given)
             if isinstance(where, str) or callable(where):
                 for kind, faces in self.mesh.faces(where).items():
                     self._add_force("load", where, DeadLoad(CELLS[kind], value), faces, (name,))
@@ -117,10 +122,10 @@ class Study:
 
         value: force per deformed length or area; a number grows with the load factor (in `march`
         it is constant), a function f(x (n, dim), t) gives the pressure at undeformed places.
-        of: unknowns that are the displacements along x, y, z; left out, u_x, u_y, u_z.
+        of: unknowns that are the displacements along x, y, z; left out, u_x, u_y, u_z. Faces
+        between two cells have no outside and are refused.
         """
-        if not callable(value):
-            read.finite("pressure", value)
+        value = read.amount(f"pressure({shown(where)})", "pressure", value)
         axes = "xyz"[: self.mesh.dimension]
         names = tuple(f"u_{axis}" for axis in axes) if of is None else tuple(of)
         if len(names) != self.mesh.dimension or len(names) == 1:
@@ -128,11 +133,12 @@ class Study:
                 f"pressure({shown(where)}, of={list(names)}): a displacement for each of "
                 f"{self.mesh.dimension} coordinates is needed, in 2-D or 3-D"
             )
-        for kind, faces in self.mesh.faces(where).items():
+        for kind, faces in self.mesh.outer_faces(where).items():
             self._add_force("pressure", where, Pressure(CELLS[kind], value), faces, names)
 
     def spring(self, where: Where, **stiffness: float) -> None:
         """Springs to the ground at the nodes of a side, each of this stiffness."""
+        read.named(f"spring({shown(where)})", stiffness, "u_x=2")
         for name, value in stiffness.items():
             kernel = Spring(read.finite(name, value))
             nodes = read.nodes_of(self.mesh, where)
@@ -145,11 +151,10 @@ class Study:
 
         where: a side, a group, a predicate of places, node numbers, or one place.
         """
-        if not values:
-            raise StudyError(f"fix({shown(where)}): name what is prescribed, as in u_x=0")
-        for name, value in values.items():
-            if not callable(value):
-                read.finite(name, value)
+        words = f"fix({shown(where)})"
+        read.named(words, values, "u_x=0")
+        for name, given in values.items():
+            value = read.amount(words, name, given)
             condition = Condition(where, read.nodes_of(self.mesh, where), name, value)
             self._statement.conditions.append(condition)
 
@@ -160,11 +165,12 @@ class Study:
 
         The sides must have the same nodes but for a shift; `tolerance` is relative to their size.
         """
+        words = f"tie({shown(where)}, {shown(to)})"
+        read.named(words, names, f'tie({shown(where)}, {shown(to)}, "u_x", "u_y")')
+        offset = read.amount(words, "offset", offset)
         ours, theirs = read.nodes_of(self.mesh, where), read.nodes_of(self.mesh, to)
         if len(ours) != len(theirs):
-            raise StudyError(
-                f"tie({shown(where)}, {shown(to)}): {len(ours)} and {len(theirs)} nodes"
-            )
+            raise StudyError(f"{words}: {len(ours)} and {len(theirs)} nodes")
         partners = theirs[
             read.partners(self.mesh.points[ours], self.mesh.points[theirs], tolerance)
         ]
@@ -173,12 +179,16 @@ class Study:
             self._add_force("tie", where, Tie(offset), pairs, (name,))
 
     def start(self, where: Where | None = None, **values: Datum) -> None:
-        """Values of unknowns at the start, numbers or functions of places; zero if left out."""
+        """Values of unknowns at the start, numbers or functions of places; zero if left out.
+
+        What is said later counts where both speak of the same node.
+        """
+        read.named("start()", values, "T=20")
         everywhere = np.arange(len(self.mesh.points))
         nodes = everywhere if where is None else read.nodes_of(self.mesh, where)
         for name, value in values.items():
             found = read.datum("start", name, value, self.mesh.points[nodes])
-            self._statement.start[name] = Start(nodes, found)
+            self._statement.start.append(Start(name, nodes, found))
 
     # solving it ---------------------------------------------------------------------------------
 
@@ -196,21 +206,24 @@ class Study:
     ) -> Result:
         """The solution at load factor `until`, from 0 (or from `start`) in `steps` steps.
 
-        Steps are cut where Newton's method fails and grow again; history is committed after each.
-        on_step is given the result of every converged step, write: a .pvd file that names them
-        all. progress: tell of each step on stderr; None: in one line, on a terminal only. engine:
-        "serial", "petsc" (on all processes that mpirun started) or an engine with settings. Raises
-        StudyError; NotConverged if the end is not reached: its `reached` is the last Result, or
-        None.
+        start: a result of this or another study on the same mesh, whose values, history and load
+        factor the path begins with; the equations are those of this study. Where `until` is no
+        other load factor, they are solved there once. Steps are cut where Newton's method fails and
+        grow again; history is committed after each. on_step is given the result of every converged
+        step, write: a .pvd file that names them all. progress: tell of each step on stderr; None:
+        in one line, on a terminal only. engine: "serial", "petsc" (on all processes that mpirun
+        started) or an engine with settings. Raises StudyError; NotConverged if the end is not
+        reached: its `reached` is the last Result, or None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
+        until = read.finite("until", until)
         where = engine_of(engine)
-        system = where.spread(self.system() if start is None else start.system)
-        begin = 0.0 if start is None else start.t
-        told = Telling(progress, system.share.first, "load factor", begin)
+        system = where.spread(self.system())
+        begin = beginning(system, start)
+        told = Telling(progress, system.share.first, "load factor", begin[0])
         with Watch(told.until(until), write, on_step) as watch:
-            return LoadSteps(steps, where.newton(newton), watch).run(system, start, until)
+            return LoadSteps(steps, where.newton(newton), watch).run(system, begin, until)
 
     def march(
         self,
@@ -229,27 +242,32 @@ class Study:
     ) -> Iterator[Result]:
         """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
 
-        dt: length of the (first) step. method: "euler" (backward) or "bdf2". tolerance: largest
-        local error of a step, relative to the largest value of each unknown (of those with a rate,
-        where there are any); steps then adapt, else
-        they are dt, but for those that Newton's method needs shorter. History is committed and
+        dt: length of the (first) step. start: a result, as in `solve`. method: "euler" (backward)
+        or "bdf2". tolerance: largest local error of a step, relative to the largest value of each
+        unknown (of those with a rate, where there are any); steps then adapt, else they are dt, but
+        for those that Newton's method needs shorter. History is committed and
         values of steps before (data u_old, `Model.rates`) are renewed after every converged step.
-        checkpoint: file that is rewritten after each step; restart: such a file, from which the
-        march goes on bitwise as if it had not stopped, with `engine` "petsc" on any number of
-        processes. write: a .pvd file that names the results of all steps (with start or restart, it
+        checkpoint: file that is rewritten after each step; restart: such a file of the same mesh,
+        pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
+        `engine` "petsc" on any number of processes; another `dt` than then is the next step.
+        write: a .pvd file that names the results of all steps (with start or restart, it
         goes on). progress: as in `solve`. Raises StudyError, NotConverged.
         """
         if method not in ("euler", "bdf2"):
             raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
         for name, value in (("dt", dt), ("until", until), ("tolerance", tolerance)):
-            if value is not None and not (np.isfinite(value) and value > 0.0):
+            if value is not None and read.finite(name, value) <= 0.0:
                 raise StudyError(f"{name} = {value}: must be positive")
+        if start is not None and restart is not None:
+            raise StudyError("start and restart: give one of them, a result or a checkpoint")
         where = engine_of(engine)
-        system = where.spread(self.system() if start is None else start.system)
-        clock = Clock.begin(system, start, dt)
-        if restart is not None:
-            clock = Clock.load(Path(restart), system)
-        settings = March(method, tolerance, SMALLEST * dt, where.newton(newton))
+        system = where.spread(self.system())
+        if restart is None:
+            clock = Clock.begin(system, start, dt)
+        else:
+            clock = Clock.load(Path(restart), system, dt)
+        clock.require_before(until)
+        settings = March(method, tolerance, dt, where.newton(newton))
         file = None if checkpoint is None else Path(checkpoint)
         series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
         told = Telling(progress, system.share.first, "t", clock.t)
@@ -260,6 +278,7 @@ class Study:
         *,
         step: float,
         until: Callable[[Result], bool],
+        start: Result | None = None,
         newton: Newton | None = None,
         most: int = 1000,
         write: str | Path | None = None,
@@ -267,17 +286,20 @@ class Study:
     ) -> LoadPath:
         """The path from load factor 0 on, by arc length: it passes limit points of the load.
 
-        step: length of the first and longest step. A length counts the load factor, and the
-        unknowns in units of what they change by per load factor in the beginning. until: is given
-        each result; the path ends where it says True. most: points at most. History is committed
-        after each point. write, progress: as in `solve`. Raises StudyError; NotConverged if the end
-        is not reached: its `reached` is the last Result, or None.
+        start: a result to begin with, as in `solve`. step: length of the first and longest step. A
+        length counts the load factor, and the unknowns in units of what they change by per load
+        factor in the beginning. until: is given each result; the path ends where it says True.
+        most: points at most. History is committed after each point. write, progress: as in `solve`.
+        Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
+        or None.
         """
-        if not (np.isfinite(step) and step > 0.0):
+        if read.finite("step", step) <= 0.0:
             raise StudyError(f"step = {step}: must be positive")
-        with Watch(Telling(progress, True, "load factor", 0.0).until(None), write) as watch:
+        system = self.system()
+        begin = beginning(system, start)
+        with Watch(Telling(progress, True, "load factor", begin[0]).until(None), write) as watch:
             path = ArcSteps(step, Serial().newton(newton), most, watch)
-            return path.run(self.system(), until)
+            return path.run(system, begin, until)
 
     def system(self) -> System:
         """What is written down, as equations.  Raises StudyError for what does not fit together."""
@@ -298,6 +320,12 @@ class Study:
 
 def _load(source: Source, model: str | None) -> Kernel:
     """By the front door, which knows when the generator is needed: this room does not."""
+    if callable(source) or hasattr(source, "finish"):
+        given = getattr(source, "__name__", type(source).__name__)
+        raise StudyError(
+            f"{given} is a {type(source).__name__}, no page: give what it returns, {given}(), a "
+            "Definition that m.finish() made, a model file or a kernel"
+        )
     import softehl
 
     return softehl.load_kernel(source, model)  # type: ignore[arg-type]

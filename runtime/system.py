@@ -14,7 +14,14 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.share import ALONE, Share
-from softehl.runtime.statement.records import Block, Condition, Force, Number, StudyError
+from softehl.runtime.statement.records import (
+    Block,
+    Condition,
+    Force,
+    Number,
+    Statement,
+    StudyError,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +47,9 @@ class System:
     """Numbering and assembler, which all steps share.
 
     conditions: prescribed values, as they were written down. implied: ties both sides of which
-    are prescribed: checked, not solved. start: name -> (points,) initial values. share: how the
-    unknowns are spread over processes; whole: where they are, the system of all of them.
+    are prescribed: checked, not solved. start: name -> (points,) initial values, nan where nothing
+    was said. share: how the unknowns are spread over processes; whole: where they are, the system
+    of all of them. statement: what was written down, and written: how much of it there was.
     """
 
     mesh: Mesh
@@ -53,6 +61,8 @@ class System:
     start: Mapping[str, Array] = field(default_factory=dict)
     share: Share = ALONE
     whole: System | None = None
+    statement: Statement | None = None
+    written: int = 0
 
     @property
     def everywhere(self) -> System:
@@ -69,7 +79,8 @@ class System:
         x = np.zeros(self.size)
         for name, values in self.start.items():
             numbers = self.numbering.nodal[name]
-            x[numbers[numbers >= 0]] = values[numbers >= 0]
+            said = (numbers >= 0) & ~np.isnan(values)
+            x[numbers[said]] = values[said]
         return x
 
     def histories(self) -> dict[str, Array]:
@@ -77,7 +88,13 @@ class System:
         return {b.name: b.initial for b in self.blocks.values() if b.initial is not None}
 
     def still(self, t: float, old: Array, histories: Mapping[str, Array]) -> Step:
-        """A step without time: t is the load factor, rates are zero."""
+        """A step without time: t is the load factor, rates are zero.  Raises StudyError."""
+        for block in self.blocks.values():
+            if "dt" in block.kernel.parameters and "dt" not in block.parameters:
+                raise StudyError(
+                    f"{block.name!r}: {block.kernel.name} has dt, the length of a step in time, "
+                    "and here is no time: march, or give dt=..."
+                )
         return Step(t, t, old, 0.0, np.zeros(self.size), 0.0, histories)
 
     def committed(
@@ -96,7 +113,15 @@ class System:
         return after
 
     def problem(self, step: Step) -> Problem:
-        """The equations of a step.  Raises StudyError where prescribed values differ."""
+        """The equations of a step.
+
+        Raises StudyError where prescribed values differ, or more was written down meanwhile.
+        """
+        if self.statement is not None and self.statement.count != self.written:
+            raise StudyError(
+                "the study was changed on its way, which this path does not see: end the loop and "
+                "go on from its last result, study.march(start=result, ...) or solve(start=result)"
+            )
         fixed, values = self._prescribed(step)
         for tie in self.implied:
             self._require_tied(tie, step, dict(zip(fixed.tolist(), values.tolist(), strict=True)))
@@ -106,8 +131,7 @@ class System:
             if page is None:
                 given: Mapping[str, Number] = {"t": step.t, "factor": step.factor}
             else:
-                automatic = {"rate": step.rate, "dt": step.dt, "t": step.t}
-                given = {**automatic, **page.parameters}
+                given = {"rate": step.rate, "dt": step.dt, **page.parameters}
                 if page.previous or page.rates or page.initial is not None:
                     state = {"data": self._data(page, step)}
                     history = step.histories.get(page.name)

@@ -1,43 +1,109 @@
-"""Reading what a script gives: numbers, data of elements, nodes; errors name it."""
+"""Reading what a script gives: numbers, functions, data of elements, nodes; errors name it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.names import listed, meant
-from softehl.runtime.statement.records import Datum, StudyError, Where, shown
+from softehl.runtime.fem.loads import Amount
+from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.names import listed, meant, misfit
+from softehl.runtime.statement.records import Datum, Number, StudyError, Where, shown
 
 
 def finite(name: str, value: object) -> float:
     """A number.  Raises StudyError."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-        raise StudyError(f"{name} = {value!r}: a number is needed, or a function")
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise StudyError(f"{name} = {value!r}: a real number is needed, or a function")
     if not np.isfinite(value):
         raise StudyError(f"{name} = {value!r}: the number must be finite")
     return float(value)
 
 
-def parameter(block: str, name: str, value: object) -> None:
-    """Raise StudyError unless it is a number or a function."""
-    if callable(value):
-        return
-    if not isinstance(value, int | float | np.number) or not np.isfinite(value):
-        raise StudyError(f"{block!r}: {name} = {value!r}, must be a number or a function of t")
+def amount(words: str, name: str, value: Amount) -> Amount:
+    """What is prescribed or loaded: a number, or a function of (x, t) whose values are looked at.
+
+    words: the call, for messages. Raises StudyError.
+    """
+    if not callable(value):
+        return finite(name, value)
+    return Told(words, _function(words, value, "x", "t"))
+
+
+def parameter(block: str, name: str, value: Number) -> Number:
+    """A number, or a function of t whose values are looked at.  Raises StudyError."""
+    if not callable(value):
+        return finite(f"{block!r}: {name}", value)
+    return Rising(f"{block!r}: {name}", _function(f"{block!r}: {name}", value, "t"))
 
 
 def datum(block: str, name: str, value: Datum, centres: Array) -> Array:
     """One number a place, (n,).  Raises StudyError."""
-    found = np.asarray(value(centres) if callable(value) else value, dtype=np.float64)
-    if found.shape not in ((), (len(centres),)) or not np.isfinite(found).all():
+    words = f"{block!r}: {name}"
+    found = _function(words, value, "x")(centres) if callable(value) else value
+    return np.broadcast_to(_real(words, found, centres), (len(centres),)).copy()
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A function of places (n, dim) and t as it was given, whose values are looked at."""
+
+    words: str
+    function: Callable[[Array, float], Array | float]
+
+    def __call__(self, places: Array, t: float) -> Array:
+        """One number, or (n,) of them.  Raises StudyError."""
+        return _real(f"{self.words} at t = {t:g}", self.function(places, t), places)
+
+
+@dataclass(frozen=True, eq=False)
+class Rising:
+    """A function of t as it was given, whose values are looked at."""
+
+    words: str
+    function: Callable[[float], float]
+
+    def __call__(self, t: float) -> float:
+        """Raises StudyError."""
+        return float(_real(f"{self.words} at t = {t:g}", self.function(t), ()))
+
+
+def _function(words: str, function: Callable[..., Any], *arguments: str) -> Callable[..., Any]:
+    """The function, if it can be called with these.  Raises StudyError."""
+    wrong = misfit(function, *arguments)
+    if wrong:
+        raise StudyError(f"{words}: {wrong}")
+    return function
+
+
+def _real(words: str, value: object, places: Array | tuple[()]) -> Array:
+    """One finite real number, or one for each place: () or (n,).  Raises StudyError."""
+    found = np.asarray(value)
+    many = f", or ({len(places)},) of them" if len(places) else ""
+    if found.dtype.kind == "O":  # numbers of SymPy, say
+        try:
+            found = found.astype(np.float64)
+        except (TypeError, ValueError):
+            found = found.astype(str)
+    if found.dtype.kind not in "fiub" or found.shape not in ((), (len(places),) if many else ()):
         raise StudyError(
-            f"{block!r}: {name} has shape {found.shape}, must be one finite number or "
-            f"({len(centres)},) of them"
+            f"{words}: one real number{many} is needed; given {found.dtype} of shape {found.shape}"
         )
-    return np.broadcast_to(found, (len(centres),)).copy()
+    bad = np.flatnonzero(~np.isfinite(found))
+    if len(bad):
+        at = f" at {place_text(places[bad[0]])}" if found.ndim else ""
+        raise StudyError(f"{words} is {np.ravel(found)[bad[0]]}{at}: numbers must be finite")
+    return found.astype(np.float64)
+
+
+def named(words: str, values: Mapping[str, object] | tuple[str, ...], example: str) -> None:
+    """Raise StudyError where no unknown is named."""
+    if not values:
+        raise StudyError(f"{words}: name an unknown, as in {example}")
 
 
 def known(what: str, given: Iterable[str], allowed: Iterable[str], of: str) -> None:
@@ -61,6 +127,8 @@ def nodes_of(mesh: Mesh, where: Where) -> Integers:
         raise StudyError(f"{shown(where)}: node numbers are a list of integers")
     if given.min() < 0 or given.max() >= len(mesh.points):
         raise StudyError(f"node numbers go from 0 to {len(mesh.points) - 1}")
+    if len(np.unique(given)) < len(given):
+        raise StudyError(f"{shown(where)}: a node number stands twice")
     return given.astype(np.int64)
 
 

@@ -12,7 +12,7 @@ from softehl.runtime.fem.unknowns import Slot, slots
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.mesh.mesh import Mesh, Predicate
 from softehl.runtime.statement.given import datum, known, parameter
-from softehl.runtime.statement.records import AUTOMATIC, Block, StudyError
+from softehl.runtime.statement.records import Block, StudyError
 
 Elements = tuple[str, Integers]
 """Kind of cells or faces and their nodes (n, k)."""
@@ -53,13 +53,15 @@ def page_on(
     known("unknown", shared, [s.name for s in found if s.node is None], kernel.name)
     previous, rates = _automatic(kernel, found)
     known("argument", given, _arguments(kernel), kernel.name)
-    needed = [p for p in kernel.parameters if p not in AUTOMATIC]
+    automatic = ("dt", "rate") if rates else ("dt",)
+    if rates and "rate" in given:
+        raise StudyError(f"{name!r}: rate comes from the steps in time, it cannot be given")
+    needed = [p for p in kernel.parameters if p not in automatic]
     needed += [d for d in kernel.data if d not in previous and d not in rates]
     missing = [a for a in needed if a not in given]
     if missing:
-        raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}")
-    for p in kernel.parameters:
-        parameter(name, p, given.get(p, 0.0))
+        hint = "; where t is the time or load factor, give t=lambda t: t" if "t" in missing else ""
+        raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}{hint}")
     centres = mesh.points[nodes].mean(axis=1)
     data = {d: datum(name, d, given[d], centres) for d in kernel.data if d in given}
     return Block(
@@ -73,7 +75,7 @@ def page_on(
         previous={d: s for d, s in previous.items() if d not in data},
         rates={d: s for d, s in rates.items() if d not in data},
         initial=_initial(name, kernel, given, centres),
-        parameters={p: given[p] for p in kernel.parameters if p in given},
+        parameters={p: parameter(name, p, given[p]) for p in kernel.parameters if p in given},
     )
 
 

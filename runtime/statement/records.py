@@ -21,9 +21,6 @@ Number: TypeAlias = float | Callable[[float], float]
 Datum: TypeAlias = float | Array | Callable[[Array], Array]
 """Data of elements: one number, (n,) numbers, or a function of their centres (n, dim)."""
 
-AUTOMATIC = ("rate", "dt", "t")
-"""Parameters that a study gives where a page has them and the user does not."""
-
 
 class StudyError(ValueError):
     """What was asked of a study cannot be; the message says what was given and what is allowed."""
@@ -81,22 +78,25 @@ class Force:
 class Start:
     """Values of an unknown at nodes at the start, (n,) each."""
 
+    name: str
     nodes: Integers
     values: Array
 
 
 @dataclass(eq=False)
 class Statement:
-    """A boundary-value problem that is being written down, in the order of the script.
-
-    start: of each unknown what was said last.
-    """
+    """A boundary-value problem that is being written down, in the order of the script."""
 
     mesh: Mesh
     blocks: dict[str, Block] = field(default_factory=dict)
     conditions: list[Condition] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
-    start: dict[str, Start] = field(default_factory=dict)
+    start: list[Start] = field(default_factory=list)
+
+    @property
+    def count(self) -> int:
+        """How many things have been said; it only grows."""
+        return sum(map(len, (self.blocks, self.conditions, self.forces, self.start)))
 
     def prescribed(self, name: str) -> Integers:
         """Nodes at which an unknown is prescribed."""

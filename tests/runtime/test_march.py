@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy as sp
 
 from softehl import Definition, Mesh, Model, Study, element, kinematics, quadrature
 from softehl.runtime.result import Result
@@ -136,8 +137,6 @@ def test_history_in_load_steps_is_committed_once_each() -> None:
     (u,) = m.nodal_unknowns("u")
     E, sy, H = m.parameters(E="modulus", sy="yield stress", H="hardening")
     ep_old, alpha_old = m.point_data(ep_old="plastic strain", alpha_old="its length")
-    import sympy as sp
-
     length = m.define("length", X[1] - X[0])
     strain = m.define("strain", (u[1] - u[0]) / length)
     trial = m.define("trial", E * (strain - ep_old))
@@ -195,11 +194,79 @@ def test_what_is_refused(tmp_path: Path) -> None:
         study.march(dt=0.1, until=1.0, restart=tmp_path / "nothing.npz")
     file = tmp_path / "other.npz"
     list(rod(5).march(dt=0.1, until=0.1, checkpoint=file))
-    with pytest.raises(StudyError, match="another study"):
+    with pytest.raises(StudyError, match="another study: other nodes or cells"):
         study.march(dt=0.1, until=1.0, restart=file)
     study.start(T=1.0)
     with pytest.raises(StudyError, match="no unknown 'T'"):
         study.system()
+
+
+def test_a_checkpoint_knows_its_mesh_and_its_pages(tmp_path: Path) -> None:
+    """As many unknowns are not enough: other places, other elements, another page."""
+    file = tmp_path / "rod.npz"
+    list(rod(4).march(dt=0.1, until=0.1, checkpoint=file))
+    moved = Study(Mesh.line(2.0, cells=4))
+    moved.add("rod", heat(), k=1.0)
+    with pytest.raises(StudyError, match="another study: other nodes or cells"):
+        moved.march(dt=0.1, until=1.0, restart=file)
+    other = Study(Mesh.line(1.0, cells=4))
+    other.add("bar", maxwell(), E=1.0, tau=1.0)
+    with pytest.raises(StudyError, match="another study: other pages or elements"):
+        other.march(dt=0.1, until=1.0, restart=file)
+    harder = rod(4)
+    harder.load((0.5,), u=1.0)
+    (step,) = harder.march(dt=0.1, until=0.2, restart=file)  # loads may change
+    assert step.t == pytest.approx(0.2)
+
+
+def test_a_step_that_is_given_at_a_restart_is_used(tmp_path: Path) -> None:
+    file = tmp_path / "rod.npz"
+    list(rod(4).march(dt=0.1, until=0.2, checkpoint=file))
+    finer = rod(4).march(dt=0.05, until=0.4, restart=file)
+    np.testing.assert_allclose([r.t for r in finer], [0.25, 0.3, 0.35, 0.4])
+
+
+@pytest.mark.parametrize("until", [0.1, 0.2])
+def test_an_end_that_is_not_after_the_start(until: float, tmp_path: Path) -> None:
+    file = tmp_path / "rod.npz"
+    (*_, last) = rod(4).march(dt=0.1, until=0.2, checkpoint=file)
+    with pytest.raises(StudyError, match=rf"until = {until}: must be after .* t = 0\.2"):
+        rod(4).march(dt=0.1, until=until, restart=file)
+    with pytest.raises(StudyError, match=rf"until = {until}: must be after .* t = 0\.2"):
+        rod(4).march(dt=0.1, until=until, start=last)
+
+
+def test_a_step_that_was_cut_grows_again_to_what_was_asked_for() -> None:
+    """A page that has no solution in long steps before t = 1: afterwards steps are 0.4 again."""
+    m = Model("early", nodes=1, rule=quadrature.point_rule())
+    ((u,),) = m.nodal_unknowns("u")
+    dt, t = m.parameters(dt="step", t="time")
+    late = sp.Piecewise((u - 1, t > 1), (u - 1, dt < 0.11), (u**2 + 1, True))
+    m.weak_form([(late, u)])
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("early", m.finish(), on="boundary", t=lambda t: t)
+    times = [0.0, *(r.t for r in study.march(dt=0.4, until=4.0))]
+    steps = np.diff(times)
+    assert steps[0] == pytest.approx(0.1)
+    assert steps.max() == pytest.approx(0.4)
+
+
+def test_arguments_that_a_study_fills_and_those_it_does_not() -> None:
+    """dt and the rate are its own; t, or a rate of the page's own, must be given."""
+    m = Model("own", nodes=1, rule=quadrature.point_rule())
+    ((u,),) = m.nodal_unknowns("u")
+    t, rate, dt = m.parameters(t="thickness", rate="of creep", dt="step")
+    m.weak_form([(t * u + rate * dt - 1, u)])
+    study = Study(Mesh.line(1.0, cells=1))
+    with pytest.raises(StudyError, match=r"own needs t, rate; where t is .* t=lambda t: t"):
+        study.add("own", m.finish(), on="boundary")
+    study.add("own", m.finish(), on="boundary", t=2.0, rate=1.0)
+    (step,) = study.march(dt=0.5, until=0.5)
+    assert step.at((0.0,))["u"] == pytest.approx(0.25)
+    with pytest.raises(StudyError, match=r"'own': own has dt.* no time: march, or give dt="):
+        study.solve()
+    with pytest.raises(StudyError, match="rate comes from the steps in time"):
+        rod(4).add("other", heat(), k=1.0, rate=2.0)
 
 
 def test_pages_that_are_refused() -> None:

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from softehl import Definition, Mesh, Model, Study, element, kinematics
 from softehl.runtime.fem.loads import DeadLoad, Pressure
 from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.study import StudyError
 
 MU, LAME = 0.4, 2.0
@@ -108,6 +109,27 @@ def test_undeformed_it_is_a_dead_load() -> None:
     r = Pressure(face, 0.7).residual(X, np.zeros((1, 4)), **given)
     dead = DeadLoad(face, -0.7).residual(X, np.zeros((1, 2)), **given)
     np.testing.assert_allclose(r, [[dead[0, 0], 0.0, dead[0, 1], 0.0]], atol=1e-15)
+
+
+def test_a_side_that_is_numbered_clockwise_is_pressed_inwards() -> None:
+    study = body("quad4")
+    mesh = study.mesh
+    sides = {**mesh.sides, "right": {"line2": mesh.sides["right"]["line2"][:, ::-1]}}
+    turned = Study(Mesh(mesh.points, mesh.cells, sides=sides))
+    turned.add("body", rubber("quad4"), mu=MU, lame=LAME)
+    for each in (study, turned):
+        each.fix("left", u_x=0.0, u_y=0.0)
+        each.pressure("right", 0.1)
+    np.testing.assert_allclose(turned.solve().x, study.solve().x)
+    assert study.solve().at((2.0, 0.5))["u_x"] < 0.0
+
+
+def test_a_side_between_cells_has_no_outside() -> None:
+    mesh = Mesh.rectangle(2.0, 1.0, cells=(2, 1))
+    middle = {"middle": {"line2": np.array([[1, 4]])}}
+    study = Study(Mesh(mesh.points, mesh.cells, sides=middle))
+    with pytest.raises(MeshError, match=r"the face at \(1, 0\.5\) lies between two cells"):
+        study.pressure("middle", 1.0)
 
 
 def test_what_is_refused() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import softehl
+from softehl import quadrature
 from softehl.runtime.mesh.mesh import Mesh, MeshError
 from softehl.runtime.result import Result
 from softehl.runtime.solve.solution import NotConverged
@@ -228,7 +229,7 @@ MISTAKES: list[tuple[str, Callable[[Study], object], str]] = [
     (
         "text",
         lambda s: s.add("b", pages.solid(), **{**SOLID, "mu": "0.4"}),
-        "mu = '0.4', must be a number",
+        "mu = '0.4': a real number is needed",
     ),
     ("side", lambda s: s.fix("lef", u_x=0.0), "no side 'lef' (did you mean 'left'?)"),
     ("group", lambda s: s.add("b", pages.solid(), cells="x", **SOLID), "no group 'x'"),
@@ -237,7 +238,7 @@ MISTAKES: list[tuple[str, Callable[[Study], object], str]] = [
         lambda s: s.add("b", pages.follower(), pressure=1.0),
         "follower has 2 nodes, the mesh has 8 quad4",
     ),
-    ("nothing", lambda s: s.fix("left"), "name what is prescribed"),
+    ("nothing", lambda s: s.fix("left"), "name an unknown, as in u_x=0"),
     ("not finite", lambda s: s.fix("left", u_x=float("nan")), "must be finite"),
     ("place", lambda s: s.load((0.1, 0.1), u_x=1.0), "no node at (0.1, 0.1); the nearest"),
     (
@@ -248,10 +249,51 @@ MISTAKES: list[tuple[str, Callable[[Study], object], str]] = [
     (
         "data",
         lambda s: s.add("b", pages.solid(), **{**SOLID, "thickness": np.ones(3)}),
-        "thickness has shape (3,)",
+        "thickness: one real number, or (8,) of them is needed; given float64 of shape (3,)",
     ),
     ("predicate", lambda s: s.fix(lambda x: x[:, 0] > 9.0, u_x=0.0), "no node is meant"),
     ("tie", lambda s: s.tie("left", "top", "u_x"), "3 and 5 nodes"),
+    ("load of nothing", lambda s: s.load("left"), "load('left'): name an unknown"),
+    ("spring of nothing", lambda s: s.spring("left"), "spring('left'): name an unknown"),
+    ("tie of nothing", lambda s: s.tie("left", "right"), "tie('left', 'right'): name an unknown"),
+    ("start of nothing", lambda s: s.start("left"), "start(): name an unknown"),
+    ("load of nan", lambda s: s.load("left", u_x=float("nan")), "u_x = nan: the number must be"),
+    ("tie of nan", lambda s: s.tie("left", "right", "u_x", offset=float("inf")), "offset = inf"),
+    ("complex", lambda s: s.fix("left", u_x=np.complex128(1 + 2j)), "a real number is needed"),
+    (
+        "complex start",
+        lambda s: s.start(u_x=lambda x: x[:, 0] * 1j),
+        "u_x: one real number, or (15,) of them is needed; given complex128",
+    ),
+    (
+        "nan start",
+        lambda s: s.start("left", u_x=lambda x: np.where(x[:, 1] == 0.5, np.nan, 0.0)),
+        "u_x is nan at (0, 0.5): numbers must be finite",
+    ),
+    (
+        "arguments of a value",
+        lambda s: s.load("left", u_x=lambda x: x[:, 0]),
+        "load('left'): a function of (x, t) is needed, this one takes (x)",
+    ),
+    (
+        "arguments of a parameter",
+        lambda s: s.add("b", pages.solid(), **{**SOLID, "mu": lambda x, t: 1.0}),
+        "'b': mu: a function of (t) is needed, this one takes (x, t)",
+    ),
+    (
+        "arguments of a predicate",
+        lambda s: s.fix(lambda x, y: x == 0, u_x=0.0),
+        "a function of (x) is needed, this one takes (x, y)",
+    ),
+    ("a function for a page", lambda s: s.add("b", pages.solid, **SOLID), "give what it returns"),
+    (
+        "a model for a page",
+        lambda s: s.add("b", softehl.Model("m", nodes=1, rule=quadrature.point_rule())),
+        "m.finish()",
+    ),
+    ("a node twice", lambda s: s.load([3, 3], u_x=1.0), "a node number stands twice"),
+    ("until", lambda s: s.solve(until=float("nan")), "until = nan: the number must be finite"),
+    ("start", lambda s: s.solve(start=s), "a result is needed"),
 ]
 
 
@@ -271,6 +313,16 @@ LATE: list[tuple[str, Callable[[Study], object], str]] = [
         "contradiction",
         lambda s: s.fix("bottom", u_x=1.0),
         "u_x at node 0 (0, 0) is prescribed twice: 0 by fix('left', u_x=...), 1 by fix('bottom'",
+    ),
+    (
+        "nan",
+        lambda s: s.load("right", u_x=lambda x, t: np.where(x[:, 1] > 0.5, np.nan, t)),
+        "load('right') at t = 0 is nan at (2, ",
+    ),
+    (
+        "complex",
+        lambda s: s.fix("right", u_x=lambda x, t: 1j * t),
+        "fix('right') at t = 0: one real number, or (3,) of them is needed; given complex128",
     ),
 ]
 
