@@ -16,6 +16,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, beginning
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
+from softehl.runtime.share import Share
 from softehl.runtime.solve.held import FirstStep
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point, Solution
@@ -58,18 +59,17 @@ class Clock:
         if until - self.t <= _ROUNDING * abs(until):
             raise StudyError(f"until = {until:g}: must be after the start, which is t = {self.t:g}")
 
-    def save(self, path: Path, system: System, asked: float) -> None:
+    def save(self, path: Path, share: Share, asked: float, marks: Mapping[str, Array]) -> None:
         """Write what a restart needs, on any number of processes, atomically.
 
-        asked: length of step that the march was asked for.
+        asked: length of step that the march was asked for. marks: see `marks_of`.
         """
-        share = system.share
         state, states = share.whole_state(self.histories), share.whole(self.states)
         parts = {f"history {name}": values for name, values in state.items()}
         steps = {"dt": np.array(self.dt), "asked": np.array(asked)}
         if share.first:
             arrays = {"times": np.array(self.times), "states": states, **steps, **parts}
-            write_arrays(path, {**arrays, **marks_of(system.everywhere)})
+            write_arrays(path, {**arrays, **marks})
 
     @classmethod
     def load(cls, path: Path, system: System, asked: float) -> Clock:
@@ -130,6 +130,7 @@ class March:
     ) -> Iterator[Result]:
         """Every converged step until the end.  Raises NotConverged."""
         length = until - clock.t
+        marks = {} if checkpoint is None else marks_of(system.everywhere)
         first_step = FirstStep(self.newton)
         settings = replace(self, newton=first_step.newton)
         while until - clock.t > _ROUNDING * abs(length):
@@ -137,7 +138,7 @@ class March:
             result, clock = settings._step(system, clock, dt)
             first_step.check(result.problem, result.point.solution)
             if checkpoint is not None:
-                clock.save(checkpoint, system, self.dt)
+                clock.save(checkpoint, system.share, self.dt, marks)
             yield result
 
     def _step(self, system: System, clock: Clock, dt: float) -> tuple[Result, Clock]:
