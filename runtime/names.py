@@ -35,6 +35,8 @@ def listed(known: Iterable[str]) -> str:
 
 def misfit(function: Callable[..., object], *arguments: str) -> str:
     """What a function takes, for a message, where it cannot be called with these; else ""."""
+    if not callable(function):
+        return f"a function of ({', '.join(arguments)}) is needed, given {function!r}"
     try:
         takes = inspect.signature(function)
     except (TypeError, ValueError):  # one that is built in does not tell

@@ -218,6 +218,8 @@ class Study:
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
         until = read.finite("until", until)
+        if on_step is not None:
+            read.function("on_step", on_step, "result")
         where = engine_of(engine)
         system = where.spread(self.system())
         begin = beginning(system, start)
@@ -295,6 +297,7 @@ class Study:
         """
         if read.finite("step", step) <= 0.0:
             raise StudyError(f"step = {step}: must be positive")
+        read.function("until", until, "result")
         system = self.system()
         begin = beginning(system, start)
         with Watch(Telling(progress, True, "load factor", begin[0]).until(None), write) as watch:

@@ -19,6 +19,15 @@ def check(mesh: Mesh) -> None:
             _require_once(mesh, f"side {name!r}: ", kind, faces)
     for name, group in mesh.groups.items():
         for kind, chosen in group.items():
+            count = len(mesh.cells.get(kind, ()))
+            if (
+                len(chosen)
+                and chosen.dtype.kind not in "iu"
+                or not ((chosen >= 0) & (chosen < count)).all()
+            ):
+                raise MeshError(
+                    f"group {name!r}: whole numbers below {count}, of {kind}, are needed"
+                )
             if len(np.unique(chosen)) < len(chosen):
                 raise MeshError(f"group {name!r}: the number of a {kind} stands twice")
     for kind, nodes in mesh.cells.items():

@@ -52,8 +52,11 @@ class Mesh:
 
     def __post_init__(self) -> None:
         """Raises MeshError for an unknown kind of cell or a wrong number of nodes."""
-        if self.points.ndim != 2 or not np.isfinite(self.points).all():
-            raise MeshError(f"points have shape {self.points.shape}, must be (n, dim) and finite")
+        if self.points.ndim != 2 or self.points.dtype.kind not in "fiu":
+            given = f"{self.points.dtype} of shape {self.points.shape}"
+            raise MeshError(f"points are {given}, must be real numbers of shape (n, dim)")
+        if not np.isfinite(self.points).all():
+            raise MeshError("points must be finite, one is not a number or infinite")
         faces = [faces for side in self.sides.values() for faces in side.items()]
         for name, nodes in (*self.cells.items(), *faces):
             if name not in CELLS:
@@ -132,7 +135,7 @@ class Mesh:
 
     def map(self, move: Callable[[Array], Array]) -> Mesh:
         """The mesh with nodes at `move(points)`, (n, dim) -> (n, dim)."""
-        moved = np.asarray(move(self.points), dtype=np.float64)
+        moved = np.asarray(move(self.points))
         if moved.ndim != 2 or len(moved) != len(self.points):
             raise MeshError(f"map: shape {moved.shape} from {self.points.shape}")
         return replace(self, points=moved)

@@ -31,20 +31,20 @@ def amount(words: str, name: str, value: Amount) -> Amount:
     """
     if not callable(value):
         return finite(name, value)
-    return Told(words, _function(words, value, "x", "t"))
+    return Told(words, function(words, value, "x", "t"))
 
 
 def parameter(block: str, name: str, value: Number) -> Number:
     """A number, or a function of t whose values are looked at.  Raises StudyError."""
     if not callable(value):
         return finite(f"{block!r}: {name}", value)
-    return Rising(f"{block!r}: {name}", _function(f"{block!r}: {name}", value, "t"))
+    return Rising(f"{block!r}: {name}", function(f"{block!r}: {name}", value, "t"))
 
 
 def datum(block: str, name: str, value: Datum, centres: Array) -> Array:
     """One number a place, (n,).  Raises StudyError."""
     words = f"{block!r}: {name}"
-    found = _function(words, value, "x")(centres) if callable(value) else value
+    found = function(words, value, "x")(centres) if callable(value) else value
     return np.broadcast_to(_real(words, found, centres), (len(centres),)).copy()
 
 
@@ -72,12 +72,12 @@ class Rising:
         return float(_real(f"{self.words} at t = {t:g}", self.function(t), ()))
 
 
-def _function(words: str, function: Callable[..., Any], *arguments: str) -> Callable[..., Any]:
-    """The function, if it can be called with these.  Raises StudyError."""
-    wrong = misfit(function, *arguments)
+def function(words: str, given: Callable[..., Any], *arguments: str) -> Callable[..., Any]:
+    """A function, if it can be called with these.  Raises StudyError."""
+    wrong = misfit(given, *arguments)
     if wrong:
         raise StudyError(f"{words}: {wrong}")
-    return function
+    return given
 
 
 def _real(words: str, value: object, places: Array | tuple[()]) -> Array:

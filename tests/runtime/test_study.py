@@ -294,6 +294,8 @@ MISTAKES: list[tuple[str, Callable[[Study], object], str]] = [
     ("a node twice", lambda s: s.load([3, 3], u_x=1.0), "a node number stands twice"),
     ("until", lambda s: s.solve(until=float("nan")), "until = nan: the number must be finite"),
     ("start", lambda s: s.solve(start=s), "a result is needed"),
+    ("on_step", lambda s: s.solve(on_step=lambda: None), "on_step: a function of (result) is"),
+    ("end of a path", lambda s: s.follow(step=0.1, until=2.0), "until: a function of (result) is"),
 ]
 
 
