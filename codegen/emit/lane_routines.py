@@ -53,9 +53,16 @@ def _newton(d: Definition, r: Newton) -> list[str]:
         M failed = softehl_mask(0), far = failed;
         V g[{n}], A[{n * n}], B[{max(n * first, 1)}];
 {body.text(2, targets)}
-        for (int i = 0; i < {n}; ++i)
-            far |= softehl_unsolved_lanes(
-                g[i], tolerance, {n}, A + {n} * i, s, {first}, B + {first} * i, p);
+        V felt[{n}];
+        for (int k = 0; k < {n}; ++k) felt[k] = softehl_splat(0.0);
+        for (int i = 0; i < {n}; ++i) {{
+            const V terms = softehl_terms_lanes({n}, A + {n} * i, s, {first}, B + {first} * i, p);
+            far |= ~softehl_le(softehl_vfabs(g[i]), tolerance * terms);
+            for (int k = 0; k < {n}; ++k) {{
+                const V share = softehl_vfabs(A[{n} * i + k]) / terms;
+                felt[k] = softehl_blend(softehl_lt(felt[k], share), share, felt[k]);
+            }}
+        }}
         failed |= softehl_eliminate_lanes({n}, A, 1, g);
         spoilt |= active & failed;
         active &= ~failed;
@@ -63,7 +70,9 @@ def _newton(d: Definition, r: Newton) -> list[str]:
             s[k] = softehl_blend(active, s[k] - g[k], s[k]);
             const V change = softehl_vfabs(g[k]);
             const V close = tolerance * ({size} + softehl_vfabs(s[k]));
-            far |= ~(softehl_le(change, close) | softehl_lt(0.9 * before[k], change));
+            const M rounding = softehl_lt(0.9 * before[k], change)
+                | softehl_le(felt[k] * change, softehl_splat({routines.rounding(r)}));
+            far |= ~(softehl_le(change, close) | rounding);
             before[k] = change;
         }}
         active &= far;
@@ -73,7 +82,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
     *lost |= spoilt;
 }}
 """
-    return [_UNSOLVED, _ELIMINATE, *texts(d, body.called), text]
+    return [_TERMS, _ELIMINATE, *texts(d, body.called), text]
 
 
 def _inverse(d: Definition, r: Inverse) -> str:
@@ -103,10 +112,9 @@ def _one_by_one(d: Definition, r: Routine) -> str:
 """
 
 
-_UNSOLVED = """/* Lanes in which an equation g is far from zero: compared with the sum of
-   |slope * value| over the local unknowns and all that comes from outside. */
-static M softehl_unsolved_lanes(V g, double tolerance, int n, const V *A, const V *s,
-    int m, const V *B, const V *p)
+_TERMS = """/* What cancels in an equation: the sum of |slope * value| over the local unknowns
+   and all that comes from outside. */
+static V softehl_terms_lanes(int n, const V *A, const V *s, int m, const V *B, const V *p)
 {
     V terms = softehl_splat(0.0);
     for (int k = 0; k < n; ++k) terms += softehl_vfabs(A[k] * s[k]);
@@ -114,7 +122,7 @@ static M softehl_unsolved_lanes(V g, double tolerance, int n, const V *A, const 
         const V term = softehl_vfabs(B[k] * p[k]);
         terms += softehl_blend(softehl_lt(term, softehl_splat(HUGE_VAL)), term, softehl_splat(0.0));
     }
-    return ~softehl_le(softehl_vfabs(g), tolerance * terms);
+    return terms;
 }
 """
 

@@ -6,6 +6,7 @@ not-a-number and the kernel marks the whole element (`codegen.abi`).
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Sequence
 
 from softehl.codegen.emit.printer import Printer, number
@@ -75,6 +76,11 @@ def newton_values(r: Newton) -> tuple[list[Node], list[str]]:
     return [*r.equations, *slopes], targets + [f"B[{i}]" for i in range(n * first)]
 
 
+def rounding(r: Newton) -> str:
+    """What the rounding of its terms may change an equation by, relative to their sum."""
+    return number(r.inputs * sys.float_info.epsilon)
+
+
 def _newton(d: Definition, r: Newton) -> list[str]:
     n, first = r.outputs, r.inputs - r.outputs
     values, targets = newton_values(r)
@@ -90,14 +96,18 @@ def _newton(d: Definition, r: Newton) -> list[str]:
         double g[{n}], A[{n * n}], B[{max(n * first, 1)}];
 {body.text(2, targets)}
         int far = 0;
-        for (int i = 0; i < {n}; ++i)
-            far |= softehl_unsolved(
-                g[i], tolerance, {n}, A + {n} * i, s, {first}, B + {first} * i, p);
+        double felt[{n}] = {{0.0}};
+        for (int i = 0; i < {n}; ++i) {{
+            const double terms = softehl_terms({n}, A + {n} * i, s, {first}, B + {first} * i, p);
+            far |= !(fabs(g[i]) <= tolerance * terms);
+            for (int k = 0; k < {n}; ++k) felt[k] = fmax(felt[k], fabs(A[{n} * i + k]) / terms);
+        }}
         if (failed || softehl_eliminate({n}, A, 1, g)) break;
         for (int k = 0; k < {n}; ++k) {{
             s[k] -= g[k];
             const double change = fabs(g[k]), close = tolerance * ({size} + fabs(s[k]));
-            far |= !(change <= close || change > 0.9 * before[k]);
+            const int rounding = change > 0.9 * before[k] || felt[k] * change <= {rounding(r)};
+            far |= !(change <= close || rounding);
             before[k] = change;
         }}
         if (!far) return 0;
@@ -106,7 +116,7 @@ def _newton(d: Definition, r: Newton) -> list[str]:
     return 1;
 }}
 """
-    return [_UNSOLVED, _ELIMINATE, *texts(d, body.called), text]
+    return [_TERMS, _ELIMINATE, *texts(d, body.called), text]
 
 
 def _inverse(d: Definition, r: Inverse) -> str:
@@ -148,10 +158,10 @@ static int {name}(
 
 _CONTENT = ("energy", "first derivatives", "first and second derivatives")
 
-_UNSOLVED = """/* Whether an equation g is far from zero: compared with the sum of |slope * value|
-   over the local unknowns and all that comes from outside. */
-static int softehl_unsolved(double g, double tolerance, int n, const double *A, const double *s,
-    int m, const double *B, const double *p)
+_TERMS = """/* What cancels in an equation: the sum of |slope * value| over the local unknowns
+   and all that comes from outside. */
+static double softehl_terms(
+    int n, const double *A, const double *s, int m, const double *B, const double *p)
 {
     double terms = 0.0;
     for (int k = 0; k < n; ++k) terms += fabs(A[k] * s[k]);
@@ -159,7 +169,7 @@ static int softehl_unsolved(double g, double tolerance, int n, const double *A, 
         const double term = fabs(B[k] * p[k]);
         if (term < HUGE_VAL) terms += term;
     }
-    return !(fabs(g) <= tolerance * terms);
+    return terms;
 }
 """
 

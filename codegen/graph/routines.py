@@ -93,7 +93,8 @@ class Control:
     """When a local iteration has found its solution; without, it fails after `iterations` steps.
 
     Every equation must be below `tolerance` of the sum of |dg_i/dy * y| over all y that enter it,
-    and every step below `tolerance` * (`size` + |s_k|), or smaller no longer: it is rounding then.
+    and every step below `tolerance` * (`size` + |s_k|), unless it is rounding: it becomes smaller
+    no longer, or it changes no equation by more than the rounding of those sums.
     """
 
     tolerance: Fraction

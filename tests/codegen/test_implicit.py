@@ -297,6 +297,46 @@ def test_rounding_of_large_terms_ends_the_iteration(tmp_path: Path) -> None:
     assert np.abs(found**3 + found - u[:, 0]).max() <= 5e-7
 
 
+def crystal() -> Definition:
+    """A cubic crystal with the twelve slips of octahedral planes, whose rate is a ninth power."""
+    m = Model("crystal", nodes=1, rule=quadrature.point_rule())
+    e = [m.unknown(f"e_{k}") for k in range(6)]
+    strain = sp.Matrix([[e[0], e[3], e[4]], [e[3], e[1], e[5]], [e[4], e[5], e[2]]])
+    planes = [(1, 1, 1), (-1, 1, 1), (1, -1, 1), (1, 1, -1)]
+    along = [(0, 1, -1), (1, 0, -1), (1, -1, 0), (0, 1, 1), (1, 0, 1), (1, 1, 0)]
+    pairs = [(sp.Matrix(n), sp.Matrix(s)) for n in planes for s in along]
+    schmid = [(n * s.T + s * n.T) / (2 * sp.sqrt(6)) for n, s in pairs if n.dot(s) == 0]
+
+    def stress(slips: Any) -> sp.Matrix:
+        elastic = strain - sum((g * P for g, P in zip(slips, schmid, strict=True)), sp.zeros(3))
+        return 1500 * elastic + 1000 * elastic.trace() * sp.eye(3)  # of the shear resistance
+
+    def flow(slips: Any) -> list[Any]:
+        sigma = stress(slips)
+        rates = [sum(sigma.multiply_elementwise(P)) ** 9 for P in schmid]
+        return [g - rate / 1000 for g, rate in zip(slips, rates, strict=True)]
+
+    slips = m.implicit("g", flow, start=[sp.Integer(0)] * 12, iterations=60)
+    sigma = stress(slips)
+    m.weak_form([(sigma[i, j], x) for (i, j), x in zip(SYMMETRIC, e, strict=True)])
+    return m.finish()
+
+
+SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def test_slips_that_are_nothing_but_rounding_end_the_iteration(tmp_path: Path) -> None:
+    """Pulled along an edge, four systems have no resolved stress but the rounding of its terms."""
+    kernel = compiled(crystal(), tmp_path)
+    rng = np.random.default_rng(0)
+    pulled = np.linspace(0.0, 2e-3, 200)[:, None] * [1.0, -0.3, -0.3, 0.0, 0.0, 0.0]
+    noise = 1e-19 * rng.standard_normal(pulled.shape)
+    r, K = kernel.tangent(np.zeros((200, 0)), pulled + noise)
+    assert np.isfinite(r).all()
+    assert np.isfinite(K).all()
+    assert np.abs(r[:, 0]).max() < 3.0  # it flows: 3.8 if it did not
+
+
 def test_one_factor_is_an_equation(tmp_path: Path) -> None:
     d = small("factor", lambda s, x: sp.log(s / x) * (2 + s), start=sp.Symbol("x", real=True) * 2)
     kernel = compiled(d, tmp_path)
