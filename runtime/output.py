@@ -10,11 +10,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.dofs import AXES
 from softehl.runtime.io import replacing, write_text
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.statement.records import Block
-
-_AXES = ("x", "y", "z", "r")
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +109,7 @@ def _vectors(nodal: Mapping[str, Array]) -> dict[str, Array]:
     stems: dict[str, list[str]] = {}
     for name in nodal:
         stem, _, axis = name.rpartition("_")
-        if stem and axis in _AXES:
+        if stem and axis in AXES:
             stems.setdefault(stem, []).append(name)
     vectors = {}
     for stem, names in stems.items():

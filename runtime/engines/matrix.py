@@ -102,6 +102,12 @@ class Tangent:
         times.matrix += time.perf_counter() - between
         return r
 
+    def diagonal(self) -> Array:
+        """Magnitudes of the diagonal of K, own rows, (k,)."""
+        found = self.exchange.vector.duplicate()
+        self.matrix.getDiagonal(found)
+        return np.asarray(np.abs(found.array_r[self.exchange.places]))
+
     def times_magnitudes(self, x: Array) -> Array:
         """|K| times own values x, (k,), at least 0: own rows, (k,)."""
         starts, columns, values = self.matrix.getValuesCSR()

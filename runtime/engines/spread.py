@@ -13,7 +13,8 @@ from softehl.runtime.engines.exchange import Exchange, largest, total
 from softehl.runtime.engines.local import Part
 from softehl.runtime.engines.matrix import Solver, Tangent
 from softehl.runtime.fem.checks import element_name, rows_not_finite, unknown_name
-from softehl.runtime.fem.problem import ROUNDING, Problem, is_lost, ratio
+from softehl.runtime.fem.measure import ROUNDING, Balance, is_lost, size
+from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import world
 
 
@@ -21,7 +22,8 @@ from softehl.runtime.mpi import world
 class Team:
     """What the processes share through a whole path: how vectors are exchanged, and the matrix.
 
-    tangent: of the latest set of prescribed unknowns. reach: see `Assembler.reach`, own unknowns.
+    tangent: of the latest set of prescribed unknowns. reach, counts: see `Assembler`, of own
+    unknowns.
     """
 
     part: Part
@@ -30,6 +32,7 @@ class Team:
     solver: Solver
     tangent: Tangent | None = None
     reach: Array = field(default_factory=lambda: np.empty(0))
+    counts: Array = field(default_factory=lambda: np.empty(0))
 
     def tangent_of(self, problem: Problem) -> Tangent:
         """The matrix for the prescribed unknowns of a problem."""
@@ -114,26 +117,28 @@ class Spread:
         """Problems of studies have no guards."""
         return 1.0
 
-    def measure(self, x: Array, K: Factors | None) -> float:
+    def measure(self, x: Array, K: Factors | None, *, rounded: bool = False) -> float:
         """See `Problem.measure`: the same sums, over all processes."""
         own, exchange, problem = self.team.part.owned, self.team.exchange, self.problem
         sums = problem.assembler.residual_and_size(x, self.parameters)
-        r, size = exchange.added(sums[0]), exchange.added(sums[1])
+        r, forces = exchange.added(sums[0]), exchange.added(sums[1])
         if total(np.array([float(not np.isfinite(r).all())]))[0]:
             return float("inf")
-        noise = np.zeros(len(own)) if K is None else self._noise(x, K)
-        if K is not None and self._is_lost(x, size, noise):
-            return float("inf")
+        noise, terms = np.zeros(len(own)), np.zeros(len(own))
+        if K is not None:
+            terms = self._terms(np.abs(x)[own], K)
+            if rounded:
+                noise = ROUNDING * self._terms(np.abs(x)[own] + self._reach(), K)
+                if self._is_lost(x, forces, K):
+                    return float("inf")
         wanted = self._wanted(x)
         free = np.ones(len(x), dtype=bool)
         free[problem.fixed] = False
         defect = np.maximum(np.abs(r) - noise, 0.0) * free[own]
         off, extent = (x - wanted)[own], np.maximum(np.abs(x), np.abs(wanted))[own]
-        squares = [v * v for v in (defect, size, off, extent)]
-        table = total(np.array([[v[p].sum() for v in squares] for p in self._fields()]))
-        roots = np.sqrt(table)
-        parts = [(ratio(d, s), ratio(o, w)) for d, s, o, w in roots]
-        return float(np.linalg.norm(parts))
+        met = ~free[own] | (self._counts() > 1)
+        balance = Balance(defect, forces, terms, met, off, extent)
+        return size(total(balance.squares(self._fields())), largest(balance.worst()))
 
     def name_of(self, number: int) -> str:
         """An unknown for messages, by PETSc's number."""
@@ -171,25 +176,41 @@ class Spread:
         r[fixed] = defect[own][fixed]
         return r
 
-    def _noise(self, x: Array, K: Factors) -> Array:
+    def _reach(self) -> Array:
         team = self.team
         if not len(team.reach):
             team.reach = team.exchange.highest(self.problem.assembler.reach())
-        magnitudes = np.abs(x)[team.part.owned] + team.reach
-        return ROUNDING * K.tangent.times_magnitudes(magnitudes)
+        return team.reach
 
-    def _is_lost(self, x: Array, size: Array, noise: Array) -> bool:
+    def _counts(self) -> Array:
+        team = self.team
+        if not len(team.counts):
+            counts = self.problem.assembler.counts(self.parameters)
+            team.counts = team.exchange.added(counts.astype(np.float64))
+        return team.counts
+
+    def _terms(self, magnitudes: Array, K: Factors) -> Array:
+        """See `Problem`; magnitudes and sums of own unknowns, (k,)."""
+        exchange, problem = self.team.exchange, self.problem
+        root = np.sqrt(K.tangent.diagonal())
+        root[np.isin(self.team.part.owned, problem.fixed)] = 0.0
+        local = exchange.local(exchange.to_petsc(root * magnitudes))
+        around = exchange.added(problem.assembler.around(local, self.parameters))
+        return K.tangent.times_magnitudes(magnitudes) + root * around
+
+    def _is_lost(self, x: Array, forces: Array, K: Factors) -> bool:
         """See `Problem`."""
+        reach = self._reach()
+        noise = ROUNDING * K.tangent.times_magnitudes(np.abs(x)[self.team.part.owned] + reach)
         values = np.abs(self.problem.values).max(initial=0.0)
-        known = largest(max(float(self.team.reach.max(initial=0.0)), float(values)))
-        norms = np.sqrt(total(np.array([noise @ noise, size @ size])))
+        known = largest(max(float(reach.max(initial=0.0)), float(values)))
+        norms = np.sqrt(total(np.array([noise @ noise, forces @ forces])))
         return is_lost(largest(float(np.abs(x).max(initial=0.0))), known, *norms.tolist())
 
     def _fields(self) -> list[Integers]:
         """For each field the places of its unknowns among own ones."""
-        own, layout = self.team.part.owned, self.problem.layout
-        parts = [layout.part(name) for name in layout.names]
-        return [np.flatnonzero((own >= p.start) & (own < p.stop)) for p in parts]
+        own = self.team.part.owned
+        return [np.flatnonzero(np.isin(own, numbers)) for numbers in self.problem.layout.fields]
 
 
 def _first(words: str) -> str:

@@ -186,13 +186,13 @@ class Memo:
     """What assembly has computed before and may be asked for again: it saves time only.
 
     tangents: block name -> the latest parameters of a constant tangent, the positions of its
-    entries and their values. crosses: prescribed unknowns -> see `Assembler.cross`. loose: names of
-    blocks -> unknowns that none of them has. reach: see `Assembler.reach`.
+    entries and their values. crosses: prescribed unknowns -> see `Assembler.cross`. counts: names
+    of blocks -> see `Assembler.counts`. reach: see `Assembler.reach`.
     """
 
     tangents: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
     crosses: dict[bytes, Integers] = field(default_factory=dict)
-    loose: dict[frozenset[str], Integers] = field(default_factory=dict)
+    counts: dict[frozenset[str], Integers] = field(default_factory=dict)
     reach: Array | None = None
 
     def without(self, name: str) -> Memo:
@@ -283,14 +283,29 @@ class Assembler:
 
     def loose(self, names: Iterable[str]) -> Integers:
         """Unknowns that no element of the blocks of these names has, rising."""
+        return np.flatnonzero(self.counts(names) == 0)
+
+    def counts(self, names: Iterable[str]) -> Integers:
+        """How many elements of the blocks of these names have each unknown, (size,)."""
         key = frozenset(names)
-        if key not in self.memo.loose:
-            present = np.zeros(self.size, dtype=bool)
+        if key not in self.memo.counts:
+            found = np.zeros(self.size, dtype=np.int64)
             for block in self.blocks:
                 if block.name in key:
-                    present[block.dofs] = True
-            self.memo.loose[key] = np.flatnonzero(~present)
-        return self.memo.loose[key]
+                    np.add.at(found, block.dofs.ravel(), 1)
+            self.memo.counts[key] = found
+        return self.memo.counts[key]
+
+    def around(self, values: Array, names: Iterable[str]) -> Array:
+        """For each unknown the sum of values (size,) over all unknowns of the elements that it is
+        in, of the blocks of these names: (size,).
+        """
+        found, chosen = np.zeros(self.size), frozenset(names)
+        for block in self.blocks:
+            if block.name in chosen:
+                sums = values[block.dofs].sum(axis=1)
+                np.add.at(found, block.dofs, sums[:, None])
+        return found
 
     def reach(self) -> Array:
         """Largest coordinate of the elements that each unknown occurs in, (size,).

@@ -11,6 +11,9 @@ import numpy as np
 
 from softehl.runtime.arrays import Integers
 
+AXES = ("x", "y", "z", "r")
+"""What follows the underscore in the name of a component of a vector."""
+
 
 @dataclass(frozen=True)
 class DofLayout:
@@ -49,6 +52,15 @@ class DofLayout:
         """Numbers (count,) of the unknowns of a field; KeyError for an unknown name."""
         part = self.part(name)
         return np.arange(part.start, part.stop)
+
+    @cached_property
+    def fields(self) -> tuple[Integers, ...]:
+        """Numbers of the unknowns of each field; components u_x, u_y, ... of one are together."""
+        found: dict[str, list[Integers]] = {}
+        for name in self.names:
+            stem, _, axis = name.rpartition("_")
+            found.setdefault(stem if stem and axis in AXES else name, []).append(self.dofs(name))
+        return tuple(np.concatenate(parts) for parts in found.values())
 
     @cached_property
     def _parts(self) -> dict[str, slice]:

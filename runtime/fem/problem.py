@@ -7,7 +7,6 @@ the same assembler.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -27,14 +26,8 @@ from softehl.runtime.fem.checks import (
 )
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import Guard
+from softehl.runtime.fem.measure import ROUNDING, Balance, is_lost, size
 from softehl.runtime.names import listed
-
-ROUNDING = 8.0 * np.finfo(np.float64).eps
-"""What the residual of an element may be off by, relative to the stiffness times the largest number
-that its kernel adds: a few roundings."""
-
-_FAR = 1e6  # times the coordinates and prescribed values: no unknown of a problem that is posed
-_SWAMPED = 1e-3  # of the loads and internal forces: rounding beyond that decides nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +37,9 @@ class Problem:
     parameters: block name -> parameters, (k,) in the order of the kernel or a mapping by name (put
     in order here); a block that is not named is switched off.
     scales: field -> reference size of its residuals, one or one for each: a force (N), a flux
-    (mm^2/s), a gap times area (mm^3). They may be left out: residuals are measured by the loads,
-    reactions and internal forces of their field, with which a scale that is given must agree: the
-    stricter of both counts.
+    (mm^2/s), a gap times area (mm^3). They may be left out: residuals are measured by the terms of
+    their equations (`fem.measure`), with which a scale that is given must agree: the stricter of
+    both counts.
     fixed, values: unknowns that are prescribed, and to what (same length). Their equations are
     x = value, and they are eliminated from the others.
     absolute: residuals are measured by `scales` alone, of which every field needs one, however
@@ -158,38 +151,54 @@ class Problem:
             weights[self.layout.part(name)] = 1.0 / np.asarray(self.scales[name])
         return weights
 
-    def measure(self, x: Array, K: csc_array[np.float64] | None) -> float:
+    def measure(self, x: Array, K: csc_array[np.float64] | None, *, rounded: bool = False) -> float:
         """Dimensionless size of the residual at x, (n,), inf where it is not finite.
 
-        Residuals of a field count relative to its loads, reactions and internal forces at x, and
-        prescribed unknowns relative to their values. With K, a tangent near x, what rounding may
-        have caused does not count. With `absolute` scales it is the norm.
-        Raises ProblemError if an unknown occurs in no block that is switched on.
+        `fem.measure` says how; prescribed unknowns count relative to their values. K: a tangent
+        near x. rounded: what rounding may have caused does not count. With `absolute` scales it is
+        the norm. Raises ProblemError if an unknown occurs in no block that is switched on.
         """
         self._require_determined()
         if self.absolute:
             r = self.residual(x)
             return self.norm(r) if np.isfinite(r).all() else np.inf
-        r, size = self.assembler.residual_and_size(x, self.parameters)
+        r, forces = self.assembler.residual_and_size(x, self.parameters)
         if not np.isfinite(r).all():
             return np.inf
-        noise = np.zeros_like(r)
+        noise, terms = np.zeros_like(r), np.zeros_like(r)
         if K is not None:
-            noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + self.assembler.reach()))
-            if self._is_lost(x, size, noise):
-                return np.inf
+            terms = self._terms(np.abs(x), K)
+            if rounded:
+                noise = ROUNDING * self._terms(np.abs(x) + self.assembler.reach(), K)
+                if self._is_lost(x, forces, K):
+                    return np.inf
         free: Flags = np.ones(len(r), dtype=bool)
         free[self.fixed] = False
+        defect = np.where(free, np.maximum(np.abs(r) - noise, 0.0), 0.0)
         wanted = x.copy()
         wanted[self.fixed] = self.values
-        parts = []
-        for name in self.layout.names:
-            part = self.layout.part(name)
-            parts.append(self._relative(name, r, size, noise, free))
-            parts.append(
-                _ratio(x[part] - wanted[part], np.maximum(np.abs(x), np.abs(wanted))[part])
-            )
-        return float(np.linalg.norm(parts))
+        off, extent = x - wanted, np.maximum(np.abs(x), np.abs(wanted))
+        met = ~free | (self.assembler.counts(self.parameters) > 1)
+        balance = Balance(defect, forces, terms, met, off, extent)
+        found = size(balance.squares(self.layout.fields), balance.worst())
+        return max(found, self._by_scales(defect))
+
+    def _terms(self, magnitudes: Array, K: csc_array[np.float64]) -> Array:
+        """What cancels in each equation, (n,), where unknowns have these magnitudes, (n,).
+
+        An entry of K may itself be what is left of larger numbers, of which sqrt(K_ii K_jj) is a
+        bound wherever an energy is convex (Cauchy and Schwarz).
+        """
+        root = np.sqrt(np.abs(K.diagonal()))
+        root[self.fixed] = 0.0
+        around = self.assembler.around(root * magnitudes, self.parameters)
+        return np.asarray(abs(K) @ magnitudes) + root * around
+
+    def _by_scales(self, defect: Array) -> float:
+        """Largest norm of the residuals of a field over the scale that is given for it."""
+        given = self.scales.items()
+        found = [defect[self.layout.part(name)] / np.asarray(scale) for name, scale in given]
+        return max((float(np.linalg.norm(part)) for part in found), default=0.0)
 
     def beyond_rounding(self, r: Array, x: Array, K: csc_array[np.float64]) -> float:
         """Norm of what is left of the residual r at x, (n,), once what the last digits of x make of
@@ -200,27 +209,13 @@ class Problem:
         noise = np.finfo(np.float64).eps * np.asarray(abs(K) @ np.abs(x))
         return self.norm(np.maximum(np.abs(r) - noise, 0.0))
 
-    def _is_lost(self, x: Array, size: Array, noise: Array) -> bool:
-        """Whether unknowns have grown until rounding is as large as the loads: nothing holds them.
-
-        Where a body floats, a tangent that rounding alone keeps regular moves it by any amount.
-        """
-        known = max(
-            float(self.assembler.reach().max()), float(np.abs(self.values).max(initial=0.0))
-        )
+    def _is_lost(self, x: Array, forces: Array, K: csc_array[np.float64]) -> bool:
+        """Whether unknowns have grown until rounding is as large as the loads."""
+        reach = self.assembler.reach()
+        noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + reach))
+        known = max(float(reach.max()), float(np.abs(self.values).max(initial=0.0)))
         largest = float(np.abs(x).max(initial=0.0))
-        return is_lost(largest, known, float(np.linalg.norm(noise)), float(np.linalg.norm(size)))
-
-    def _relative(self, name: str, r: Array, size: Array, noise: Array, free: Flags) -> float:
-        """Size of the residuals r, (n,), of a field, relative to what it is measured by."""
-        part = self.layout.part(name)
-        own = free[part]
-        defect = np.maximum(np.abs(r[part]) - noise[part], 0.0)[own]
-        found = _ratio(defect, size[part])
-        if name in self.scales:
-            scale = np.broadcast_to(self.scales[name], own.shape)[own]
-            found = max(found, float(np.linalg.norm(defect / scale)))
-        return found
+        return is_lost(largest, known, float(np.linalg.norm(noise)), float(np.linalg.norm(forces)))
 
     def _require_determined(self) -> None:
         loose = np.setdiff1d(self.assembler.loose(self.parameters), self.fixed)
@@ -291,19 +286,3 @@ class Problem:
         K.data[self.assembler.cross(self.fixed)] = 0.0
         K.data[self.assembler.pattern.diagonal[self.fixed]] = 1.0
         return K
-
-
-def _ratio(defect: Array, size: Array) -> float:
-    return ratio(float(np.linalg.norm(defect)), float(np.linalg.norm(size)))
-
-
-def is_lost(largest: float, known: float, noise: float, size: float) -> bool:
-    """Whether the largest unknown is far from what is known of the problem, and rounding (noise)
-    as large as the loads and internal forces (size).
-    """
-    return largest > _FAR * known > 0.0 and noise > _SWAMPED * size
-
-
-def ratio(off: float, size: float) -> float:
-    """Norm of a defect over that of what it is measured by; 0 where there is no defect."""
-    return (off / size if size else math.inf) if off > 0.0 else 0.0

@@ -107,11 +107,11 @@ class _Corrector:
         problem = self._problem(self.base)
         return max(problem.norm(r[:-1]), abs(float(r[-1])))
 
-    def measure(self, y: Array, K: SparseMatrix | None) -> float:
+    def measure(self, y: Array, K: SparseMatrix | None, *, rounded: bool = False) -> float:
         problem, off = self._problem(y), abs(float(self._plane(y)[0]))
         if isinstance(problem, MeasuredProblem):
             inner = None if K is None else csc_array(csc_array(K)[:-1, :-1])
-            return max(problem.measure(y[:-1], inner), off)
+            return max(problem.measure(y[:-1], inner, rounded=rounded), off)
         r = problem.residual(y[:-1])
         return max(problem.norm(r), off) if np.isfinite(r).all() else math.inf
 

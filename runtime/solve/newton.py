@@ -63,10 +63,11 @@ class EvolvingProblem(NonlinearProblem, Protocol):
 class MeasuredProblem(NonlinearProblem, Protocol):
     """A problem that measures its residuals by its own terms; Newton then asks it, not `norm`."""
 
-    def measure(self, x: Array, K: SparseMatrix | None) -> float:
+    def measure(self, x: Array, K: SparseMatrix | None, *, rounded: bool = False) -> float:
         """Dimensionless size of R(x), (n,), inf if it is not finite.
 
-        With K, a tangent near x, what rounding may have caused does not count.
+        K: a tangent near x, from which the size of the terms is known; None at a start. rounded:
+        what rounding may have caused does not count.
         """
         ...
 
@@ -212,7 +213,7 @@ class Newton:
         best, best_norm = state.x, math.inf
         for _ in range(self.halvings + 1):
             x = state.x + fraction * dx
-            norm = _norm_at(problem, x)
+            norm = _norm_at(problem, x, K)
             if norm < best_norm:
                 best, best_norm = x, norm
             if self._acceptable(norm, state.norms[-1], fraction):
@@ -230,7 +231,9 @@ class Newton:
 
     def _is_rounding(self, problem: NonlinearProblem, x: Array, K: SparseMatrix) -> bool:
         """Whether nothing is left of the residual at x but what rounding may have caused."""
-        return isinstance(problem, MeasuredProblem) and problem.measure(x, K) <= self.tolerance
+        return isinstance(problem, MeasuredProblem) and (
+            problem.measure(x, K, rounded=True) <= self.tolerance
+        )
 
     def _is_exact(self, problem: NonlinearProblem, state: NewtonState, K: SparseMatrix) -> bool:
         """Whether the last digits of x make all that is left of a residual near the tolerance."""
@@ -247,10 +250,10 @@ class Newton:
         return not self.line_search or norm <= (1.0 - _SUFFICIENT_DECREASE * fraction) * before
 
 
-def _norm_at(problem: NonlinearProblem, x: Array) -> float:
-    """Norm of the residual at x, inf if either is not finite."""
+def _norm_at(problem: NonlinearProblem, x: Array, K: SparseMatrix | None = None) -> float:
+    """Norm of the residual at x, inf if either is not finite.  K: a tangent near x, if known."""
     if isinstance(problem, MeasuredProblem):
-        norm = problem.measure(x, None)
+        norm = problem.measure(x, K)
         return norm if math.isfinite(norm) else math.inf
     r = problem.residual(x)
     norm = float(problem.norm(r)) if np.isfinite(r).all() else math.inf

@@ -1,0 +1,88 @@
+"""How far equations are from being fulfilled, as one number without a unit.
+
+Two things must be small. Every equation by itself: its residual relative to what cancels in it,
+which is the contributions of its elements and loads, and the tangent's entries times the unknowns.
+So no equation is overlooked because another one, elsewhere, has larger terms. And every field as a
+whole: the norm of its residuals relative to that of its loads, reactions and internal forces, which
+in slender and nearly incompressible bodies are much smaller than those terms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Flags, Integers
+
+ROUNDING = 8.0 * np.finfo(np.float64).eps
+"""What the residual of an element may be off by, relative to the stiffness times the largest number
+that its kernel adds: a few roundings."""
+
+_LEAST = ROUNDING / 1e-9
+"""A field whose forces are smaller than this share of its terms is measured by that: residuals that
+rounding alone leaves are then below Newton's usual tolerance, 1e-9."""
+
+_FAR = 1e6  # times the coordinates and prescribed values: no unknown of a problem that is posed
+_SWAMPED = 1e-3  # of the loads and internal forces: rounding beyond that decides nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Residuals and what they are made of, each (n,).
+
+    defect: size of the residuals, 0 where the unknown is prescribed. forces: sums of the sizes of
+    what elements contribute. terms: of the tangent's entries times the unknowns, 0 if no tangent is
+    known. met: whether several elements contribute or the unknown is prescribed, so that `forces`
+    is more than the residual's own size. off: prescribed unknowns less their values, and extent:
+    the larger of both.
+    """
+
+    defect: Array
+    forces: Array
+    terms: Array
+    met: Flags
+    off: Array
+    extent: Array
+
+    def worst(self) -> float:
+        """Largest residual of one equation relative to what cancels in it."""
+        wrong = np.flatnonzero(self.defect)
+        return float(np.max(self.defect[wrong] / (self.forces + self.terms)[wrong], initial=0.0))
+
+    def squares(self, fields: Sequence[Integers]) -> Array:
+        """Sums of squares over the unknowns of each field, (fields, 6), for `size`."""
+        columns = (
+            self.defect,
+            np.where(self.met, self.forces, 0.0),
+            self.forces + self.terms,
+            self.terms,
+            self.off,
+            self.extent,
+        )
+        return np.array([[float(c[f] @ c[f]) for c in columns] for f in fields])
+
+
+def size(squares: Array, worst: float) -> float:
+    """The number, from the sums of squares of all fields and the worst equation."""
+    found = [worst]
+    for defect, forces, every, terms, off, extent in np.sqrt(squares).tolist():
+        reference = max(forces, _LEAST * terms) if forces else every
+        found += [min(_ratio(defect, reference), 1.0), _ratio(off, extent)]
+    return float(max(found))
+
+
+def is_lost(largest: float, known: float, noise: float, size: float) -> bool:
+    """Whether the largest unknown is far from what is known of the problem, and rounding (noise)
+    as large as the loads and internal forces (size).
+
+    Where a body floats, a tangent that rounding alone keeps regular moves it by any amount.
+    """
+    return largest > _FAR * known > 0.0 and noise > _SWAMPED * size
+
+
+def _ratio(off: float, size: float) -> float:
+    """Norm of a defect over that of what it is measured by; 0 where there is no defect."""
+    return (off / size if size else math.inf) if off > 0.0 else 0.0
