@@ -9,6 +9,7 @@ import numpy as np
 
 from softehl.runtime.begin import Beginning
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
 from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.held import FirstStep
@@ -54,6 +55,7 @@ class ArcSteps:
             self.on_step(results[-1])
 
         problem, first_step = problem_at(begin + self.step), FirstStep(self.newton)
+        require_held(system, problem, x0)
         with np.errstate(all="ignore"):
             first = first_step.newton.solve(problem, x0)
         if not first.converged:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from softehl.runtime.begin import SMALLEST, Beginning
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
 from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.held import FirstStep
@@ -42,6 +43,7 @@ class LoadSteps:
             self.on_step(reached[0])
 
         first = abs(until - begin) / self.steps or 1.0  # nowhere to go: one solution there
+        require_held(system, problem_at(begin + (until - begin) / self.steps), x0)
         rule = StepRule(first, min(SMALLEST, first), first)
         path = Continuation(first_step.newton, rule, name="load factor")
         branch = path.follow(problem_at, begin, until, x0, on_point=keep)

@@ -14,6 +14,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, beginning
+from softehl.runtime.held import require_held
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.share import Share
@@ -133,6 +134,9 @@ class March:
         marks = {} if checkpoint is None else marks_of(system.everywhere)
         first_step = FirstStep(self.newton)
         settings = replace(self, newton=first_step.newton)
+        if length > 0.0:
+            posed = system.problem(self._posed(system, clock, _towards(length, clock.dt)))
+            require_held(system, posed, clock.states[0])
         while until - clock.t > _ROUNDING * abs(length):
             dt = _towards(until - clock.t, clock.dt)
             result, clock = settings._step(system, clock, dt)

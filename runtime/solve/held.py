@@ -63,8 +63,8 @@ class FirstStep:
         # one that is spread over processes is not looked at
         number = loosest(K, factors) if issparse(K) else None
         if number is not None:
-            message = f"nothing holds {problem.name_of(number)}: it can move freely"
-            raise NotConverged(replace(solution, status=Status.SINGULAR, message=message))
+            message = f"nothing prevents a motion of {problem.name_of(number)}"
+            raise NotConverged(replace(solution, status=Status.NOT_HELD, message=message))
 
 
 def loosest(K: SparseMatrix, factors: Factors) -> int | None:

@@ -23,6 +23,7 @@ class Status(enum.Enum):
     MAX_ITERATIONS = "too many iterations"
     DIVERGED = "diverged"
     SINGULAR = "singular tangent"
+    NOT_HELD = "not held"
     NOT_FINITE = "residual not finite"
     STEP_TOO_SMALL = "continuation step too small"
     KILLED = "ended from outside"
@@ -45,6 +46,7 @@ _ADVICE = {
         "Look for a rigid motion or an unknown that no equation holds; at a limit point of the "
         "load follow the path by arc length instead."
     ),
+    Status.NOT_HELD: "Prescribe what is missing (fix), or hold it by springs or ties.",
     Status.NOT_FINITE: (
         "Take a smaller step; check that the start is admissible (positive Jacobian, positive "
         "film thickness) and that step_limit keeps it so."

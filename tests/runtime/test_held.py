@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.sparse import csc_array, lil_array
 
-from softehl import Mesh, Study
+from softehl import Definition, Mesh, Model, Study, kinematics, quadrature, shapes
 from softehl.runtime.solve.held import loosest
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.solve.superlu import SuperLU
 from tests.runtime import solid_page as pages
+from tests.runtime.test_measure import bar
 
 SOLID: dict[str, Any] = {"mu": 0.4, "lame": 2.0, "thickness": 1.0}
 
@@ -49,6 +51,82 @@ def test_three_supports_hold_it() -> None:
     study.fix((0.0, 0.0), u_x=0.0, u_y=0.0)
     study.fix((2.0, 0.0), u_y=0.0)
     assert study.solve().at((2.0, 0.0))["u_x"] > 0.0
+
+
+FREE: dict[str, tuple[Callable[[Study], object], str]] = {
+    "nothing": (lambda s: None, "a translation along x, a translation along y, a rotation[.]"),
+    "a roller": (lambda s: s.fix("bottom", u_y=0.0), "a translation along x[.]"),
+    "a pin": (lambda s: s.fix((2.0, 1.0), u_x=0.0, u_y=0.0), r"a rotation about \(2, 1\)[.]"),
+    "a spring": (
+        lambda s: s.spring((2.0, 1.0), u_x=1e-3, u_y=1e-3),
+        r"a rotation about \(2, 1\)[.]",
+    ),
+    "ties": (
+        lambda s: s.tie("right", "left", "u_x", "u_y"),
+        "a translation along x, a translation along y[.]",
+    ),
+}
+
+
+@pytest.mark.parametrize("held", FREE)
+@pytest.mark.parametrize("load", [0.0, 1e-12, 0.05])
+def test_the_free_motion_is_named_before_anything_is_solved(held: str, load: float) -> None:
+    support, words = FREE[held]
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(4, 2)))
+    study.add("body", pages.solid(), **SOLID)
+    study.load("right", u_x=load)
+    support(study)
+    with pytest.raises(NotConverged, match=f"not held: nothing prevents {words}"):
+        study.solve()
+
+
+def test_the_one_of_two_bodies_that_is_free_is_named() -> None:
+    mesh = Mesh.rectangle(3.0, 1.0, cells=(6, 2)).with_group("a", lambda x: x[:, 0] < 1.1)
+    study = Study(mesh.with_group("b", lambda x: x[:, 0] > 1.9))
+    for name in "ab":
+        study.add(name, pages.solid(), cells=name, **SOLID)
+    study.fix("left", u_x=0.0, u_y=0.0)
+    with pytest.raises(NotConverged, match=r"a rotation of the part with node 4 \(2, 0\)"):
+        study.solve()
+
+
+def test_a_temperature_that_nothing_sets_is_named() -> None:
+    study = Study(Mesh.line(1.0, cells=4))
+    study.add("bar", bar(), k=1.0)
+    with pytest.raises(NotConverged, match=r"nothing prevents a constant added to T[.]"):
+        study.solve()
+    study.spring("left", T=1e-6)
+    study.load("right", T=1e-6)
+    assert study.solve().at((0.0,))["T"] == pytest.approx(1.0)
+
+
+def test_a_body_of_three_dimensions_on_a_hinge() -> None:
+    study = Study(Mesh.box((1.0, 2.0, 1.0), cells=(1, 2, 1)))
+    study.add("body", springy())
+    study.fix(lambda x: (x[:, 0] == 0.0) & (x[:, 2] == 1.0), u_x=0.0, u_y=0.0, u_z=0.0)
+    with pytest.raises(NotConverged, match=r"a rotation about y through \(0, 1, 1\)[.]"):
+        study.solve()
+
+
+def test_a_floor_holds_what_is_pressed_into_it() -> None:
+    """It holds at the start already: its nodes are a little below."""
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(4, 2)).map(lambda x: x - np.array([0.0, 1e-3])))
+    study.add("body", pages.solid(), **SOLID)
+    study.add("floor", pages.floor(), on="bottom", k=10.0)
+    study.fix((0.0, -1e-3), u_x=0.0)
+    study.load("top", u_y=lambda x, t: np.full(len(x), -1e-2))
+    assert 0.0 < study.solve().at((0.0, -1e-3))["u_y"] < 1e-3
+
+
+def springy() -> Definition:
+    """A linear elastic brick."""
+    m = Model("brick", nodes=8, rule=quadrature.gauss(2, 3))
+    X, u = m.coordinates("X", "Y", "Z"), m.nodal_unknowns("u_x", "u_y", "u_z")
+    e = kinematics.isoparametric(m, X, shapes.hex8_gradient(*m.point()))
+    F = kinematics.deformation_gradient(m, e.dN, u)
+    eps = (F + F.T) / 2 - sp.eye(3)
+    m.potential(m.integral("Pi", (eps.trace() ** 2 + (eps.T * eps).trace()) * e.detJ))
+    return m.finish()
 
 
 def chain(n: int, ground: float) -> csc_array[np.float64]:
