@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.names import meant
 from softehl.runtime.output import Picture, piece_names
@@ -132,11 +133,13 @@ class Result:
 
     @cached_property
     def _forces(self) -> Array:
-        """What the supports do, (n,): internal less external forces, zero but for rounding where
-        nothing is prescribed.
+        """What supports, ties and springs do, (n,): internal less external forces, zero but for
+        rounding where there are none.
         """
-        x = self.point.solution.x
-        own = self.problem.assembler.residual(x, self.problem.parameters)
+        x, assembler = self.point.solution.x, self.problem.assembler
+        holding = [b.name for b in assembler.blocks if isinstance(b.kernel, Spring | Tie)]
+        others = {n: v for n, v in self.problem.parameters.items() if n not in holding}
+        own = assembler.residual(x, others)
         return self.system.share.whole_forces(own)
 
     @property
@@ -144,7 +147,7 @@ class Result:
         return self.system.everywhere
 
     def reaction(self, where: str | Predicate) -> dict[str, float]:
-        """Sums of the reactions at the nodes of a side: unknown -> force."""
+        """Sums of what supports, ties and springs do at the nodes of a side: unknown -> force."""
         nodes = self.system.mesh.nodes(where)
         found = {}
         for name, numbers in self._whole.numbering.nodal.items():

@@ -154,6 +154,23 @@ def test_springs_and_ties() -> None:
         np.testing.assert_allclose(values[right], values[left], atol=1e-12)
 
 
+def test_reactions_of_ties_and_springs_are_those_of_all_nodes() -> None:
+    """Simple shear between periodic sides: P_yx = mu g on the whole of each, not at its corners."""
+    study = block_of()
+    study.fix("bottom", u_x=0.0, u_y=0.0)
+    study.fix("top", u_x=0.2, u_y=0.0)
+    study.tie("right", "left", "u_x", "u_y")
+    result = study.solve()
+    shear = 0.2 * MU
+    assert result.reaction("right") == pytest.approx({"u_x": 0.0, "u_y": shear}, abs=1e-9)
+    assert result.reaction("left") == pytest.approx({"u_x": 0.0, "u_y": -shear}, abs=1e-9)
+    held = block_of()
+    held.spring("left", u_x=2.0)
+    held.fix("bottom", u_y=0.0)
+    held.load("right", u_x=1e-4)
+    assert held.solve().reaction("left")["u_x"] == pytest.approx(-1e-4, rel=1e-6)
+
+
 def test_a_tie_between_prescribed_sides_is_checked() -> None:
     study = block_of()
     study.fix("left", u_x=0.0, u_y=0.0)
