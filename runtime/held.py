@@ -51,11 +51,13 @@ def require_held(system: System, problem: Any, x: Array) -> None:
     order = np.argsort(parts, kind="stable")
     for members in np.split(order, np.flatnonzero(np.diff(parts[order])) + 1):
         there = np.flatnonzero(np.abs(fields[members]).max(axis=0, initial=0.0) > 0.0)
-        free = _null(rows[np.ix_(members, there)])
+        chosen = np.ix_(members, there)
+        basis = _independent(fields[chosen])
+        free = _null(rows[chosen] @ basis)
         if not len(free):
             continue
         motions = np.zeros((len(free), fields.shape[1]))
-        motions[:, there] = free
+        motions[:, there] = free @ basis.T
         part = int(parts[members[0]])
         shape = len(free), len(system.numbering.nodal), system.mesh.dimension + 1
         told = _Motions(system, motions.reshape(shape), centres[part], sizes[part]).words()
@@ -99,6 +101,16 @@ def _candidates(
     fields[own, name[own], 0] = 1.0
     fields[own, name[own], 1:] = apart / sizes[label, None]
     return fields.reshape(len(node), -1), centres, sizes
+
+
+def _independent(fields: Array) -> Array:
+    """Combinations (columns, k) of the columns of (n, columns) that are fields of size one.
+
+    x about the centre of a part is no field where the part has a name at one node only.
+    """
+    _, values, vectors = np.linalg.svd(fields, full_matrices=False)
+    kept = values > 1e-6 * values.max(initial=0.0)
+    return np.asarray(vectors[kept].T / values[kept])
 
 
 def _null(rows: Array) -> Array:

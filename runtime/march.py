@@ -135,7 +135,8 @@ class March:
         first_step = FirstStep(self.newton)
         settings = replace(self, newton=first_step.newton)
         if length > 0.0:
-            posed = system.problem(self._posed(system, clock, _towards(length, clock.dt)))
+            shortest = min(length, SMALLEST * self.dt)  # longer ones may be cut
+            posed = system.problem(self._posed(system, clock, shortest))
             require_held(system, posed, clock.states[0])
         while until - clock.t > _ROUNDING * abs(length):
             dt = _towards(until - clock.t, clock.dt)

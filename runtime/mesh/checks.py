@@ -20,11 +20,9 @@ def check(mesh: Mesh) -> None:
     for name, group in mesh.groups.items():
         for kind, chosen in group.items():
             count = len(mesh.cells.get(kind, ()))
-            if (
-                len(chosen)
-                and chosen.dtype.kind not in "iu"
-                or not ((chosen >= 0) & (chosen < count)).all()
-            ):
+            if (len(chosen) and chosen.dtype.kind not in "iu") or not (
+                (chosen >= 0) & (chosen < count)
+            ).all():
                 raise MeshError(
                     f"group {name!r}: whole numbers below {count}, of {kind}, are needed"
                 )

@@ -336,12 +336,12 @@ LATE: list[tuple[str, Callable[[Study], object], str]] = [
     (
         "nan",
         lambda s: s.load("right", u_x=lambda x, t: np.where(x[:, 1] > 0.5, np.nan, t)),
-        "load('right') at t = 0 is nan at (2, ",
+        "load('right') at t = 1 is nan at (2, ",
     ),
     (
         "complex",
         lambda s: s.fix("right", u_x=lambda x, t: 1j * t),
-        "fix('right') at t = 0: one real number, or (3,) of them is needed; given complex128",
+        "fix('right') at t = 1: one real number, or (3,) of them is needed; given complex128",
     ),
 ]
 
