@@ -110,9 +110,7 @@ class Domain:
             seen.add(n)
             if n.op is Op.BRANCH and self._is_absolute(n):
                 stack.append(n.args[2])
-            elif n.op in _PLAIN or (n.op is Op.POW and n.payload in WHOLE):
-                stack += n.args
-            elif n.op is Op.MUL and all(m.op is not Op.RECIP for m in n.args):
+            elif self._is_plain(n):
                 stack += n.args
             else:
                 found.append(n)
@@ -156,6 +154,12 @@ class Domain:
                     self._sign(b, known | self._says(c), depth),
                 )
         return 0
+
+    def _is_plain(self, n: Node) -> bool:
+        """Whether a value is a number where its operands are finite."""
+        whole = n.op is Op.POW and n.payload in WHOLE
+        product = n.op is Op.MUL and all(a.op is not Op.RECIP for a in n.args)
+        return n.op in _PLAIN or whole or product
 
     def _is_absolute(self, n: Node) -> bool:
         c, a, b = n.args

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import inspect
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -38,6 +39,37 @@ class Entries:
     def shaped(self) -> Any:
         """The scalar, list or matrix."""
         return self.arrange(self.values)
+
+
+class Listed(list[Any]):
+    """A list of a page; an index that is too large is an error that says how many there are."""
+
+    def __init__(self, values: Iterable[Any] = (), what: str = "the list") -> None:
+        super().__init__(values)
+        self.what = what
+
+    def __getitem__(self, k: Any) -> Any:
+        try:
+            return super().__getitem__(k)
+        except IndexError:
+            raise ModelError(
+                f"[{k}] of {self.what}: there are {len(self)}, counted from 0"
+            ) from None
+
+
+def applied(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Value of a function of a page, or an error that says how many arguments it gets."""
+    try:
+        inspect.signature(function).bind(*arguments)
+    except ValueError:
+        pass  # what is written in C has no signature
+    except TypeError:
+        count = len(arguments)
+        raise ModelError(
+            f"{name}: its function gets {count} argument{'s' * (count != 1)}, and cannot take "
+            f"{'them' if count != 1 else 'it'}; write `lambda {', '.join('abc'[:count])}: ...`"
+        ) from None
+    return function(*arguments)
 
 
 def fraction(value: Any, *, zero: bool = False) -> Fraction:

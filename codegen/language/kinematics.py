@@ -12,7 +12,9 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language.elements import shapes
+from softehl.codegen.language.elements import cells, shapes
+from softehl.codegen.language.entries import Listed
+from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 
 
@@ -30,19 +32,49 @@ def isoparametric(m: Model, X: Any, parent: Any) -> Isoparametric:
     Works in one, two and three dimensions; `parent` is e.g. `shapes.hex8_gradient(xi, eta, zeta)`.
     """
     size = len(X)
+    _require_parent(m, size, parent)
     J = sp.Matrix(size, size, lambda i, k: shapes.interpolate([g[k] for g in parent], X[i]))
     J = m.define("dX", J)
     detJ = m.define("detJ", J.det(method="berkowitz"))
     inverse = m.define("dX_inverse", J.adjugate() / detJ)
+    m.measure(detJ, inverse)
     dN = [list(sp.Matrix([list(g)]) * inverse) for g in parent]
-    return Isoparametric(
-        [[m.define(f"dN_{a}{k}", v) for k, v in enumerate(row)] for a, row in enumerate(dN)], detJ
+    slopes = [[m.define(f"dN_{a}{k}", v) for k, v in enumerate(row)] for a, row in enumerate(dN)]
+    rows = (
+        Listed(row, f"dN[{a}], the gradient of a shape function") for a, row in enumerate(slopes)
     )
+    return Isoparametric(Listed(rows, "dN, one row for each node"), detJ)
+
+
+def _require_parent(m: Model, size: int, parent: Any) -> None:
+    """Refuse gradients of other cells, and a rule that does not fit the cell they are of."""
+    widths = {len(row) for row in parent}
+    if len(parent) != m.nodes or widths != {size}:
+        raise ModelError(
+            f"isoparametric: gradients of {len(parent)} shape functions by "
+            f"{', '.join(map(str, sorted(widths)))} coordinates, but {m.name} has {m.nodes} nodes "
+            f"and {size} coordinates"
+        )
+    known = cells.of(m.nodes, m.rule.dimension)
+    if known is None or known[1].fits(m.rule):
+        return
+    places = {s: sp.Rational(1, 7 + 2 * k) for k, s in enumerate(m.point())}
+    found = [sp.sympify(g).subs(places) for row in parent for g in row]
+    if found == [g for row in known[0].gradient(*places.values()) for g in row]:
+        raise ModelError(
+            f"{m.name} has shape functions of {known[0].name}, but {cells.misfit(known[1])}"
+        )
 
 
 def deformation_gradient(m: Model, dN: Any, u: Any) -> Any:
     """Matrix F = 1 + Grad u, named F_00, F_01, ..., from displacements [component][node]."""
     size = len(u)
+    widths = {len(row) for row in dN}
+    if widths != {size}:
+        raise ModelError(
+            f"deformation_gradient: {size} displacements, but gradients by "
+            f"{', '.join(map(str, sorted(widths)))} coordinates; as many are needed"
+        )
     F = sp.Matrix(
         size, size, lambda i, k: (1 if i == k else 0) + shapes.interpolate([g[k] for g in dN], u[i])
     )
@@ -92,6 +124,7 @@ def quad4(m: Model, label: str, X: Any, xi: Any, eta: Any) -> Quad4:
         )
         for a, g in enumerate(parent)
     ]
+    m.measure(detJ, [g for row in dN for g in row])
     radius = m.define(f"R{label}", shapes.interpolate(N, X[1]))
     return Quad4(N, dN, radius, J, detJ)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -41,6 +42,20 @@ def page_line() -> str:
             return f"{path}:{frame.f_lineno}"
         frame = frame.f_back
     return ""
+
+
+class ModelWarning(UserWarning):
+    """A page says what is allowed, but seldom meant."""
+
+
+_WARNED: dict[str, int] = {}
+"""What Python's warnings remember, so that a page that is read again does not warn again."""
+
+
+def warn_page(message: str) -> None:
+    """A `ModelWarning` with the page's line."""
+    file, _, line = page_line().rpartition(":")
+    warnings.warn_explicit(message, ModelWarning, file, int(line or 0), registry=_WARNED)
 
 
 _FUNCTIONS: dict[type, Op] = {

@@ -26,10 +26,11 @@ from softehl.codegen.graph.routines import (
 )
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Argument, Condition, Definition
+from softehl.codegen.language.elements import cells
 from softehl.codegen.language.elements.quadrature import QuadratureRule
-from softehl.codegen.language.entries import Entries, fraction
-from softehl.codegen.language.lower import Lowering, ModelError, page_line
-from softehl.codegen.language.names import named
+from softehl.codegen.language.entries import Entries, Listed, applied, fraction
+from softehl.codegen.language.lower import Lowering, ModelError, page_line, warn_page
+from softehl.codegen.language.names import Declared, named
 from softehl.codegen.language.record import Integral, Record
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -38,6 +39,12 @@ LONGEST = 200
 """Letters of the name of a model: file systems take 255, with `_design.c` and the like."""
 
 __all__ = ["Argument", "Definition", "Model"]
+
+
+def _columns(what: str, names: Sequence[str], columns: Sequence[Sequence[Any]]) -> list[Any]:
+    """Lists over the nodes, one for each name."""
+    inner = (Listed(c, f"the nodes of {n}") for n, c in zip(names, columns, strict=True))
+    return Listed(inner, f"{what} ({', '.join(names)})")
 
 
 class Model:
@@ -65,6 +72,9 @@ class Model:
             raise ModelError(
                 f"the name {name[:20]}... of a model has {len(name)} letters, allowed are {LONGEST}"
             )
+        wrong = cells.foreign(rule, nodes)
+        if wrong:
+            raise ModelError(f"{name} has {nodes} nodes, and {wrong}")
         self.name, self.nodes, self.rule, self.unroll = name, nodes, rule, unroll
         self.doc = " ".join((doc or "").split())
         self.graph = Graph()
@@ -90,6 +100,8 @@ class Model:
         self._fields: list[tuple[str, Node]] = []
         self._potentials: list[tuple[Node, list[Node]]] = []
         self._factors = 0
+        self._measures: set[Node] = set()
+        self._gradients: set[Node] = set()
         self._product = False
         self._norms = 0
         self._design = (False, False)
@@ -106,10 +118,12 @@ class Model:
         if self._coordinates not in ((), names):
             raise ModelError(f"the coordinates are {', '.join(self._coordinates)} already")
         self._coordinates, width = names, len(names)
-        return [
-            [self._input(f"{name}{a + 1}", "coordinates", a * width + c) for a in range(self.nodes)]
+        places = range(self.nodes)
+        columns = [
+            [self._input(f"{name}{a + 1}", "coordinates", a * width + c) for a in places]
             for c, name in enumerate(names)
         ]
+        return _columns("the coordinates", names, columns)
 
     def nodal_unknowns(
         self, *names: str, idle: Sequence[str] = (), nodes: int | None = None
@@ -131,7 +145,7 @@ class Model:
                 self._places[-1] = (name, a)
                 if name in idle:
                     self._declared.pop(f"{name}{a + 1}", None)
-        return columns
+        return _columns("the unknowns", names, columns)
 
     def unknown(self, name: str) -> sp.Symbol:
         """One more scalar unknown of the element."""
@@ -196,7 +210,7 @@ class Model:
         for name in names:
             given = {f"{name}{a + 1}": f"{name} {meaning}" for a in range(nodes or self.nodes)}
             columns.append(self._declare("data", given))
-        return columns
+        return _columns("the data", names, columns)
 
     def rates(self, *names: str) -> list[list[sp.Expr]]:
         """Time derivatives of nodal unknowns, in the order of `nodal_unknowns`.
@@ -257,7 +271,8 @@ class Model:
     def point(self) -> list[sp.Symbol]:
         """Coordinates of the quadrature point in the parent element."""
         names = ("xi", "eta", "zeta")[: self.rule.dimension]
-        return [self._input(s, "rule", k, varying=True) for k, s in enumerate(names)]
+        point = [self._input(s, "rule", k, varying=True) for k, s in enumerate(names)]
+        return Listed(point, "the point's coordinates")
 
     @property
     def weight(self) -> sp.Symbol:
@@ -330,7 +345,7 @@ class Model:
         """
         begin, unknowns = Entries.of(start), Entries.of(start).map(lambda _: sp.Dummy(real=True))
         local = self._placeholders(name, unknowns)
-        found = Entries.of(equations(unknowns.shaped()))
+        found = Entries.of(applied(name, equations, unknowns.shaped()))
         if len(found.values) != len(local):
             raise ModelError(
                 f"{name}: {len(found.values)} equations for {len(local)} unknowns; one for each"
@@ -362,7 +377,7 @@ class Model:
             raise ModelError(f"{name}: C has shape {sp.Matrix(C).shape}, must be (3, 3)")
         squares = Entries([sp.Dummy(positive=True) for _ in range(3)], ("", "", ""), list)
         local = self._placeholders(name, squares)
-        written = energy(*(sp.sqrt(c) for c in squares.values))
+        written = applied(name, energy, *(sp.sqrt(c) for c in squares.values))
         value = self._lower(written)
         if not symmetric(value, local):
             raise ModelError(f"{name}: the energy changes when two stretches are exchanged")
@@ -395,11 +410,27 @@ class Model:
 
     def integral(self, name: str, integrand: Any) -> sp.Symbol:
         """Quadrature of `integrand` over the parent element."""
+        density = self._lower(integrand)
+        inside = reachable([density], stop=self._gradients.__contains__)
+        moves = any(n in self._directions for n in reachable([density]))
+        if moves and self._measures and not self._measures & set(inside):
+            warn_page(
+                f"the integrand of {name} has no factor detJ: the sum is over the parent element; "
+                "multiply by e.detJ"
+            )
         node = self.graph.sum(self._lower(integrand * self.weight))
         symbol: sp.Symbol = self._record.define(
             self._name(name, node, integrand, known=False), Integral(integrand)
         )
         return symbol
+
+    def measure(self, detJ: Any, gradients: Iterable[Any]) -> None:
+        """Say what an integrand is multiplied by, and which names only divide by it.
+
+        `kinematics` does; an integrand without such a factor is warned of.
+        """
+        self._measures.add(self._lower(detJ))
+        self._gradients.update(self._lower(v) for v in gradients)
 
     def potential(self, expression: Any, *, constant: Iterable[Any] = ()) -> None:
         """The residual is the gradient of `expression` with the `constant` symbols frozen.
@@ -600,7 +631,7 @@ class Model:
 
     def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
         node = self.graph.input(array, index, varying=varying)
-        symbol = self._bind(sp.Symbol(name, real=True), node)
+        symbol = self._bind(Declared(name, real=True), node)
         if array in ("dofs", "parameters", "data", "point data"):
             self._declared.setdefault(name, (node, page_line()))
         return symbol

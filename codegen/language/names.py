@@ -9,6 +9,7 @@ its kernels are checked: the definition stands in the tree of the expression, wh
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -53,6 +54,33 @@ def _direct(value: Any) -> set[Any]:
     return value.atoms(sp.Symbol) if isinstance(value, sp.Basic) else set(value.free_symbols)
 
 
+def _refuse_truth(symbol: Any, other: object) -> None:
+    """Raise where a page compares a symbol with a number by == or !=: it would be a constant."""
+    if isinstance(other, (int, float, sp.Number)):
+        caller = str(sys._getframe(2).f_globals.get("__name__", ""))
+        page = caller.startswith("softehl.codegen.models")
+        if page or not caller.startswith(("sympy.", "softehl.codegen.")):
+            raise ModelError(
+                f"{symbol} == {other} is neither true nor false while the page is read: write a "
+                "branch as sp.Piecewise((value, sp.Eq(...)), (other, True))"
+            )
+
+
+class Declared(sp.Symbol):  # type: ignore[misc]
+    """The symbol of an argument: a plain symbol that no page compares with numbers."""
+
+    def __eq__(self, other: object) -> bool:
+        _refuse_truth(self, other)
+        plain = type(other) in (sp.Symbol, Declared)
+        return self is other or (plain and self._hashable_content() == other._hashable_content())  # type: ignore[attr-defined]
+
+    def __ne__(self, other: object) -> bool:
+        _refuse_truth(self, other)
+        return not self == other
+
+    __hash__ = sp.Symbol.__hash__
+
+
 class Name(sp.Symbol):  # type: ignore[misc]
     """A symbol with a definition; two are equal only if they are one and the same."""
 
@@ -77,7 +105,12 @@ class Name(sp.Symbol):  # type: ignore[misc]
         return self
 
     def __eq__(self, other: object) -> bool:
+        _refuse_truth(self, other)
         return self is other
+
+    def __ne__(self, other: object) -> bool:
+        _refuse_truth(self, other)
+        return self is not other
 
     __hash__ = sp.Symbol.__hash__
 
@@ -178,7 +211,7 @@ class Name(sp.Symbol):  # type: ignore[misc]
 
 
 # SymPy orders terms by the names of classes first: the C is to be that of plain symbols.
-Name.__name__ = "Symbol"
+Name.__name__ = Declared.__name__ = "Symbol"
 
 
 class Written(sp.Expr):  # type: ignore[misc]

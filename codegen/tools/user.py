@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import inspect
 import linecache
+import re
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -34,6 +35,13 @@ _TRUTH = (
     "a condition on symbols is neither true nor false while the page is read: write a branch as "
     "sp.Piecewise((value, condition), (other, True))"
 )
+
+
+_NUMERIC = re.compile(r"no callable \w+ method|[Cc]annot convert expression to float")
+_FUNCTION = re.compile(r"\b(math|np|numpy)\.(\w+)")
+_IN_SYMPY = {"fabs": "Abs", "abs": "Abs", "absolute": "Abs", "pow": "Pow", "power": "Pow"} | {
+    f"arc{name}": f"a{name}" for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "tan2")
+}
 
 
 def definitions(path: Path) -> list[Definition]:
@@ -163,13 +171,21 @@ def _errors_of(path: Path) -> Iterator[None]:
         if isinstance(error, ModelError) and what.startswith(str(path.parent)):
             raise ModelFileError(what) from error  # it has found its line itself
         kind = "" if isinstance(error, ModelError) else f"{type(error).__name__}: "
+        where, written = _line(path, error)
         if isinstance(error, TypeError) and "truth value of Relational" in what:
             kind, what = "", _TRUTH
-        raise ModelFileError(f"{_line(path, error)}: {kind}{what}") from error
+        if isinstance(error, TypeError) and _NUMERIC.search(what):
+            found = _FUNCTION.search(written)
+            use = f"sp.{_IN_SYMPY.get(found[2], found[2])}" if found else "those of sympy"
+            called = found[0] if found else "a function of math or NumPy"
+            kind, what = "", f"{called} computes with numbers, not with symbols: use {use}"
+        raise ModelFileError(f"{where}: {kind}{what}") from error
 
 
-def _line(path: Path, error: BaseException) -> str:
-    """File and line of the innermost frame that stands in the model's folder."""
+def _line(path: Path, error: BaseException) -> tuple[str, str]:
+    """File and line of the innermost frame that stands in the model's folder, and its text."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [f for f in frames if Path(f.filename).is_relative_to(path.parent)]
-    return f"{Path(own[-1].filename).name}:{own[-1].lineno}" if own else path.name
+    if not own:
+        return path.name, ""
+    return f"{Path(own[-1].filename).name}:{own[-1].lineno}", own[-1].line or ""

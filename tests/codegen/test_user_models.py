@@ -114,6 +114,13 @@ def test_imported_models_are_not_those_of_the_file() -> None:
             spring(energy="k if u > 0 else 0"),
             "mine.py:9: a condition on symbols is neither .* write a branch as sp.Piecewise",
         ),
+        (
+            "import numpy as np" + spring(energy="np.exp(k * u)"),
+            r"mine.py:9: np.exp .*: use sp.exp",
+        ),
+        ("import math" + spring(energy="math.log(k * u)"), r"mine.py:9: math.log .*: use sp.log"),
+        ("import numpy as np" + spring(energy="k * np.arctan(u)"), r"np.arctan .*: use sp.atan"),
+        (spring(energy="0 if u == 0 else k * u**2"), "mine.py:9: u1 == 0 is neither true nor"),
         (spring().replace("point_rule()", "gauss(4, 7)"), "mine.py:5: .*the dimension is 1, 2"),
         (
             "import sympy as sp" + spring(energy="sp.Derivative(k * u**2, u)"),

@@ -178,3 +178,30 @@ def _elements() -> dict[str, Element]:
 
 ELEMENTS: dict[str, Element] = _elements()
 """Every element by its name."""
+
+
+def of(nodes: int, dimension: int) -> tuple[Element, quadrature.Region] | None:
+    """The element with so many nodes in so many dimensions, and its reference cell."""
+    for found in ELEMENTS.values():
+        if (len(found.nodes), found.dimension) == (nodes, dimension):
+            region = next(r for r in quadrature.REGIONS[dimension] if r.fits(found.rule))
+            return found, region
+    return None
+
+
+def foreign(rule: QuadratureRule, nodes: int) -> str:
+    """What is wrong where a rule is that of another cell than the one with so many nodes."""
+    mine = of(nodes, rule.dimension)
+    if mine is None or mine[1].fits(rule):
+        return ""
+    others = [r for r in quadrature.REGIONS[rule.dimension] if r.fits(rule)]
+    return misfit(mine[1], others[0].name) if others else ""
+
+
+def misfit(region: quadrature.Region, of_what: str = "") -> str:
+    """Words for a rule that does not fit a reference cell."""
+    whose = f"is that of a {of_what}" if of_what else "does not fit the cell"
+    return (
+        f"the rule {whose}: points of a {region.name} lie in it and its weights sum to "
+        f"{region.measure}; take e.g. quadrature.{region.rule}"
+    )

@@ -22,6 +22,44 @@ class QuadratureRule:
     weights: tuple[sp.Expr, ...]
 
 
+@dataclass(frozen=True)
+class Region:
+    """A reference cell: its name, where it is, its measure, and a rule for it."""
+
+    name: str
+    measure: sp.Rational
+    rule: str
+
+    def fits(self, rule: QuadratureRule) -> bool:
+        """Whether all points lie in it and the weights sum to its measure."""
+        points = [[float(x) for x in p] for p in rule.points]
+        inside = all(self._holds(p) for p in points)
+        return inside and abs(sum(map(float, rule.weights)) - float(self.measure)) < _SLACK
+
+    def _holds(self, p: list[float]) -> bool:
+        flat = {"triangle": 2, "tetrahedron": 3, "wedge": 2}.get(self.name, 0)
+        simplex, rest = p[:flat], p[flat:]
+        within = min([0.0, *simplex]) >= -_SLACK and sum(simplex) <= 1 + _SLACK
+        return within and all(abs(x) <= 1 + _SLACK for x in rest)
+
+
+_SLACK = 1e-9
+"""Of points and weights as doubles."""
+REGIONS = {
+    1: (Region("line", sp.Integer(2), "gauss(2, 1)"),),
+    2: (
+        Region("square", sp.Integer(4), "gauss(2, 2)"),
+        Region("triangle", sp.Rational(1, 2), "triangle(2)"),
+    ),
+    3: (
+        Region("cube", sp.Integer(8), "gauss(2, 3)"),
+        Region("tetrahedron", sp.Rational(1, 6), "tetrahedron(2)"),
+        Region("wedge", sp.Integer(1), "wedge(2)"),
+    ),
+}
+"""The reference cells of every dimension."""
+
+
 def point_rule() -> QuadratureRule:
     """The rule of a model without an integral: one point, no coordinates, weight one."""
     return QuadratureRule(0, ((),), (sp.Integer(1),))

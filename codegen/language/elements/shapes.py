@@ -58,4 +58,9 @@ def line2(xi: Any) -> list[Any]:
 
 def interpolate(shape: Any, nodal: Any) -> Any:
     """Sum over nodes of shape times nodal value."""
+    if len(shape) != len(nodal):
+        raise ValueError(
+            f"interpolate: {len(shape)} shape functions and {len(nodal)} nodal values; as many "
+            "are needed"
+        )
     return sum(n * v for n, v in zip(shape, nodal, strict=True))
