@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from types import ModuleType
 
 from softehl.codegen.abi import DESIGN, ROLLED, Target
@@ -42,7 +41,6 @@ from softehl.codegen.emit.schedule import Schedule, is_straight, schedule, strai
 from softehl.codegen.graph.graph import Routine
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
-from softehl.codegen.optimise.field import close_rational
 
 SHORT = 3000
 """Operations of one element up to which writing the loop over its points out is tried."""
@@ -163,7 +161,7 @@ def _for_target(v: Variant, task: str, target: Target) -> Variant:
 
 
 def _attempt(d: Definition, way: Variant, *, unrolled: bool) -> Attempt:
-    straight = passes.straight_line(_points(d), (len(d.data), len(d.point_data)))
+    straight = passes.straight_line(d.rule.rows(), (len(d.data), len(d.point_data)))
     rewrites = straight if unrolled else passes.STANDARD
     roots, trace = passes.run(d.graph, [x.node for x in way.entries], rewrites)
     plan = schedule(roots)
@@ -177,9 +175,3 @@ def _printer(target: Target, operations: int) -> ModuleType:
         return emit_ufcx
     at_once = target is Target.SIMD and operations >= FEW
     return emit_simd if at_once else emit_c
-
-
-def _points(definition: Definition) -> list[list[Fraction]]:
-    """Rows (coordinates..., weight) of the model's rule, to 60 digits or more."""
-    rows = zip(definition.rule.points, definition.rule.weights, strict=True)
-    return [[close_rational(x) for x in (*p, w)] for p, w in rows]

@@ -16,7 +16,7 @@ import mpmath
 
 from softehl.codegen.graph.arithmetic import number
 from softehl.codegen.graph.differentiate import gradient, guarded, plus
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, Place, Routine
 from softehl.codegen.graph.partials import DifferentiationError
 from softehl.codegen.graph.traverse import reachable, substitute
 
@@ -38,11 +38,7 @@ def localise(g: Graph, values: Sequence[Node], unknowns: Sequence[Node]) -> Loca
     What can be computed once, outside, is; but not across a branch, whose other side may have no
     value there.
     """
-    inside: set[Node] = set(unknowns)
-    nodes = reachable(values)
-    for n in nodes:
-        if any(a in inside for a in n.args):
-            inside.add(n)
+    inside, nodes = depends(values, unknowns), reachable(values)
     branched = any(n.op is Op.BRANCH for n in nodes)
     leaves = (Op.NAME, Op.INPUT, Op.SUM, Op.ITEM)
     seen: set[Node] = set(unknowns)
@@ -61,6 +57,39 @@ def localise(g: Graph, values: Sequence[Node], unknowns: Sequence[Node]) -> Loca
     replacement = {u: g.input("local", k) for k, u in enumerate(unknowns)}
     replacement |= {n: g.input("external", k) for k, n in enumerate(found)}
     return Local(tuple(substitute(g, values, replacement)[0]), tuple(found))
+
+
+def depends(values: Sequence[Node], sources: Iterable[Node]) -> set[Node]:
+    """Nodes below `values` that `sources` enter, these among them."""
+    inside = set(sources)
+    for n in reachable(values):
+        if any(a in inside for a in n.args):
+            inside.add(n)
+    return inside
+
+
+def sums_written_out(
+    g: Graph, values: Sequence[Node], inside: set[Node], points: Sequence[Sequence[Fraction]]
+) -> list[Node]:
+    """`values` with the sums among `inside` as sums of one term for each of the `points`."""
+    new: dict[Node, Node] = {}
+    copies: list[dict[Node, Node]] = [{} for _ in points]
+    for n in reachable(values):
+        if n.op is Op.SUM:
+            new[n] = g.zero if n in inside else n
+            for copy in copies if n in inside else ():
+                new[n] = g.add(new[n], copy.get(n.args[0]) or new[n.args[0]])
+        elif not n.varying:
+            args = tuple(new[a] for a in n.args)
+            new[n] = g.rebuild(n.op, args, n.payload) if n in inside else n
+        elif isinstance(n.payload, Input):
+            for copy, point in zip(copies, points, strict=True):
+                copy[n] = g.const(point[n.payload.index]) if n.payload.array == "rule" else n
+        else:
+            for copy in copies:
+                args = tuple(copy[a] if a.varying else new[a] for a in n.args)
+                copy[n] = g.rebuild(n.op, args, n.payload)
+    return [new[v] for v in values]
 
 
 def lifted(

@@ -19,9 +19,11 @@ from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.routines import (
     SYMMETRIC,
     Control,
+    depends,
     isotropic,
     localise,
     newton,
+    sums_written_out,
     symmetric,
 )
 from softehl.codegen.graph.traverse import reachable
@@ -335,6 +337,9 @@ class Model:
     ) -> Any:
         """Local unknowns s with equations(s) = 0, found by Newton's method inside the kernel.
 
+        Equations that are integrals belong to the element: s is then one for all of its points
+        (condensation), and the rule becomes part of the kernel.
+
         `start` is where the iteration begins: a scalar, a list, or a matrix, and s is alike; so is
         what `equations` returns.  Derivatives of s follow from the implicit function theorem,
         whatever the start.  The iteration ends when every equation is solved to `tolerance` of its
@@ -350,7 +355,8 @@ class Model:
             raise ModelError(
                 f"{name}: {len(found.values)} equations for {len(local)} unknowns; one for each"
             )
-        system = localise(self.graph, [self._lower(e) for e in found.values], local)
+        values = self._condensed(name, [self._lower(e) for e in found.values], local)
+        system = localise(self.graph, values, local)
         if not (isinstance(iterations, int) and iterations > 0):
             raise ModelError(f"{name}: iterations = {iterations!r} must be an integer > 0")
         control = Control(fraction(tolerance), fraction(size, zero=True), iterations)
@@ -598,6 +604,29 @@ class Model:
                 raise ModelError(f"the {what} {name} is never used: {advice}", where)
 
     # binding ------------------------------------------------------------------------------------
+
+    def _condensed(self, name: str, values: list[Node], local: Sequence[Node]) -> list[Node]:
+        """Equations of local unknowns with their integrals as sums of one term for each point."""
+        inside = depends(values, local)
+        sums = [n for n in inside if n.op is Op.SUM]
+        if not sums:
+            return values
+        if self.unroll is False:
+            raise ModelError(f"{name}: its equations are integrals, which need unroll=True or None")
+        if any(v.varying for v in values):
+            raise ModelError(
+                f"{name}: an equation varies with the point and another holds an integral of the "
+                "unknowns; wrap it in integral(...) too"
+            )
+        below = reachable(sums)
+        arrays = {n.payload.array for n in below if isinstance(n.payload, Input) and n.varying}
+        if arrays - {"rule"} or any(n in self._given for n in below):
+            raise ModelError(
+                f"{name}: an integral of local unknowns may hold no point data, no interpolated "
+                "field and no given derivative; use m.unknown for what the element condenses"
+            )
+        self.unroll = True
+        return sums_written_out(self.graph, values, inside, self.rule.rows())
 
     def _placeholders(self, name: str, symbols: Entries) -> list[Node]:
         """Inputs that stand for local unknowns while their equations are written."""

@@ -54,7 +54,6 @@ class Report:
     tasks: list[str] = field(default_factory=list)
     late: bool = False
 
-
     def told(self, seconds: float) -> str:
         """How far the check went, in one line."""
         left = {

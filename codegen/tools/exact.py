@@ -347,9 +347,7 @@ class Evaluation:
 def _slopes(residual: Callable[[Vector], Vector], at: Vector, h: Number) -> list[Vector]:
     columns = []
     for j in range(len(at)):
-        plus, minus = (
-            residual([v + t * h * (i == j) for i, v in enumerate(at)]) for t in (1, -1)
-        )
+        plus, minus = (residual([v + t * h * (i == j) for i, v in enumerate(at)]) for t in (1, -1))
         columns.append([(a - b) / (2 * h) for a, b in zip(plus, minus, strict=True)])
     return [list(line) for line in zip(*columns, strict=True)]
 

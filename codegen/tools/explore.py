@@ -165,7 +165,9 @@ class Explorer:
     def _linear(self, s: State, scale: float) -> list[float]:
         """Unknowns of one name as a linear field of their nodes' places."""
         width = len(self.d.coordinates)
-        spread = max([abs(float(a) - float(b)) for a in s.coordinates for b in s.coordinates] or [1])
+        spread = max(
+            [abs(float(a) - float(b)) for a in s.coordinates for b in s.coordinates] or [1]
+        )
         slopes: dict[str, list[float]] = {}
         out = []
         for k, v in enumerate(s.dofs):
@@ -264,7 +266,9 @@ class Explorer:
         for direction, change in ranked[:LINES]:
             rates = [(v, c) for v, c in zip(values, change[number], strict=False) if c]
             steps = [(level - v) / c for v, c in rates][:1]
-            steps = [t * f for t in steps for f in ((1, 0.97, 1.03) if side == "near" else (1.1, 2))]
+            steps = [
+                t * f for t in steps for f in ((1, 0.97, 1.03) if side == "near" else (1.1, 2))
+            ]
             steps += [sign * 10.0**k for k in range(-2, 5) for sign in (1, -1)]
             last = start
             for t in steps:

@@ -238,11 +238,14 @@ class _Builder:
 
     def _switches(self, e: Any, name: str, at: tuple[int, ...]) -> None:
         if name in ("max", "min"):
-            self.switches += [Switch(at[0], b, f"{e.args[0]} > {x}", True) for b, x in
-                              zip(at[1:], e.args[1:], strict=True)]
+            self.switches += [
+                Switch(at[0], b, f"{e.args[0]} > {x}", True)
+                for b, x in zip(at[1:], e.args[1:], strict=True)
+            ]
         elif name in ("abs", "sign", "heaviside", "arctangent"):
-            self.switches += [Switch(a, None, f"{x} > 0", True) for a, x in
-                              zip(at, e.args, strict=False)]
+            self.switches += [
+                Switch(a, None, f"{x} > 0", True) for a, x in zip(at, e.args, strict=False)
+            ]
         elif name in SATURATING:
             self.switches.append(Switch(at[0], None, str(e), False))
 
@@ -284,9 +287,7 @@ class _Builder:
         return tuple(self.steps[k] for k in sorted(reached - set(sources)))
 
 
-def _needed(
-    steps: Sequence[Step], roots: Iterable[int], stop: Iterable[int] = ()
-) -> set[int]:
+def _needed(steps: Sequence[Step], roots: Iterable[int], stop: Iterable[int] = ()) -> set[int]:
     """Slots of all operations below `roots`, and they themselves; none below `stop`."""
     needed: set[int] = set(stop)
     waiting = list(roots)

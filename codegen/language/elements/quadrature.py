@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from itertools import product
 from typing import Any
 
 import sympy as sp
+
+from softehl.codegen.graph.field import close_rational
 
 _DIGITS = 100
 """Of the points that have no short exact form."""
@@ -20,6 +23,11 @@ class QuadratureRule:
     dimension: int
     points: tuple[tuple[sp.Expr, ...], ...]
     weights: tuple[sp.Expr, ...]
+
+    def rows(self) -> list[list[Fraction]]:
+        """(coordinates..., weight) of each point, to 60 digits or more."""
+        pairs = zip(self.points, self.weights, strict=True)
+        return [[close_rational(x) for x in (*p, w)] for p, w in pairs]
 
 
 @dataclass(frozen=True)
