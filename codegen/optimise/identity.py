@@ -1,6 +1,6 @@
 """Values that algebra proves equal become one.
 
-Every value is computed once at a random point of a prime field (`graph.field`).  Additions, products,
+Every value is computed once at a random point of a prime field (`graph.field`): sums, products,
 reciprocals and powers are those of the field.  Every other operation (a logarithm, a branch, a
 sum over points) is a random number of its own, the same one only where operation and arguments
 are the same.  Two values that agree there, up to sign, are equal as functions:
@@ -24,9 +24,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from softehl.codegen.graph.field import PRIME, image, root
 from softehl.codegen.graph.graph import BOOLEAN, ODD, Graph, Node, Op, Payload
 from softehl.codegen.graph.traverse import reachable
-from softehl.codegen.graph.field import PRIME, image, root
 
 _EVERYWHERE = (
     frozenset(

@@ -103,7 +103,23 @@ def _changes(p: Program, s: Switch) -> bool:
 
 FUNCTIONS = {
     getattr(sp, name): name
-    for name in "log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh erf erfc".split()
+    for name in [
+        "log",
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "sinh",
+        "cosh",
+        "tanh",
+        "asinh",
+        "acosh",
+        "atanh",
+        "erf",
+        "erfc",
+    ]
 }
 SATURATING = frozenset(
     {"exp", "tan", "sin", "cos", "atan", "sinh", "cosh", "tanh", "asinh", "erf", "erfc"}

@@ -12,11 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from softehl.codegen.graph.evaluate import evaluate
+from softehl.codegen.graph.field import PRIME, close_rational
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.spec import check
 from softehl.codegen.graph.traverse import operations
 from softehl.codegen.language.lower import Lowering
-from softehl.codegen.graph.field import PRIME, close_rational
 from softehl.codegen.optimise.identity import merge_equal
 from softehl.codegen.optimise.passes import powers, run, straight_line
 from tests.codegen.random_models import UNKNOWNS, Digits, K, Meaning, OutsideError, Recipe
