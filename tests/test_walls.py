@@ -37,7 +37,7 @@ ORDER = {
             "fem",
             "solve",
         ),
-        *("share", "statement", "system", "equations output", "result", "begin", "watch engines"),
+        *("share", "statement", "system", "equations output", "result", "begin", "held watch engines"),
         *("follow load march", "study"),
     ),
     "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "cli document"),

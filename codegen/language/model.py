@@ -32,7 +32,7 @@ from softehl.codegen.language.elements import cells
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import Entries, Listed, applied, fraction
 from softehl.codegen.language.lower import Lowering, ModelError, page_line, warn_page
-from softehl.codegen.language.names import Declared, named
+from softehl.codegen.language.names import named
 from softehl.codegen.language.record import Integral, Record
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -660,7 +660,7 @@ class Model:
 
     def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:
         node = self.graph.input(array, index, varying=varying)
-        symbol = self._bind(Declared(name, real=True), node)
+        symbol = self._bind(sp.Symbol(name, real=True), node)
         if array in ("dofs", "parameters", "data", "point data"):
             self._declared.setdefault(name, (node, page_line()))
         return symbol

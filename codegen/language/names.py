@@ -55,7 +55,7 @@ def _direct(value: Any) -> set[Any]:
 
 
 def _refuse_truth(symbol: Any, other: object) -> None:
-    """Raise where a page compares a symbol with a number by == or !=: it would be a constant."""
+    """Raise where a page compares a name with a number by == or !=: the answer is always no."""
     if isinstance(other, (int, float, sp.Number)):
         caller = str(sys._getframe(2).f_globals.get("__name__", ""))
         page = caller.startswith("softehl.codegen.models")
@@ -64,21 +64,6 @@ def _refuse_truth(symbol: Any, other: object) -> None:
                 f"{symbol} == {other} is neither true nor false while the page is read: write a "
                 "branch as sp.Piecewise((value, sp.Eq(...)), (other, True))"
             )
-
-
-class Declared(sp.Symbol):  # type: ignore[misc]
-    """The symbol of an argument: a plain symbol that no page compares with numbers."""
-
-    def __eq__(self, other: object) -> bool:
-        _refuse_truth(self, other)
-        plain = type(other) in (sp.Symbol, Declared)
-        return self is other or (plain and self._hashable_content() == other._hashable_content())  # type: ignore[attr-defined]
-
-    def __ne__(self, other: object) -> bool:
-        _refuse_truth(self, other)
-        return not self == other
-
-    __hash__ = sp.Symbol.__hash__
 
 
 class Name(sp.Symbol):  # type: ignore[misc]
@@ -211,7 +196,7 @@ class Name(sp.Symbol):  # type: ignore[misc]
 
 
 # SymPy orders terms by the names of classes first: the C is to be that of plain symbols.
-Name.__name__ = Declared.__name__ = "Symbol"
+Name.__name__ = "Symbol"
 
 
 class Written(sp.Expr):  # type: ignore[misc]

@@ -101,26 +101,11 @@ def _changes(p: Program, s: Switch) -> bool:
     return not any(x.locals for x in operands) and any(x.depends or x.varying for x in operands)
 
 
-FUNCTIONS = {
-    getattr(sp, name): name
-    for name in [
-        "log",
-        "sin",
-        "cos",
-        "tan",
-        "asin",
-        "acos",
-        "atan",
-        "sinh",
-        "cosh",
-        "tanh",
-        "asinh",
-        "acosh",
-        "atanh",
-        "erf",
-        "erfc",
-    ]
-}
+_NAMES = (
+    *("log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
+    *("asinh", "acosh", "atanh", "erf", "erfc"),
+)
+FUNCTIONS = {getattr(sp, name): name for name in _NAMES}
 SATURATING = frozenset(
     {"exp", "tan", "sin", "cos", "atan", "sinh", "cosh", "tanh", "asinh", "erf", "erfc"}
 )

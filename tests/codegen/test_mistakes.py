@@ -70,21 +70,19 @@ def test_an_integrand_without_detJ_is_warned_of_with_the_line() -> None:
 @pytest.mark.parametrize(
     "compared",
     [
-        lambda J, u: J == 1,
-        lambda J, u: J != 1.0,
-        lambda J, u: u == sp.Rational(1, 2),
-        lambda J, u: J == 1.0,
+        lambda J: J == 1,
+        lambda J: J != 1.0,
+        lambda J: J == 1.0,
     ],
 )
-def test_a_symbol_that_is_compared_with_a_number_raises(compared: Callable[..., bool]) -> None:
+def test_a_name_that_is_compared_with_a_number_raises(compared: Callable[..., bool]) -> None:
     m = Model("page", nodes=1, rule=quadrature.point_rule())
     u = m.unknown("u")
     J = m.define("J", 1 + u)
-    assert u == sp.Symbol("u", real=True)
     assert u != J
     assert u in [J, u]
     with pytest.raises(ModelError, match="neither true nor false while the page is read"):
-        compared(J, u)
+        compared(J)
 
 
 def interpolated(m: Model, u: Any, e: Any) -> None:
