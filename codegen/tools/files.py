@@ -101,7 +101,7 @@ def _reports(
     seconds: float,
 ) -> tuple[dict[str, verify.Report], list[str]]:
     """What the check of each kernel found, and why some kernels could not be checked."""
-    written = {name: d for p in paths for name, d in user.written_out(p).items()}
+    written = {name: d for p in paths for name, d in user.written_out(p, seconds / 4).items()}
     reports, unchecked = {}, []
     for d in definitions:
         tasks = _entries(made.files)[d.name]["tasks"]

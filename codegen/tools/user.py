@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import inspect
 import linecache
+import math
 import re
 import sys
 import traceback
@@ -56,14 +57,15 @@ def definitions(path: Path) -> list[Definition]:
     return found
 
 
-def written_out(path: Path) -> dict[str, Definition]:
+def written_out(path: Path, seconds: float = math.inf) -> dict[str, Definition]:
     """The models of a file that is run again, with names as `language.names.Written`.
 
     A page that loses a dependence through a name, because SymPy took it for a constant, says
-    something else then. Empty where SymPy cannot do with such names what the page asks for.
+    something else then. Empty where SymPy cannot do with such names what the page asks for, or not
+    in so many seconds.
     """
     try:
-        with names.written_out(), redirect_stdout(StringIO()):
+        with names.written_out(seconds), redirect_stdout(StringIO()):
             return {d.name: d for d in definitions(path)}
     except (ModelFileError, RecursionError):
         return {}
