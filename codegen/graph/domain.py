@@ -202,16 +202,13 @@ def decidable(
             return None, []
         both = known[0] if len(known) == 1 else g.node(Op.AND, (known[0], known[1]))
         return both, [g.sub(*c.args)]
-    found = [decidable(g, domain, a) for a in c.args]
-    if all(known is None for known, _ in found):
-        return None, []
-    decides = [a if c.op is Op.OR else g.node(Op.NOT, (a,)) for a in c.args]
-    known, other = (k for k, _ in found)
-    total = decides[1] if known is None else g.node(Op.OR, (known, decides[1]))
-    # known and known, or one of them decides
-    if known is not None and other is not None:
-        alone = [g.node(Op.AND, (k, d)) for k, d in ((known, decides[0]), (other, decides[1]))]
-        total = g.node(Op.OR, (g.node(Op.AND, (known, other)), g.node(Op.OR, tuple(alone))))
-    elif known is None and other is not None:
-        total = g.node(Op.OR, (other, decides[0]))
-    return total, [d for _, ds in found for d in ds]
+    (one, first), (other, second) = (decidable(g, domain, a) for a in c.args)
+    # one of the two decides alone where it is false in `and`, true in `or`
+    alone = [a if c.op is Op.OR else g.node(Op.NOT, (a,)) for a in c.args]
+    differences = [*first, *second]
+    if one is None or other is None:
+        rest, decides = (other, alone[0]) if one is None else (one, alone[1])
+        return None if rest is None else g.node(Op.OR, (rest, decides)), differences
+    either = [g.node(Op.AND, pair) for pair in ((one, alone[0]), (other, alone[1]))]
+    both = g.node(Op.AND, (one, other))
+    return g.node(Op.OR, (both, g.node(Op.OR, (either[0], either[1])))), differences

@@ -48,7 +48,7 @@ class ModelWarning(UserWarning):
     """A page says what is allowed, but seldom meant."""
 
 
-_WARNED: dict[str, int] = {}
+_WARNED: dict[str | tuple[str, type[Warning], int], int] = {}
 """What Python's warnings remember, so that a page that is read again does not warn again."""
 
 
