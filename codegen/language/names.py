@@ -9,13 +9,11 @@ its kernels are checked: the definition stands in the tree of the expression, wh
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterable, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from itertools import count
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
@@ -27,16 +25,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _NUMBERS = count()
-_WRITTEN: ContextVar[float | None] = ContextVar("written", default=None)
+_WRITTEN: ContextVar[bool] = ContextVar("written", default=False)
 
 
 @contextmanager
-def written_out(seconds: float = math.inf) -> Iterator[None]:
-    """Names of models that are made in this context are `Written`.
-
-    After so many seconds the next name is an error: in a long page SymPy has much to look through.
-    """
-    token = _WRITTEN.set(perf_counter() + seconds)
+def written_out() -> Iterator[None]:
+    """Names of models that are made in this context are `Written`."""
+    token = _WRITTEN.set(True)
     try:
         yield
     finally:
@@ -48,10 +43,7 @@ def named(
 ) -> Any:
     """The name of `value`, an expression or several; not `known`: it only depends on them."""
     values = [sp.sympify(v) for v in (value if isinstance(value, (list, tuple)) else [value])]
-    deadline = _WRITTEN.get()
-    if deadline is not None and perf_counter() > deadline:
-        raise ModelError(f"no time to write out {label}")
-    if known and deadline is not None and not given:
+    if known and _WRITTEN.get() and not given:
         return Written(label, values[0])
     below = {s for v in values for s in _direct(v)} | set(given or ())
     return Name(label, values[0] if known else None, below, given)

@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
+from time import perf_counter
 from types import ModuleType
 from typing import Any
 
@@ -65,10 +66,30 @@ def written_out(path: Path, seconds: float = math.inf) -> dict[str, Definition]:
     in so many seconds.
     """
     try:
-        with names.written_out(seconds), redirect_stdout(StringIO()):
+        with names.written_out(), redirect_stdout(StringIO()), _at_most(seconds):
             return {d.name: d for d in definitions(path)}
-    except (ModelFileError, RecursionError):
+    except (ModelFileError, RecursionError, _Over):
         return {}
+
+
+class _Over(BaseException):  # noqa: N818 (SymPy is not to catch it)
+    """Time is over."""
+
+
+@contextmanager
+def _at_most(seconds: float) -> Iterator[None]:
+    """End what takes longer, at its next call of a function: SymPy may look at a tree for hours."""
+    deadline, before = perf_counter() + seconds, sys.getprofile()
+
+    def watch(*_: Any) -> None:
+        if perf_counter() > deadline:
+            raise _Over
+
+    sys.setprofile(watch)
+    try:
+        yield
+    finally:
+        sys.setprofile(before)
 
 
 def check_names(where: str, found: Iterable[Definition]) -> None:
