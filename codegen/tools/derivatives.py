@@ -10,7 +10,7 @@ from typing import Any
 import mpmath
 
 from softehl.codegen.graph.evaluate import State
-from softehl.codegen.tools.digits import CONTEXT, DIGITS, Number
+from softehl.codegen.tools.digits import CONTEXT, DIGITS, UNIT, Number
 from softehl.codegen.tools.exact import Evaluation, Evaluator, Vector
 
 Along = Sequence[Sequence[float]]
@@ -78,6 +78,15 @@ class Page:
         """Error of a derivative of this order by differences: digits that cancel."""
         n = self.evaluator.arithmetic
         return float(self.here.largest() * n.near / n.step**order)
+
+    @_in_digits
+    def rounding(self, order: int, changes: float) -> float:
+        """Error of a derivative of this order by the unknowns if the potential is rounded once.
+
+        The page is taken to change so many times within the size of the unknowns.
+        """
+        size = max(abs(float(u)) for u in self.state.dofs) or 1.0
+        return UNIT * float(self.here.largest()) * (changes / size) ** order
 
     def _numbers(self, values: Sequence[float]) -> Vector:
         return [self.evaluator.arithmetic.number(v) for v in values]

@@ -134,6 +134,10 @@ class Rounded(Exact):
         error = _error(slot, 0)
         return lambda *args: _in_range(function(*args) * error)
 
+    def eigenvalues(self, a: Sequence[Number]) -> list[Number]:
+        """Each with an error of its own, which counts where they are nearly equal."""
+        return [v * _error(k, 3) for k, v in enumerate(super().eigenvalues(a))]
+
     def sum(self, slot: int, count: int) -> Function:
         """Sum with an error of every partial sum."""
         errors = [_error(slot, k) for k in range(count)]

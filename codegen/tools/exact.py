@@ -316,7 +316,7 @@ class Evaluation:
             size, before = max(map(abs, found)), changed
             changed = max(map(abs, step))
             least = n.near * (size or 1)
-            if changed <= least or (before is not None and 2 * changed > before <= 1e6 * least):
+            if changed <= least or (before is not None and 2 * changed > before <= 10**6 * least):
                 self.solved[s.slot, q] = found, inverse
                 return found
             if changed > n.close * size:

@@ -56,8 +56,8 @@ class Explorer:
 
     program: Program
     nominal: Sequence[State]
-    drawn: int = 0
     unreal: int = 0
+    late: bool = False
     missing: list[Target] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -100,11 +100,13 @@ class Explorer:
 
     def probe(self, state: State) -> Found | None:
         """The state in doubles; None without real values, or if the page forbids it."""
-        if not _allowed(self.d, state) or perf_counter() > self.evaluator.deadline:
+        self.late = self.late or perf_counter() > self.evaluator.deadline
+        if self.late or not _allowed(self.d, state):
             return None
         try:
             at = self.evaluator.at(state)
         except OutOfTimeError:
+            self.late = True
             return None
         if not at.real():
             return None
@@ -127,12 +129,11 @@ class Explorer:
 
     def _draw(self) -> None:
         for k in range(DRAWN):
-            if perf_counter() > self.evaluator.deadline:
+            if self.late:
                 break
             found = self.probe(self._far(k))
-            self.drawn += 1
             if found is None:
-                self.unreal += 1
+                self.unreal += not self.late
             else:
                 self.pool.append(found)
 

@@ -81,6 +81,7 @@ def check(
             comparison.far(state, states, tasks)
     except OutOfTimeError:
         report.late = True
+    report.late = report.late or explorer.late
     report.unreal += explorer.unreal
     report.tasks = [t for t in tasks if t not in report.errors]
     report.missing += [explorer.text(t) for t in explorer.missing]
