@@ -1,4 +1,4 @@
-"""A tenth of the sample of docs/validation/glands.md: every tenth gland up to three shear moduli."""
+"""A tenth of the sample of docs/validation/glands.md: every tenth up to three shear moduli."""
 
 from __future__ import annotations
 
