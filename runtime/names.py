@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 _AS_GOOD = 0.05
 """Names whose likeness differs by less are as likely: `pressure` may be `sealed_pressure`."""
@@ -33,7 +33,7 @@ def listed(known: Iterable[str]) -> str:
     return ", ".join(known) or "none"
 
 
-def misfit(function: Callable[..., object], *arguments: str) -> str:
+def misfit(function: object, *arguments: str) -> str:
     """What a function takes, for a message, where it cannot be called with these; else ""."""
     if not callable(function):
         return f"a function of ({', '.join(arguments)}) is needed, given {function!r}"

@@ -195,7 +195,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="group 'g': whole numbers below 6, of quad4"):
         Mesh(mesh.points, mesh.cells, {"g": {"quad4": np.array([6])}}).check()
     with pytest.raises(MeshError, match=r"points are complex128 of shape \(12, 2\)"):
-        mesh.map(lambda x: x + 1j)
+        mesh.map(lambda x: x + 1j)  # type: ignore[arg-type, return-value]
     (tmp_path / "bad.msh").write_text("nothing of a mesh\n")
     with pytest.raises(MeshError, match=r"bad\.msh"):
         Mesh.read(tmp_path / "bad.msh")

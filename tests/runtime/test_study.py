@@ -231,7 +231,7 @@ def test_a_path_that_ends_says_how_far_it_came() -> None:
     assert 0.0 < reached.t < 1.0
 
 
-MISTAKES: list[tuple[str, Callable[[Study], object], str]] = [
+MISTAKES: list[tuple[str, Callable[[Any], object], str]] = [
     ("block twice", lambda s: s.add("body", pages.solid(), **SOLID), "block 'body' is there"),
     (
         "parameter",
@@ -325,7 +325,7 @@ def test_mistakes_are_named(mistake: Callable[[Study], object], words: str) -> N
         mistake(study)
 
 
-LATE: list[tuple[str, Callable[[Study], object], str]] = [
+LATE: list[tuple[str, Callable[[Any], object], str]] = [
     ("unknown", lambda s: s.fix("left", u_z=0.0), "no unknown 'u_z' (did you mean 'u_"),
     ("load", lambda s: s.load("left", w=1.0), "no unknown 'w'; at nodes: u_x, u_y"),
     (
