@@ -122,8 +122,8 @@ class Study:
 
         value: force per deformed length or area; a number grows with the load factor (in `march`
         it is constant), a function f(x (n, dim), t) gives the pressure at undeformed places.
-        of: unknowns that are the displacements along x, y, z; left out, u_x, u_y, u_z. Faces
-        between two cells have no outside and are refused.
+        of: unknowns that are the displacements along x, y, z; left out, u_x, u_y, u_z. A face
+        of two cells or of none has no outside and is refused.
         """
         value = read.amount(f"pressure({shown(where)})", "pressure", value)
         axes = "xyz"[: self.mesh.dimension]

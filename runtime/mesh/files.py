@@ -25,7 +25,7 @@ def read(path: Path) -> Mesh:
         raise MeshError(f"no mesh file {str(path)!r}")
     try:
         data = path.read_bytes() if path.suffix == ".msh" else b""
-        found = gmsh.parse(data) if data.startswith(b"$MeshFormat") else _by_meshio(path)
+        found = gmsh.parse(data) if b"$MeshFormat" in data else _by_meshio(path)
     except _DEFECTS as error:
         words = " ".join(str(error).split()) or "not a mesh file that meshio knows"
         raise MeshError(f"{path}: {words}") from None

@@ -164,16 +164,11 @@ class Mesh:
     @cached_property
     def boundary(self) -> Faces:
         """Every face that belongs to one cell only."""
-        return {name: once(faces, CELLS[name].corners) for name, faces in self._cell_faces.items()}
-
-    @cached_property
-    def _cell_faces(self) -> Faces:
-        """The faces of every cell: those between two cells stand twice."""
         found: dict[str, list[Integers]] = {}
         for kind, nodes in self.cells.items():
             for face, local in CELLS[kind].side_nodes:
                 found.setdefault(face.name, []).append(nodes[:, list(local)])
-        return {name: np.concatenate(parts) for name, parts in found.items()}
+        return {k: once(np.concatenate(parts), CELLS[k].corners) for k, parts in found.items()}
 
     def faces(self, where: str | Predicate) -> Faces:
         """Faces of a named side, or those of the boundary all of whose nodes are meant.
@@ -195,21 +190,21 @@ class Mesh:
         }
 
     def outer_faces(self, where: str | Predicate) -> Faces:
-        """The same, of one dimension less than the mesh.  Raises MeshError for a face between two
-        cells, which has no outside.
+        """The same, of one dimension less than the mesh.  Raises MeshError for a face that is not
+        that of one cell alone, which has no outside; those of shells are as they were given.
         """
         found = self.faces(where)
+        solid = any(CELLS[kind].dimension == self.dimension for kind in self.cells)
         for kind, faces in found.items():
-            cell, every = CELLS[kind], self._cell_faces.get(kind)
+            cell, known = CELLS[kind], self.boundary.get(kind, faces[:0])
             if cell.dimension != self.dimension - 1:
                 raise MeshError(f"{kind} is no face of a mesh of {self.dimension} coordinates")
-            if every is None:
-                continue
-            between = matched(faces, self.boundary[kind], cell.corners) < 0
-            between &= matched(faces, every, cell.corners) >= 0
-            if between.any():
-                place = place_text(self.points[faces[between.argmax()]].mean(axis=0))
-                raise MeshError(f"the face at {place} lies between two cells: it has no outside")
+            lost = faces[matched(faces, known, cell.corners) < 0] if solid else faces[:0]
+            if len(lost):
+                place = place_text(self.points[lost[0]].mean(axis=0))
+                raise MeshError(
+                    f"the face at {place} is of two cells or of none: it has no outside"
+                )
         return found
 
     def nodes(self, where: str | Predicate) -> Integers:

@@ -124,12 +124,13 @@ def test_a_side_that_is_numbered_clockwise_is_pressed_inwards() -> None:
     assert study.solve().at((2.0, 0.5))["u_x"] < 0.0
 
 
-def test_a_side_between_cells_has_no_outside() -> None:
+def test_a_face_of_two_cells_or_of_none_has_no_outside() -> None:
     mesh = Mesh.rectangle(2.0, 1.0, cells=(2, 1))
-    middle = {"middle": {"line2": np.array([[1, 4]])}}
-    study = Study(Mesh(mesh.points, mesh.cells, sides=middle))
-    with pytest.raises(MeshError, match=r"the face at \(1, 0\.5\) lies between two cells"):
-        study.pressure("middle", 1.0)
+    for name, face in (("middle", [1, 4]), ("diagonal", [0, 4])):
+        sides = {name: {"line2": np.array([face])}}
+        study = Study(Mesh(mesh.points, mesh.cells, sides=sides))
+        with pytest.raises(MeshError, match=r"the face at \(.*0\.5\) is of two cells or of none"):
+            study.pressure(name, 1.0)
 
 
 def test_what_is_refused() -> None:
