@@ -323,11 +323,14 @@ class Study:
 
 def _load(source: Source, model: str | None) -> Kernel:
     """By the front door, which knows when the generator is needed: this room does not."""
-    if callable(source) or hasattr(source, "finish"):
-        given = getattr(source, "__name__", type(source).__name__)
+    if isinstance(source, str | Path):
+        pass
+    elif callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):
+        name = getattr(source, "__name__", type(source).__name__)
+        hint = f", or what {name} returns when it is called" if callable(source) else ""
         raise StudyError(
-            f"{given} is a {type(source).__name__}, no page: give what it returns, {given}(), a "
-            "Definition that m.finish() made, a model file or a kernel"
+            f"{type(source).__name__} is no page: give a model file, a kernel, a Definition that "
+            f"m.finish() made{hint}"
         )
     import softehl
 

@@ -61,7 +61,7 @@ class System:
     start: Mapping[str, Array] = field(default_factory=dict)
     share: Share = ALONE
     whole: System | None = None
-    statement: Statement | None = None
+    statement: Statement | None = field(default=None, repr=False)
     written: int = 0
 
     @property
