@@ -126,11 +126,11 @@ class Spread:
             return float("inf")
         noise, terms = np.zeros(len(own)), np.zeros(len(own))
         if K is not None:
+            if self._is_lost(x, forces, K):
+                return 1.0
             terms = self._terms(np.abs(x)[own], K)
             if rounded:
                 noise = ROUNDING * self._terms(np.abs(x)[own] + self._reach(), K)
-                if self._is_lost(x, forces, K):
-                    return float("inf")
         wanted = self._wanted(x)
         free = np.ones(len(x), dtype=bool)
         free[problem.fixed] = False

@@ -167,11 +167,11 @@ class Problem:
             return np.inf
         noise, terms = np.zeros_like(r), np.zeros_like(r)
         if K is not None:
+            if self._is_lost(x, forces, K):
+                return 1.0
             terms = self._terms(np.abs(x), K)
             if rounded:
                 noise = ROUNDING * self._terms(np.abs(x) + self.assembler.reach(), K)
-                if self._is_lost(x, forces, K):
-                    return np.inf
         free: Flags = np.ones(len(r), dtype=bool)
         free[self.fixed] = False
         defect = np.where(free, np.maximum(np.abs(r) - noise, 0.0), 0.0)

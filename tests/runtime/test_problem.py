@@ -388,6 +388,14 @@ def test_a_body_at_rest_that_was_moved_converges_although_only_rounding_is_left(
         assert solution.iterations <= 4
 
 
+def test_a_body_that_a_step_threw_away_is_not_solved() -> None:
+    """So far away that the rounding of its places is larger than its load."""
+    p = problem(1e-3, fixed=np.empty(0, dtype=np.int64), values=np.empty(0))
+    _, K = p.linearise(np.zeros(50))
+    away = np.tile([1e17, 0.0], 25)
+    assert p.measure(away, K) == p.measure(away, K, rounded=True) == 1.0
+
+
 def test_prescribed_values_count_relative_to_themselves() -> None:
     p = problem(0.0)
     tiny = replace(p, values=np.full(len(p.fixed), 1e-13))
