@@ -50,17 +50,15 @@ def require_held(system: System, problem: Any, x: Array) -> None:
     rows[problem.fixed] = fields[problem.fixed]
     order = np.argsort(parts, kind="stable")
     for members in np.split(order, np.flatnonzero(np.diff(parts[order])) + 1):
-        there = np.flatnonzero(np.abs(fields[members]).max(axis=0, initial=0.0) > 0.0)
-        chosen = np.ix_(members, there)
-        basis = _independent(fields[chosen])
-        free = _null(rows[chosen] @ basis)
+        if len(members) == 1 and scale[members[0]] > 0.0:
+            continue  # an equation for itself
+        basis = _independent(fields[members])
+        free = _null(rows[members] @ basis) @ basis.T
         if not len(free):
             continue
-        motions = np.zeros((len(free), fields.shape[1]))
-        motions[:, there] = free @ basis.T
         part = int(parts[members[0]])
         shape = len(free), len(system.numbering.nodal), system.mesh.dimension + 1
-        told = _Motions(system, motions.reshape(shape), centres[part], sizes[part]).words()
+        told = _Motions(system, free.reshape(shape), centres[part], sizes[part]).words()
         first = int(node[members[node[members] >= 0]].min())
         alone = (parts[node >= 0] == part).all()
         raise NotConverged(_loose(system, x, told, first, alone=bool(alone)))
@@ -104,13 +102,13 @@ def _candidates(
 
 
 def _independent(fields: Array) -> Array:
-    """Combinations (columns, k) of the columns of (n, columns) that are fields of size one.
-
-    x about the centre of a part is no field where the part has a name at one node only.
+    """Combinations (columns, k) of the columns of (n, columns) that are independent and of size 1:
+    nodes on a line do not tell all coordinates apart.
     """
-    _, values, vectors = np.linalg.svd(fields, full_matrices=False)
-    kept = values > 1e-6 * values.max(initial=0.0)
-    return np.asarray(vectors[kept].T / values[kept])
+    triangle = np.linalg.qr(fields, mode="r") if len(fields) > fields.shape[1] else fields
+    _, values, vectors = np.linalg.svd(triangle, full_matrices=False)
+    kept = values > 1e-9 * np.sqrt(len(fields))
+    return np.asarray((vectors[kept] * (np.sqrt(len(fields)) / values[kept])[:, None]).T)
 
 
 def _null(rows: Array) -> Array:

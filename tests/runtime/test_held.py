@@ -148,3 +148,27 @@ def test_badly_conditioned_is_not_loose(n: int, ground: float) -> None:
 def test_held_by_rounding_is_loose() -> None:
     K = chain(10, 1e-15)
     assert loosest(K, SuperLU().factorise(K)) is not None
+
+
+def test_nodes_on_a_sloping_line_are_no_free_motion() -> None:
+    """Their coordinates are one up to a factor, so that their difference is no field."""
+    mesh = Mesh(
+        np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]), {"line2": np.array([[0, 1], [1, 2]])}
+    )
+    study = Study(mesh)
+    study.add("bar", lengthening())
+    study.spring((1.0, 1.0), u_x=1.0, u_y=1.0)
+    study.fix((0.0, 0.0), u_x=0.0, u_y=0.0)
+    study.fix((2.0, 2.0), u_x=0.0, u_y=0.0)
+    assert study.solve().norm() == 0.0
+
+
+def lengthening() -> Definition:
+    """A bar in the plane."""
+    m = Model("lengthening", nodes=2, rule=quadrature.point_rule(), unroll=True)
+    X, u = m.coordinates("X", "Y"), m.nodal_unknowns("u_x", "u_y")
+    apart = [x[1] - x[0] for x in X]
+    square = sum(a**2 for a in apart)
+    stretch = sum(a * (v[1] - v[0]) for a, v in zip(apart, u, strict=True)) / square
+    m.potential(stretch**2)
+    return m.finish()
