@@ -1,0 +1,377 @@
+"""Small faults in the sources, one at a time, and the tests that must see each of them.
+
+    python -m tests.mutations [--tests FOLDER] [NUMBER ...]
+
+The sources are copied to a temporary folder; each fault is made there, the tests that should see it
+are run up to the first that fails, and the fault is taken back.  Printed is one line a fault; the
+exit code is 1 if one was not seen.  `--tests` takes the tests of another version, to compare two.
+
+A fault on a page of the shipped models makes it differ from its C, which only the oracle sees;
+where `generated` names a model, its C is made anew from the page, which only the references see.
+The test that compares the C with what the generator writes now sees both and is never among them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+COPIED = ("benchmarks", "cases", "codegen", "docs", "generated", "runtime", "src", "tests")
+PATIENCE = 600.0
+"""Seconds after which tests count as hanging: the fault is seen."""
+
+GENERATE = """
+import sys
+from softehl.codegen import pipeline
+from softehl.codegen.models import ALL
+from softehl.codegen.tools import build, product
+for name, text in product.files([pipeline.compile_model(ALL[sys.argv[1]]())]).items():
+    if name.startswith(sys.argv[1]):
+        (build.GENERATED / name).write_text(text, encoding="utf-8")
+"""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A text in a file that becomes another one; tests: arguments of pytest."""
+
+    file: str
+    old: str
+    new: str
+    tests: str
+    generated: str = ""
+
+
+ORACLE = "tests/codegen/test_oracle.py"
+REFERENCE = "tests/physics/test_kernels_against_reference.py"
+
+FAULTS = (
+    # the compiler
+    Fault(
+        "codegen/graph/partials.py",
+        "g.mul(g.const(Fraction(1, 2)), g.recip(n))",
+        "g.mul(g.const(Fraction(1, 3)), g.recip(n))",
+        "tests/codegen/test_differentiate.py",
+    ),
+    Fault(
+        "codegen/graph/partials.py",
+        "(x, g.neg(g.mul(a, scale)))",
+        "(x, g.mul(a, scale))",
+        "tests/codegen/test_differentiate.py",
+    ),
+    Fault(
+        "codegen/graph/differentiate.py",
+        "sides[1].get(f, zero)",
+        "sides[0].get(f, zero)",
+        "tests/codegen/test_differentiate.py",
+    ),
+    Fault(
+        "codegen/optimise/passes.py",
+        "g.mul(square, a) if n % 2 else square",
+        "g.mul(square, a) if n % 3 else square",
+        "tests/codegen/test_passes.py",
+    ),
+    Fault(
+        "codegen/optimise/passes.py",
+        "tuple(sorted((*known, (c, False))",
+        "tuple(sorted((*known, (c, True))",
+        "tests/codegen/test_passes.py",
+    ),
+    Fault(
+        "codegen/optimise/factors.py",
+        "(-sign if n.op is Op.SUB else sign, b)",
+        "(sign, b)",
+        "tests/codegen/test_passes.py",
+    ),
+    Fault(
+        "codegen/emit/lanes.py",
+        "m.op is not Op.CALL and all(",
+        "m.op is not Op.CALL and any(",
+        "tests/codegen/test_lanes.py",
+    ),
+    Fault(
+        "codegen/language/elements/shapes.py",
+        "return [half * (1 - xi), half * (1 + xi)]",
+        "return [half * (1 + xi), half * (1 - xi)]",
+        f"{ORACLE} -k follower_pressure",
+    ),
+    # pages: the C does not follow
+    Fault(
+        "codegen/language/kinematics.py",
+        "(g[0] * J[1][1] - g[1] * J[1][0]) / detJ",
+        "(g[0] * J[1][1] + g[1] * J[1][0]) / detJ",
+        f"{ORACLE} -k solid_taylor",
+    ),
+    Fault(
+        "codegen/models/film.py",
+        "U / 2 * h - conductance * slope",
+        "U / 2 * h + conductance * slope",
+        f"{ORACLE} -k film_facet",
+    ),
+    Fault(
+        "codegen/models/contact.py",
+        "(sp.Max(a, b), True)",
+        "(sp.Min(a, b), True)",
+        f"{ORACLE} -k contact",
+    ),
+    Fault(
+        "codegen/models/contact.py",
+        "(-area * lam / rho, True)",
+        "(area * lam / rho, True)",
+        f"{ORACLE} -k contact",
+    ),
+    Fault(
+        "codegen/models/roughness.py",
+        "sp.exp(-(H - _JOINT) / 4)",
+        "sp.exp(-(H - _JOINT) / 5)",
+        f"{ORACLE} -k rough",
+    ),
+    Fault(
+        "codegen/models/rheology.py",
+        "3 * term / (2 * k + 3)",
+        "3 * term / (2 * k + 4)",
+        f"{ORACLE} -k eyring",
+    ),
+    Fault(
+        "codegen/models/mixed_film.py",
+        "narrowing**2 * conductance",
+        "narrowing * conductance",
+        f"{ORACLE} -k conserving",
+    ),
+    Fault(
+        "codegen/models/support.py",
+        "angle * (z**2 + r**2)",
+        "angle * (z**2 - r**2)",
+        f"{ORACLE} -k mean_rotation",
+    ),
+    # pages: the C follows
+    Fault(
+        "codegen/models/contact.py",
+        "n_r * (u_z - z_old) - n_z * (u_r - r_old)",
+        "n_r * (u_z - z_old) + n_z * (u_r - r_old)",
+        f"{REFERENCE} -k contact_friction",
+        "contact_friction",
+    ),
+    Fault(
+        "codegen/models/film.py",
+        "1 / (1 + widening**2), True",
+        "1 / (1 + widening), True",
+        f"{REFERENCE} -k film_upwind",
+        "film_upwind",
+    ),
+    Fault(
+        "codegen/language/materials.py",
+        "(19, 7000)",
+        "(19, 7001)",
+        f"{REFERENCE} -k arruda_boyce",
+        "solid_taylor_mean_arruda_boyce",
+    ),
+    Fault(
+        "codegen/models/roughness.py",
+        "z / 15 * (66 + z**2 * (30",
+        "z / 15 * (66 + z**2 * (31",
+        f"{REFERENCE} -k film_rough",
+        "film_rough",
+    ),
+    # the runtime
+    Fault(
+        "runtime/fem/rules.py",
+        "np.array([1.0, -1.0])",
+        "np.array([-1.0, 1.0])",
+        "tests/runtime/test_rules.py",
+    ),
+    Fault(
+        "runtime/fem/rules.py",
+        "(nodes[cell + 1] - xi) / width, -1.0 / width",
+        "(nodes[cell + 1] - xi) / width, 1.0 / width",
+        "tests/runtime/test_rules.py tests/physics/test_reynolds.py",
+    ),
+    Fault(
+        "runtime/fem/assembly.py",
+        "else self.data[part]",
+        "else self.data[: len(self.dofs[part])]",
+        "tests/runtime/test_assembly.py",
+    ),
+    Fault(
+        "runtime/solve/predictor.py",
+        "(t - e) / (d - e) for e",
+        "(t - e) / (d + e) for e",
+        "tests/runtime/test_continuation.py",
+    ),
+    Fault(
+        "runtime/solve/newton.py",
+        "return before <= now <= self.stagnation",
+        "return now <= self.stagnation",
+        "tests/runtime/test_newton.py",
+    ),
+    Fault(
+        "runtime/solve/condensation.py",
+        "full[self.interior] -= self.factors",
+        "full[self.interior] += self.factors",
+        "tests/runtime/test_condensation.py",
+    ),
+    Fault(
+        "runtime/march.py",
+        "(1.0 + 2.0 * r) / (1.0 + r) / dt",
+        "(1.0 + r) / (1.0 + r) / dt",
+        "tests/runtime/test_march.py",
+    ),
+    Fault(
+        "runtime/solve/sensitivity.py",
+        "linear.factorise(csc_array(K.T))",
+        "linear.factorise(csc_array(K))",
+        "tests/cases/test_sensitivity.py",
+    ),
+    Fault(
+        "runtime/solve/steps.py",
+        "self.target_iterations / max(iterations, 1)",
+        "max(iterations, 1) / self.target_iterations",
+        "tests/runtime/test_continuation.py",
+    ),
+    # the cases
+    Fault(
+        "cases/seal/leakage.py",
+        "- back.leak_rate_mm3_s / back.rod_speed_mm_s",
+        "+ back.leak_rate_mm3_s / back.rod_speed_mm_s",
+        "tests/cases/test_leakage.py",
+    ),
+    Fault(
+        "cases/seal/motion.py",
+        "-(1.0 + r), r**2 / (1.0 + r)",
+        "-(1.0 + r), r / (1.0 + r)",
+        "tests/cases/test_cycle.py",
+    ),
+    Fault(
+        "cases/seal/transient.py",
+        "return 2.0 * reading.flux_air_mm2_s / max",
+        "return 1.0 * reading.flux_air_mm2_s / max",
+        "tests/cases/test_cycle.py",
+    ),
+    Fault(
+        "cases/seal/estimate.py",
+        "100.0 * (other / value - 1.0)",
+        "100.0 * (value / other - 1.0)",
+        "tests/cases/test_estimate.py",
+    ),
+    Fault(
+        "cases/seal/loads.py",
+        "self.sealed_pressure + here, 0.0] if out",
+        "self.sealed_pressure - here, 0.0] if out",
+        "tests/cases/test_entrance.py",
+    ),
+    Fault(
+        "cases/seal/results.py",
+        'h[_nodes(first)][:: 1 if film.stroke == "out" else -1]',
+        'h[_nodes(first)][:: -1 if film.stroke == "out" else 1]',
+        "tests/cases/test_results.py tests/cases/test_method.py",
+    ),
+    Fault(
+        "cases/seal/materials.py",
+        "float(K[0, 0, 0]) / 4.0",
+        "float(K[0, 0, 0]) / 2.0",
+        "tests/cases/test_materials.py",
+    ),
+    Fault(
+        "cases/seal/fitting.py",
+        "section * (1.0 - values",
+        "section * (1.0 + values",
+        "tests/cases/test_fitting.py tests/cases/test_catalogue.py",
+    ),
+)
+
+
+def main() -> int:
+    """Make the faults that were asked for, all by default."""
+    parser = argparse.ArgumentParser(prog="python -m tests.mutations")
+    parser.add_argument("numbers", nargs="*", type=int, help="faults by number, from 1")
+    parser.add_argument("--tests", type=Path, default=ROOT / "tests", help="folder of the tests")
+    asked = parser.parse_args()
+    numbers, missed = asked.numbers or range(1, len(FAULTS) + 1), list[int]()
+    with tempfile.TemporaryDirectory(prefix="softehl-faults-") as scratch:
+        copy = copied(Path(scratch), asked.tests.resolve())
+        for number in numbers:
+            fault, start = FAULTS[number - 1], time.monotonic()
+            seen = made(fault, copy)
+            seconds = time.monotonic() - start
+            print(f"{number:3} {fault.file:40} {seconds:5.0f} s  {seen or 'NOT SEEN'}", flush=True)
+            missed += [] if seen else [number]
+    print(f"{len(list(numbers)) - len(missed)} of {len(list(numbers))} seen")
+    return 1 if missed else 0
+
+
+def copied(to: Path, tests: Path) -> Path:
+    """The sources with these tests, as they stand in a clone."""
+    skipped = shutil.ignore_patterns("__pycache__", "*.so", "*.sha256")
+    for name in COPIED:
+        source = tests if name == "tests" else ROOT / name
+        shutil.copytree(source, to / name, symlinks=True, ignore=skipped)
+    for path in ROOT.glob("*.*"):
+        if path.is_file():
+            shutil.copy(path, to)
+    return to
+
+
+def made(fault: Fault, copy: Path) -> str:
+    """The test that sees a fault in the copy, empty if none does; the fault is taken back."""
+    path, generated = copy / fault.file, copy / "generated"
+    text = path.read_text(encoding="utf-8")
+    if text.count(fault.old) != 1:
+        raise SystemExit(
+            f"{fault.file} holds {fault.old!r} {text.count(fault.old)} times, not once"
+        )
+    before = {p: p.read_bytes() for p in generated.iterdir() if p.is_file()}
+    path.write_text(text.replace(fault.old, fault.new), encoding="utf-8")
+    try:
+        if fault.generated:
+            run(copy, "-c", GENERATE, fault.generated)
+        return failing(copy, fault.tests)
+    finally:
+        path.write_text(text, encoding="utf-8")
+        for p, data in before.items():
+            p.write_bytes(data)
+
+
+def failing(copy: Path, tests: str) -> str:
+    """The first test that fails, or why none ran."""
+    words = ["-m", "pytest", "-x", "-q", "--tb=no", "-p", "no:cacheprovider", *tests.split()]
+    try:
+        done = run(copy, *words)
+    except subprocess.TimeoutExpired:
+        return "hangs"
+    if done.returncode == 0:
+        return ""
+    found = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+    if found is None:
+        raise SystemExit(f"no test ran: {tests}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+    return found[1]
+
+
+def run(copy: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Python in the copy, with what the user's cache would hold in a cache beside it."""
+    fresh = {
+        "PYTHONPATH": str(copy / "src"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "SOFTEHL_CACHE": os.environ.get("SOFTEHL_CACHE", str(copy / "cache")),
+    }
+    return subprocess.run(
+        [sys.executable, *words],
+        cwd=copy,
+        env={**os.environ, **fresh},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
