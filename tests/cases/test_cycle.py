@@ -202,6 +202,7 @@ def test_keys_of_steady_films_are_named() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_long_periods_give_the_steady_curve(tmp_path: Path) -> None:
     """The mean leak over the period tends to that of steady strokes as one over it."""
     leaks = []

@@ -213,6 +213,7 @@ def contact_stages(curve: Curve) -> list[str]:
     return [stage["name"] for stage in stages if stage["stroke"] == "both"]
 
 
+@pytest.mark.slow
 def test_a_sweep_on_dask(serial: list[Curve], tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     with (

@@ -36,6 +36,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
+@pytest.mark.slow
 def test_a_small_version_of_everything_and_nothing_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -72,6 +73,7 @@ def test_a_lost_file_is_computed_again(tmp_path: Path) -> None:
     assert lost.exists()
 
 
+@pytest.mark.slow
 def test_runs_side_by_side_are_the_same_as_one_by_one(tmp_path: Path) -> None:
     requests = [ask(setup(1, p_s), [1600.0]) for p_s in (0.0, 0.5)]
     stores = [Store(tmp_path / name) for name in ("one", "two")]

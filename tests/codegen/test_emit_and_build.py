@@ -282,6 +282,7 @@ def test_numbers_are_read_back_exactly() -> None:
         assert text.startswith("(") == (v < 0)
 
 
+@pytest.mark.slow
 def test_shipped_c_is_plain_c11_without_warnings(tmp_path: Path) -> None:
     """Every warning the compiler knows of that is not a matter of taste, under two dialects."""
     for source in build.GENERATED.glob("*.[ch]"):

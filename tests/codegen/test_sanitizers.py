@@ -167,11 +167,13 @@ def run(program: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_all_kernels_are_clean_on_every_batch(program: Path) -> None:
     done = run(program)
     assert (done.returncode, done.stdout, done.stderr) == (0, "clean\n", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "array",
     [

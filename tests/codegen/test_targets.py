@@ -35,8 +35,13 @@ def scalar(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def one_lane(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The shipped C as a compiler without vector extensions reads it."""
     directory = tmp_path_factory.mktemp("one_lane")
-    for source in (*build.GENERATED.glob("*.[ch]"), build.GENERATED / "manifest.json"):
-        shutil.copy(source, directory)
+    for name in (
+        *(f"{f}.c" for f in FAMILIES),
+        "signature.c",
+        "softehl_kernels.h",
+        "manifest.json",
+    ):
+        shutil.copy(build.GENERATED / name, directory)
     build.build(directory, extra=(*build.STRICT, "-Wpedantic", "-O1", "-DSOFTEHL_LANES=1"))
     return directory
 

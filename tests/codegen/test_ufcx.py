@@ -16,8 +16,6 @@ import pytest
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.emit import ufcx as emit_ufcx
-from softehl.codegen.graph.graph import Op
-from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
@@ -31,12 +29,11 @@ from tests.codegen.workshop import compiled
 from tests.shipped import SHIPPED
 
 LIMIT = 1e-12
-FAMILIES = tuple(
-    name
-    for name, make in ALL.items()
-    if (made := make()).interpolated is None
-    and not any(node.op is Op.CALL for node in reachable([made.potential]))  # stretches
+FAMILIES = (
+    *("solid_fbar", "solid_q4", "follower_pressure", "contact", "contact_friction"),
+    *("contact_corner", "film_void", "mean_rotation", "sheet_ogden"),
 )
+"""Of every kind one: nodes, data, branches, unknowns beside those of the nodes, none of them."""
 CASES = {f"{c.family}: {c.label}": c for c in all_cases() if c.family in FAMILIES}
 QUADS = tuple(name for name, shipped in SHIPPED.items() if shipped.nodes == 4)
 
@@ -71,14 +68,13 @@ def close(a: Array, b: Array) -> bool:
     return bool(np.abs(a - b).max() <= LIMIT * np.abs(b).max())
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_a_cell_is_the_element_in_another_order(name: str, cells: dict[str, CellKernels]) -> None:
-    case = CASES[name]
-    positional, named = case.arguments()
-    R, K = load_kernel(case.family).tangent(*positional, **named)
-    kernels = cells[case.family]
-    assert close(called(kernels, case, "residual"), R[0])
-    assert close(called(kernels, case, "tangent"), K[0])
+def test_a_cell_is_the_element_in_another_order(cells: dict[str, CellKernels]) -> None:
+    for name, case in CASES.items():
+        positional, named = case.arguments()
+        R, K = load_kernel(case.family).tangent(*positional, **named)
+        kernels = cells[case.family]
+        assert close(called(kernels, case, "residual"), R[0]), name
+        assert close(called(kernels, case, "tangent"), K[0]), name
 
 
 def test_cells_are_added_to_what_is_there(cells: dict[str, CellKernels]) -> None:

@@ -27,7 +27,13 @@ def read(entry: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> Reader:
     return reader
 
 
-@pytest.mark.parametrize("entry", ENTRIES)
+LONG = ("fbar",)
+"""Entries that take as long as all others together."""
+
+
+@pytest.mark.parametrize(
+    "entry", [pytest.param(e, marks=[pytest.mark.slow] * (e in LONG)) for e in ENTRIES]
+)
 def test_an_entry_runs_and_prints_what_it_shows(
     entry: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -116,23 +116,25 @@ def test_a_carreau_oil_becomes_a_power_law_and_ends_in_its_plateau() -> None:
     assert fast / slow == pytest.approx(4.0, rel=2e-3)  # as p'^(1/n)
 
 
-@pytest.mark.parametrize("law", ["eyring", "carreau"])
-@pytest.mark.parametrize("state", STATES, ids=lambda s: s.id)
-def test_an_oil_of_large_critical_stress_is_newtonian(state: State, law: str) -> None:
+def test_an_oil_of_large_critical_stress_is_newtonian() -> None:
     """Residual and tangent to rounding; those without a law are the kernel of before."""
-    (thinning,) = (s for s in thinned(state, 2.0**60) if s.family == f"film_{law}")
-    for found, before in zip(call("tangent", thinning), call("tangent", state), strict=True):
-        assert np.abs(found - before).max() <= 1e-14 * np.abs(before).max()
+    for state in STATES:
+        for law in ["eyring", "carreau"]:
+            (thinning,) = (s for s in thinned(state, 2.0**60) if s.family == f"film_{law}")
+            for found, before in zip(
+                call("tangent", thinning), call("tangent", state), strict=True
+            ):
+                assert np.abs(found - before).max() <= 1e-14 * np.abs(before).max()
 
 
-@pytest.mark.parametrize("state", STATES, ids=lambda s: s.id)
-def test_a_carreau_oil_of_exponent_or_plateau_one_is_newtonian(state: State) -> None:
-    for n, c in ((1.0, 0.0), (0.4, 1.0)):
-        given = (*state.parameters, 0.01, n, c)
-        same = State("film_carreau", "", state.coordinates, state.dofs, given, kind=state.kind)
-        same = State(**{**vars(same), "count": state.count})
-        for found, before in zip(call("tangent", same), call("tangent", state), strict=True):
-            assert np.abs(found - before).max() <= 1e-13 * np.abs(before).max()
+def test_a_carreau_oil_of_exponent_or_plateau_one_is_newtonian() -> None:
+    for state in STATES:
+        for n, c in ((1.0, 0.0), (0.4, 1.0)):
+            given = (*state.parameters, 0.01, n, c)
+            same = State("film_carreau", "", state.coordinates, state.dofs, given, kind=state.kind)
+            same = State(**{**vars(same), "count": state.count})
+            for found, before in zip(call("tangent", same), call("tangent", state), strict=True):
+                assert np.abs(found - before).max() <= 1e-13 * np.abs(before).max()
 
 
 @pytest.mark.parametrize("law", ["eyring", "carreau"])

@@ -132,50 +132,52 @@ def test_names_are_in_the_order_of_the_arrays() -> None:
 # ----------------------------------------------------------------------------------- good calls
 
 
-@pytest.mark.parametrize("name", FAMILIES)
-def test_shapes_and_kinds_of_results(name: str, rng: np.random.Generator) -> None:
-    kernel, n = load_kernel(name), 3
-    positional, named = arguments(name, n, rng)
-    ndof = positional[1].shape[1]
-    points = len((named["rule"] or kernel.default_rule).weights)
-    shapes = {
-        "energy": [(n,)],
-        "residual": [(n, ndof)],
-        "tangent": [(n, ndof), (n, ndof, ndof)],
-        "fields": [(n, points, len(kernel.fields))],
-        "fields_rate": [(n, points, len(kernel.fields))],
-    }
-    for task, call in methods(kernel).items():
-        result = call(*positional, **named)
-        arrays = result if isinstance(result, tuple) else (result,)
-        assert [a.shape for a in arrays] == shapes.get(task, [(n, ndof)])
-        assert all(a.dtype == np.float64 and np.isfinite(a).all() for a in arrays)
-        assert all(a.any() for a in arrays)
+def test_shapes_and_kinds_of_results(rng: np.random.Generator) -> None:
+    for name in FAMILIES:
+        kernel, n = load_kernel(name), 3
+        positional, named = arguments(name, n, rng)
+        ndof = positional[1].shape[1]
+        points = len((named["rule"] or kernel.default_rule).weights)
+        shapes = {
+            "energy": [(n,)],
+            "residual": [(n, ndof)],
+            "tangent": [(n, ndof), (n, ndof, ndof)],
+            "fields": [(n, points, len(kernel.fields))],
+            "fields_rate": [(n, points, len(kernel.fields))],
+        }
+        for task, call in methods(kernel).items():
+            result = call(*positional, **named)
+            arrays = result if isinstance(result, tuple) else (result,)
+            assert [a.shape for a in arrays] == shapes.get(task, [(n, ndof)])
+            assert all(a.dtype == np.float64 and np.isfinite(a).all() for a in arrays)
+            assert all(a.any() for a in arrays)
 
 
-@pytest.mark.parametrize("name", FAMILIES)
-def test_a_batch_is_exactly_its_elements_one_by_one(name: str, rng: np.random.Generator) -> None:
-    kernel, n = load_kernel(name), 7
-    (X, u), named = arguments(name, n, rng)
-    for task, call in methods(kernel).items():
-        together = call(X, u, **named)
-        for e in range(n):
-            one = {**named, "data": named["data"][e : e + 1]}
-            if kernel.point_data:
-                one["point_data"] = named["point_data"][e : e + 1]
-            alone = call(X[e : e + 1], u[e : e + 1], **one)
-            pairs = zip(together, alone, strict=True) if task == "tangent" else [(together, alone)]
-            for many, single in pairs:
-                np.testing.assert_array_equal(many[e], single[0])
+def test_a_batch_is_exactly_its_elements_one_by_one(rng: np.random.Generator) -> None:
+    for name in FAMILIES:
+        kernel, n = load_kernel(name), 7
+        (X, u), named = arguments(name, n, rng)
+        for task, call in methods(kernel).items():
+            together = call(X, u, **named)
+            for e in range(n):
+                one = {**named, "data": named["data"][e : e + 1]}
+                if kernel.point_data:
+                    one["point_data"] = named["point_data"][e : e + 1]
+                alone = call(X[e : e + 1], u[e : e + 1], **one)
+                pairs = (
+                    zip(together, alone, strict=True) if task == "tangent" else [(together, alone)]
+                )
+                for many, single in pairs:
+                    np.testing.assert_array_equal(many[e], single[0])
 
 
-@pytest.mark.parametrize("name", FAMILIES)
-def test_no_elements_are_no_error(name: str, rng: np.random.Generator) -> None:
-    kernel = load_kernel(name)
-    positional, named = arguments(name, 0, rng)
-    for task, call in methods(kernel).items():
-        result = call(*positional, **named)
-        assert all(len(a) == 0 for a in (result if task == "tangent" else (result,)))
+def test_no_elements_are_no_error(rng: np.random.Generator) -> None:
+    for name in FAMILIES:
+        kernel = load_kernel(name)
+        positional, named = arguments(name, 0, rng)
+        for task, call in methods(kernel).items():
+            result = call(*positional, **named)
+            assert all(len(a) == 0 for a in (result if task == "tangent" else (result,)))
 
 
 def written(kernel: Kernel, rng: np.random.Generator) -> set[str]:

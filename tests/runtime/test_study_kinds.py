@@ -30,8 +30,8 @@ NORMALS = {"left": (0, -1), "right": (0, 1), "bottom": (1, -1), "top": (1, 1)}
 BOX = {"left": (0, -1), "right": (0, 1), "front": (1, -1), "back": (1, 1)}
 BOX |= {"bottom": (2, -1), "top": (2, 1)}
 SIDES = {1: {"left": (0, -1), "right": (0, 1)}, 2: NORMALS, 3: BOX}
-QUICK = ["line3", "tri3", "quad4", "quad8", "tet4", "wedge6"]
-LONG = ["line2", "tri6", "quad9", "tet10", "hex8", "hex20", "hex27"]
+QUICK = ["line3", "tri3", "quad4", "quad8", "tet4"]
+LONG = ["line2", "tri6", "quad9", "tet10", "wedge6", "hex8", "hex20", "hex27"]
 MISTAKES = ["", "", "", "no support", "twice", "unknown", "side", "kind", "not finite"]
 
 

@@ -16,7 +16,7 @@ from softehl.runtime.result import Result
 from softehl.runtime.study import StudyError
 from softehl.runtime.watch import Series, read_series
 from tests.runtime import solid_page as pages
-from tests.runtime.test_study_elements import SHAPES, poisson, unit_mesh
+from tests.runtime.test_study_elements import EVERY, poisson, unit_mesh
 
 
 def pulled() -> Study:
@@ -87,7 +87,7 @@ def test_following_writes_a_series_too(tmp_path: Path) -> None:
     assert [t for t, _ in whole(path)] == [r.t for r in found.results]
 
 
-@pytest.mark.parametrize("kind", SHAPES)
+@pytest.mark.parametrize("kind", EVERY)
 def test_every_kind_of_cell_is_written(kind: str, tmp_path: Path) -> None:
     study = Study(unit_mesh(kind, 2))
     study.add("body", poisson(kind), k=2.0)
