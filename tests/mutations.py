@@ -66,7 +66,7 @@ FAULTS = (
         "codegen/graph/partials.py",
         "(x, g.neg(g.mul(a, scale)))",
         "(x, g.mul(a, scale))",
-        "tests/codegen/test_differentiate.py",
+        "tests/codegen/test_differentiate.py tests/codegen/test_tasks.py",
     ),
     Fault(
         "codegen/graph/differentiate.py",
@@ -100,9 +100,9 @@ FAULTS = (
     ),
     Fault(
         "codegen/language/elements/shapes.py",
-        "return [half * (1 - xi), half * (1 + xi)]",
-        "return [half * (1 + xi), half * (1 - xi)]",
-        f"{ORACLE} -k follower_pressure",
+        "c * (1 + a * xi) * (1 + b * eta) / 8",
+        "c * (1 + a * xi) * (1 - b * eta) / 8",
+        "tests/codegen/test_elements.py tests/codegen/test_dimensions.py",
     ),
     # pages: the C does not follow
     Fault(
@@ -193,7 +193,7 @@ FAULTS = (
         "runtime/fem/rules.py",
         "(nodes[cell + 1] - xi) / width, -1.0 / width",
         "(nodes[cell + 1] - xi) / width, 1.0 / width",
-        "tests/runtime/test_rules.py tests/physics/test_reynolds.py",
+        "tests/cases/test_slider_cavitation.py tests/cases/test_rough_film.py",
     ),
     Fault(
         "runtime/fem/assembly.py",
@@ -260,6 +260,18 @@ FAULTS = (
         "cases/seal/estimate.py",
         "100.0 * (other / value - 1.0)",
         "100.0 * (value / other - 1.0)",
+        "tests/cases/test_estimate.py",
+    ),
+    Fault(
+        "cases/seal/contact_route.py",
+        "stored = self.contacts.densities(p, (*coarser, p.density))",
+        "stored = list[int]()",
+        "tests/cases/test_contact_store.py",
+    ),
+    Fault(
+        "cases/seal/coarser_films.py",
+        "change = end - start",
+        "change = start - end",
         "tests/cases/test_estimate.py",
     ),
     Fault(

@@ -28,10 +28,8 @@ from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.solve.newton import Newton
 
 Damage = Callable[[Path, np.random.Generator], None]
-LOADED = ["sealed pressure"] * 2
 """Stages of the path of the pressure: roughly on the way, then at its end."""
 
-STORED = "newton, from a stored contact state"
 OTHER = {
     "upwinding": 0.3,
     "error_estimate": False,
@@ -117,8 +115,9 @@ def case(**changes: Any) -> ORing:
     return ORing(**{**scheme, **given, **changes})
 
 
-def names(outcome: Outcome) -> list[str]:
-    return [stage.name for stage in outcome.stages if stage.stroke == "both"]
+def cost(outcome: Outcome) -> int:
+    """Factorisations of the contact."""
+    return sum(s.factorisations or 0 for s in outcome.stages if s.stroke == "both")
 
 
 @pytest.fixture(scope="module")
@@ -174,11 +173,10 @@ def test_every_parameter_either_matters_or_does_not() -> None:
 
 def test_a_second_curve_has_no_contact_path(solved: tuple[Path, Outcome], contacts: Path) -> None:
     first = solved[1]
-    assert names(first) == ["squeeze", *LOADED]
+    assert cost(first) > 20
     second = run(case(stroke="both"), Silent(), contacts=contacts)
     assert second.converged, second.message
-    assert names(second) == ["contact at density 1"]
-    assert (second.stages[0].method, second.stages[0].factorisations) == (STORED, 0)
+    assert cost(second) == 0
     assert second.stages[0].residual_histories[-1][-1] < 1e-8  # it was looked at
     assert second.states[0].h_star_um == pytest.approx(plain().states[0].h_star_um, rel=1e-10)
     assert first.states[0].h_star_um == plain().states[0].h_star_um
@@ -198,8 +196,7 @@ def test_a_state_holds_whatever_the_film_is(contacts: Path) -> None:
 
 def test_a_coarser_state_is_prolonged(contacts: Path) -> None:
     fine = run(case(density=2), Silent(), contacts=contacts)
-    assert names(fine) == ["contact at density 1", "contact at density 2"]
-    assert [s.method for s in fine.stages[:2]] == [STORED, "newton, prolonged from density 1"]
+    assert 0 < cost(fine) <= 6
     expected = plain(density=2).states[0].h_star_um
     assert fine.states[0].h_star_um == pytest.approx(expected, rel=1e-10)
     assert ContactStore(contacts).densities(case(), (1, 2, 4)) == [2, 1]
@@ -207,7 +204,7 @@ def test_a_coarser_state_is_prolonged(contacts: Path) -> None:
 
 def test_the_reference_takes_no_part(contacts: Path) -> None:
     reference = run(case(solver="monolithic"), Silent(), contacts=contacts)
-    assert names(reference) == ["squeeze", "sealed pressure"]
+    assert cost(reference) > 10
 
 
 def cut(path: Path, rng: np.random.Generator) -> None:
@@ -259,9 +256,8 @@ def test_a_damaged_state_costs_little_and_is_replaced(
     before = path.read_bytes()
     damage(path, rng)
     outcome = run(case(), Silent(), contacts=contacts)
-    assert names(outcome) == ["contact at density 1", "squeeze", *LOADED]
+    assert cost(outcome) > cost(plain())
     refused = outcome.stages[0]
-    assert refused.method.startswith(f"{STORED}; ended: ")
     assert (refused.factorisations or 0) <= 10
     assert outcome.states[0].h_star_um == plain().states[0].h_star_um
     assert path.read_bytes() == before

@@ -1,6 +1,5 @@
 """Tables of the documentation that follow from declarations."""
 
-
 import pytest
 
 from softehl.cases.document import DOCS, renewed

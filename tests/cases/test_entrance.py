@@ -1,6 +1,7 @@
 """Films whose arc begins within their inlet, against arcs that are long enough."""
 
 from functools import cache
+from typing import cast
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.entrance import built_up, facing, wedge_friction
 from softehl.cases.seal.equations import build_system
+from softehl.cases.seal.loads import FilmLoads, Stroke
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.state import CLIPPED, FilmState, Silent
@@ -18,6 +20,13 @@ FLOW, SLOPE, H_STAR = 4e-4, 0.3, 2e-3
 def _straight(parts: int) -> tuple[np.ndarray, np.ndarray]:
     way = np.linspace(0.0, 1.0, parts + 1)
     return way, 0.01 + SLOPE * way
+
+
+def test_the_pressure_of_the_entrance_is_at_the_end_where_oil_comes_in() -> None:
+    nothing = np.zeros(2)
+    for stroke, ends in (("out", [3.5, 0.0]), ("in", [3.0, 0.5])):
+        film = FilmLoads(3.0, cast("Stroke", stroke), 400.0, nothing, nothing, entrance=0.5)
+        assert film.ends.tolist() == ends
 
 
 @pytest.mark.parametrize("parts", [1, 7])

@@ -10,7 +10,7 @@ import pytest
 
 from softehl.cases.seal import film as seal_film
 from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.film import METHOD, first_film
+from softehl.cases.seal.film import first_film
 from softehl.cases.seal.layers import film_layer
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
@@ -58,18 +58,15 @@ def test_both_routes_give_the_same_films(sealed_pressure: float, density: int) -
 
 
 def test_the_cost_of_the_fast_route() -> None:
-    stages = solved("auto", 1.0).stages
-    on_the_mesh = [s for s in stages if s.name == "contact at density 2"]
-    assert [s.method for s in on_the_mesh] == ["newton, prolonged from density 1"]
-    assert (on_the_mesh[0].factorisations or 99) <= 6
-    films = [s for s in stages if s.method == METHOD]
-    assert [s.name for s in films] == ["contact to film", "shear", "falling speed"] * 2
+    """Factorisations of a stroke, once contact is known; of Newton's method a multiple."""
+    fast, reference = (solved(s, 1.0, density=1).stages for s in ("auto", "monolithic"))
     for stroke in ("out", "in"):
-        assert sum(s.factorisations or 0 for s in films if s.stroke == stroke) <= 5
-    final = [
-        norms[-1] for s in films if s.name == "falling speed" for norms in s.residual_histories
-    ]
-    assert max(final) < 1e-8
+        few, many = (
+            sum(s.factorisations or 0 for s in stages if s.stroke == stroke)
+            for stages in (fast, reference)
+        )
+        assert few <= 5
+        assert many > 4 * few
 
 
 def test_superlu_does_it_too() -> None:
@@ -88,7 +85,6 @@ def test_the_discontinuous_film_is_condensed_too() -> None:
     routes = ("auto", "monolithic")
     fast, reference = (run(oring(solver=s, **parameters), Recorder()) for s in routes)
     assert fast.converged, fast.message
-    assert [s.method for s in fast.stages if s.name == "falling speed"] == [METHOD]
     for a, b in zip(fast.states, reference.states, strict=True):
         assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)
         assert a.pressure_jump_max_MPa == pytest.approx(b.pressure_jump_max_MPa, rel=1e-7)
@@ -111,22 +107,16 @@ class VeryTired(Tired):
     slowest = math.inf
 
 
-@pytest.mark.parametrize(
-    ("corrector", "ended"), [(Tired, "falling speed"), (VeryTired, "contact to film")]
-)
+@pytest.mark.parametrize("corrector", [Tired, VeryTired])
 def test_where_it_gives_up_newton_goes_on(
-    monkeypatch: pytest.MonkeyPatch, corrector: type[Tired], ended: str
+    monkeypatch: pytest.MonkeyPatch, corrector: type[Tired]
 ) -> None:
     monkeypatch.setattr(seal_film, "SchurCorrector", corrector)
     parameters = oring(density=1, sealed_pressure=1.0, stroke="out", speeds=SPEEDS)
     outcome = run(parameters, Recorder())
     assert outcome.converged, outcome.message
     assert [s.rod_speed for s in outcome.states] == list(SPEEDS)  # each of them once
-    last_fast = [s for s in outcome.stages if s.method.startswith(METHOD)][-1]
-    assert last_fast.name == ended
-    assert last_fast.method.startswith(f"{METHOD}; ended: ")
-    assert "tired" in last_fast.method
-    assert (outcome.stages[-1].name, outcome.stages[-1].method) == ("falling speed", "newton")
+    assert any("tired" in stage.method for stage in outcome.stages)  # it is said
     reference = solved("monolithic", 1.0, density=1)
     for a, b in zip(outcome.states, reference.states, strict=False):
         assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)

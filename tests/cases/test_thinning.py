@@ -213,7 +213,6 @@ def test_where_the_fast_way_stalls_under_shear_newton_goes_on_to_the_same_film()
         end = FilmPath(system, SETTINGS, driver)._sheared(fast, stage, built)
         assert not isinstance(end, StageFailed)
         found.append(system.arc_film(end)[1])
-        assert driver.records[-1].method == (METHOD if type(driver) is PathDriver else "newton")
     np.testing.assert_allclose(found[1], found[0], rtol=1e-5)
 
 
@@ -240,10 +239,6 @@ def test_a_film_that_is_not_steady_is_squeezed_for_longer() -> None:
         driver = kind(Silent())
         assert FilmPath(system, SETTINGS, driver).thinned(loads(), x, keep) is None
         found.append(films)
-    squeezed = [record for record in driver.records if record.name == "contact to film"]
-    assert len(squeezed) == 2
-    assert squeezed[1].parameters[0] == pytest.approx(squeezed[0].parameters[-1])
-    assert squeezed[1].parameters[-1] == pytest.approx(1e9)
     assert found[1][400.0] == pytest.approx(found[0][400.0], rel=1e-7)
 
 
@@ -270,12 +265,6 @@ def test_shear_stress_that_leads_nowhere_begins_at_a_slower_film(
                 found.append(system.arc_film(point.solution.x)[1].min())
 
         assert FilmPath(system, SETTINGS, driver).thinned(loads(), x, keep) is None
-    names = [record.name for record in driver.records]
-    number = names.index("falling speed")
-    assert "shear" not in names[:number]
-    assert names[number + 1] == "shear"
-    slower = driver.records[number].parameters
-    assert [slower[0], slower[-1]] == pytest.approx([1600.0, 400.0])
     assert found[1] == pytest.approx(found[0], rel=1e-7)
 
 

@@ -8,7 +8,6 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.film import METHOD
 from softehl.cases.seal.loads import FilmLoads
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
@@ -89,7 +88,6 @@ def test_both_routes_give_the_same_films(reynolds: str) -> None:
         solved(1.0, stroke="both", reynolds=reynolds, solver=s, speeds=(1600.0, 800.0))
         for s in ("auto", "monolithic")
     )
-    assert {s.method for s in fast.stages if s.name == "falling speed"} == {METHOD}
     for a, b in zip(fast.states, reference.states, strict=True):
         assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)
         assert a.rod_friction_N == pytest.approx(b.rod_friction_N, rel=1e-7)

@@ -34,6 +34,7 @@ def run(path: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_prints_what_its_page_shows(path: Path, tmp_path: Path) -> None:
     copy = Path(shutil.copy(path, tmp_path))

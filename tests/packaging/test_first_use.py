@@ -347,6 +347,7 @@ def test_others_may_read_the_library_and_nobody_else_write_it(
         assert mode & 0o022 == 0
 
 
+@pytest.mark.slow
 def test_a_users_build_is_not_stopped_by_warnings(wheel: Path, tmp_path: Path) -> None:
     """On a processor without AVX, gcc warns of how vectors are passed (-Wpsabi)."""
     for source in build.GENERATED.glob("*.[ch]"):
