@@ -256,9 +256,7 @@ def test_a_damaged_state_costs_little_and_is_replaced(
     before = path.read_bytes()
     damage(path, rng)
     outcome = run(case(), Silent(), contacts=contacts)
-    assert cost(outcome) > cost(plain())
-    refused = outcome.stages[0]
-    assert (refused.factorisations or 0) <= 10
+    assert cost(plain()) <= cost(outcome) <= cost(plain()) + 10
     assert outcome.states[0].h_star_um == plain().states[0].h_star_um
     assert path.read_bytes() == before
 
