@@ -82,7 +82,8 @@ def vectors(family: str, ndof: int) -> Array:
     names += ["interpolated"] * (ndof - len(names))
     kinds = np.array(names)[None, :] == np.array(list(dict.fromkeys(names)))[:, None]
     rng = np.random.default_rng(1996)
-    return kinds * rng.uniform(0.5, 1.0, ndof) * rng.choice([-1.0, 1.0], ndof)
+    found: Array = kinds * rng.uniform(0.5, 1.0, ndof) * rng.choice([-1.0, 1.0], ndof)
+    return found
 
 
 @cache
