@@ -254,7 +254,7 @@ FAULTS = (
         "cases/seal/transient.py",
         "return 2.0 * reading.flux_air_mm2_s / max",
         "return 1.0 * reading.flux_air_mm2_s / max",
-        "tests/cases/test_cycle.py",
+        "tests/cases/test_cycle.py tests/cases/test_leakage.py",
     ),
     Fault(
         "cases/seal/estimate.py",

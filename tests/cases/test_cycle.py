@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +29,6 @@ from softehl.cases.seal.report.cycle import (
 )
 from softehl.cases.seal.strip import Oil, Strip
 from softehl.cases.seal.system import FILM, PRESSURE, SQUEEZE, VOID
-from softehl.cases.seal.transient import March, Reading
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, read_table
 from softehl.runtime.solve.newton import Newton
@@ -171,15 +169,6 @@ def test_the_rod_brings_back_what_was_left_on_it() -> None:
     rod.leave(1.0, 7.0)
     assert rod.found(1.5) is None
     assert rod.found(1.0) == 7.0
-
-
-def test_an_outstroke_leaves_the_film_that_its_flux_has() -> None:
-    """The flux is U h* / 2, and h* stays on the rod; an instroke leaves nothing."""
-    of = cast("March", SimpleNamespace(_fastest=100.0))
-    for speed, left in ((80.0, pytest.approx(3e-3)), (-80.0, None)):
-        flux = 0.5 * speed * 3e-3
-        at = cast("Reading", SimpleNamespace(rod_speed_mm_s=speed, flux_air_mm2_s=flux))
-        assert March.left(of, at) == left
 
 
 def cycle(folder: Path, *settings: str) -> dict[str, Array]:

@@ -1,5 +1,7 @@
 """Tables of the documentation that follow from declarations."""
 
+from pathlib import Path
+
 import pytest
 
 from softehl.cases.document import DOCS, renewed
@@ -9,7 +11,8 @@ from softehl.cases.shipped import SHIPPED
 
 
 def test_tables_are_current() -> None:
-    for page in DOCS.glob("*.md"):
+    pages: list[Path] = sorted(DOCS.glob("*.md"))
+    for page in pages:
         text = page.read_text(encoding="utf-8")
         assert renewed(text) == text, f"{page}: run `python -m softehl.cases.document`"
 

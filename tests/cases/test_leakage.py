@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
@@ -16,6 +18,7 @@ from softehl.cases.seal.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.state import OSCILLATING, UNDER_RESOLVED, FilmRow
 from softehl.cases.seal.telling import Teller
+from softehl.cases.seal.transient import March, Reading
 from softehl.runtime.io import read_csv, read_json
 from tests.cases.test_cli import film_state
 
@@ -27,6 +30,15 @@ def row(speed: float, film: float, verdict: str = OK, sealed_pressure: float = 1
     state = film_state(ORing(sealed_pressure=sealed_pressure), speed, verdict)
     leak = math.pi * RADIUS * speed * film * 1e-3
     return replace(FilmRow.part_of(state), h_star_um=film, leak_rate_mm3_s=leak)
+
+
+def test_an_outstroke_leaves_the_film_that_its_flux_has() -> None:
+    """The flux is U h* / 2, and h* stays on the rod; an instroke leaves nothing."""
+    of = cast("March", SimpleNamespace(_fastest=100.0))
+    for speed, left in ((80.0, pytest.approx(3e-3)), (-80.0, None)):
+        flux = 0.5 * speed * 3e-3
+        at = cast("Reading", SimpleNamespace(rod_speed_mm_s=speed, flux_air_mm2_s=flux))
+        assert March.left(of, at) == left
 
 
 def test_net_leakage_is_the_difference_of_the_two_films() -> None:
