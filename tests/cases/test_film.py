@@ -122,12 +122,6 @@ def test_where_it_gives_up_newton_goes_on(
         assert a.h_star_um == pytest.approx(b.h_star_um, rel=1e-8)
 
 
-def test_a_section_that_is_free_to_roll_takes_the_monolithic_route() -> None:
-    parameters = {"density": 1, "sealed_pressure": 0.6, "stroke": "out", "speeds": (6400.0,)}
-    outcome = run(oring(rotation="free", shear_traction=False, **parameters), Recorder())
-    assert {s.method for s in outcome.stages} == {"newton"}
-
-
 def test_a_film_that_ends_at_a_wall_leaves_no_multiplier_undetermined() -> None:
     """Above three shear moduli the arc reaches the wall; the rest of the section is condensed."""
     system = build_system(ORing(density=1))

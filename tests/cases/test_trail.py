@@ -56,7 +56,7 @@ def test_nothing_is_known_before_a_path_and_nothing_gained_at_the_pressure_itsel
 
 
 def test_contact_above_three_shear_moduli_is_not_walked_from_rest_on_every_mesh() -> None:
-    """And states on the way are rough, the last one is not."""
+    """189 factorisations; from rest on each of the four meshes it is more than 4 times 93."""
     p = ORing(
         inner_diameter=69.215,
         section_diameter=5.334,
@@ -73,11 +73,7 @@ def test_contact_above_three_shear_moduli_is_not_walked_from_rest_on_every_mesh(
     driver = PathDriver(Silent())
     found = ContactRoute(PathSettings(), driver.follow).contact(p)
     assert not isinstance(found, StageFailed)
-    assert sum(record.name == "squeeze" for record in driver.records) == 1
+    assert sum(record.factorisations or 0 for record in driver.records) < 250
     system, x = found
     problem = contact_problem(system, PathSettings(), p.sealed_pressure)
     assert problem.norm(problem.residual(x)) < 1e-8
-    ways = [record for record in driver.records if record.name == "sealed pressure"]
-    rough = [way.residual_histories[-1][-1] for way in ways[::2]]
-    assert 1e-8 < max(rough) <= 1e-3
-    assert max(way.residual_histories[-1][-1] for way in ways[1::2]) < 1e-7
