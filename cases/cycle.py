@@ -253,7 +253,7 @@ class CycleCase(Case[Cycle, CycleRow]):
         names, last = rows[-1].file_names(), [*loops.values()][-1]
         film, outline = (read_table(folder / names[k]) for k in (1, 3))
         with matplotlib.rc_context(STYLE):
-            save(loop_figure(loops), folder / PICTURES[0], kinds)
+            save(loop_figure(loops, [row.energy_mJ for row in rows]), folder / PICTURES[0], kinds)
             save(map_figure(film, last), folder / PICTURES[1], kinds)
             if parameters.animation:
                 write_animation(folder / ANIMATION, parameters, film, last, outline)

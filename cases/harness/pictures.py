@@ -61,7 +61,12 @@ def draw_columns(
     save(figure, stem, kinds)
 
 
+_UNITS = frozenset(("mm", "mm2", "mm3", "um", "MPa", "N", "s", "mJ", "percent"))
+
+
 def titled(name: str) -> str:
-    """The title of a column: `p_MPa` is p [MPa], `flux_mm2_s` is flux [mm2/s]."""
-    quantity, _, unit = name.partition("_")
-    return f"{quantity} [{unit.replace('_', '/').replace('um', 'µm')}]"
+    """The title of a column: `p_MPa` is p [MPa], `flux_air_mm2_s` is flux air [mm2/s]."""
+    parts = name.split("_")
+    first = next((k for k, part in enumerate(parts[1:], 1) if part in _UNITS), len(parts))
+    quantity, unit = " ".join(parts[:first]), "/".join(parts[first:])
+    return f"{quantity} [{unit.replace('um', 'µm')}]" if unit else quantity

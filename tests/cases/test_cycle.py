@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,10 @@ from PIL import Image
 from pydantic import ValidationError
 
 import softehl
-from softehl.cases.cycle import CASE, Cycle
+from softehl.cases.cycle import CASE, Cycle, cycle_row
+from softehl.cases.harness.pictures import titled
 from softehl.cases.seal import cycles
+from softehl.cases.seal.cycles import Films
 from softehl.cases.seal.motion import Motion, RodFilm, Table, differences
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.report.cycle import (
@@ -24,11 +26,11 @@ from softehl.cases.seal.report.cycle import (
     film_map,
     loop_figure,
     map_figure,
-    work_mJ,
     write_animation,
 )
 from softehl.cases.seal.strip import Oil, Strip
 from softehl.cases.seal.system import FILM, PRESSURE, SQUEEZE, VOID
+from softehl.cases.seal.transient import Reading
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, read_table
 from softehl.runtime.solve.newton import Newton
@@ -317,15 +319,35 @@ def test_the_map_of_a_film_has_a_line_for_every_time() -> None:
     assert speed.get_ylim() == axes.get_ylim()
 
 
-def test_the_loop_says_what_a_cycle_costs() -> None:
-    _, loop = film_and_loop(times=901)
-    way = float(np.trapezoid(abs(loop["rod_speed_mm_s"]), loop["t_s"]))
-    assert work_mJ(loop) == pytest.approx(2.0 * way, rel=1e-3)
-    (axes,) = loop_figure({"cycle = 1": loop}).axes
+def _reading(t: float, place: float, speed: float, friction: float) -> Reading:
+    names = {field.name: 1.0 for field in fields(Reading)}
+    known = {"t_s": t, "place_mm": place, "rod_speed_mm_s": speed, "friction_N": friction}
+    return Reading(**{**names, **known, "iterations": 1})  # type: ignore[arg-type]
+
+
+def test_the_loop_closes_and_costs_what_the_table_says() -> None:
+    # two strokes of 2 mm at 1 mm/s against 2 N; the first step is half of the outstroke
+    out = [_reading(t, t, 1.0, 2.0) for t in (0.0, 1.0, 2.0)]
+    back = [_reading(t, 4.0 - t, -1.0, -2.0) for t in (2.0, 3.0, 4.0)]
+    films = Films(readings=[*out[1:], *back])
+    row = cycle_row(1, 1.0, films, out[0], None)
+    assert row.energy_mJ == pytest.approx(8.0)
+    loop = {name: np.array([getattr(r, name) for r in films.readings]) for name in asdict(out[0])}
+    loops = {"cycle = 1": loop, "cycle = 2": loop}
+    (axes,) = loop_figure(loops, [row.energy_mJ, row.energy_mJ]).axes
+    _, second, _ = axes.lines
+    place, friction = second.get_data()
+    assert place[0] == place[-1] == 0.0
+    assert len(friction) == len(loop["t_s"]) + 1
     legend = axes.get_legend()
     assert legend is not None
-    (text,) = legend.get_texts()
-    assert f"{work_mJ(loop):.4g} mJ" in text.get_text()
+    assert [text.get_text() for text in legend.get_texts()] == [f"{k}: 8 mJ" for k in loops]
+
+
+def test_titles_part_quantity_and_unit() -> None:
+    titles = {"p_MPa": "p [MPa]", "h_um": "h [µm]", "place_mm": "place [mm]", "x": "x"}
+    titles |= {"flux_mm2_s": "flux [mm2/s]", "flux_air_mm2_s": "flux air [mm2/s]"}
+    assert {name: titled(name) for name in titles} == titles
 
 
 def test_an_animation_moves(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.integrate import trapezoid
 
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
@@ -35,28 +34,27 @@ _MARKS = (0.6, 0.12, 8)
 _PLACE = "place of the rod [mm]   (+ = to the air side)"
 
 
-def loop_figure(loops: Mapping[str, Table]) -> Figure:
+def loop_figure(loops: Mapping[str, Table], work: Sequence[float]) -> Figure:
     """Friction on the rod over its place, a line a cycle, with the work it takes.
 
-    loops: label -> readings of a cycle.
+    loops: label -> readings of a cycle, one cycle after the other. A line begins with the last
+    reading of the cycle before. work: mJ, of each cycle, as in curve.csv.
     """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.4, 3.6), layout="constrained")
     axes = figure.subplots()
-    for number, (label, loop) in enumerate(loops.items()):
+    begun: list[Array] = [np.empty(0), np.empty(0)]
+    for number, ((label, loop), energy) in enumerate(zip(loops.items(), work, strict=True)):
         shade = 0.25 + 0.75 * (number + 1) / len(loops)
-        words = f"{label}: {work_mJ(loop):.4g} mJ"
-        axes.plot(loop["place_mm"], loop["friction_N"], color="#1b6ca8", alpha=shade, label=words)
+        columns = [loop["place_mm"], loop["friction_N"]]
+        line = [np.concatenate(pair) for pair in zip(begun, columns, strict=True)]
+        axes.plot(*line, color="#1b6ca8", alpha=shade, label=f"{label}: {energy:.4g} mJ")
+        begun = [column[-1:] for column in columns]
     axes.axhline(0.0, color="0.4", linewidth=0.7)
     axes.set(xlabel=_PLACE, ylabel="friction on the rod [N]")
     axes.legend(title="work of a cycle")
     return figure
-
-
-def work_mJ(loop: Table) -> float:
-    """Work of friction along the readings of a cycle."""
-    return float(trapezoid(loop["friction_N"] * loop["rod_speed_mm_s"], loop["t_s"]))
 
 
 def film_map(film: Table) -> tuple[Array, Array, Array, Array]:
