@@ -11,6 +11,7 @@ import numpy as np
 from softehl.cases.seal.layout import Layout, dam_nodes, moved_dams
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.sections.files import finer as divided
+from softehl.cases.seal.sections.keys import lobes
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.outline_mesh import outline_mesh
@@ -70,7 +71,8 @@ class OutlineLayout:
 
     def before_groove(self, mesh: SectionMesh) -> int:
         """See `Layout`: as `lowest`, of the first lobe."""
-        return min(self._node(mesh, self._lobes(mesh)[0]), self.lowest(mesh))
+        last = self.lowest(mesh)
+        return last if lobes(self.shape) < 2 else min(self._node(mesh, self._lobes(mesh)[0]), last)
 
     def _node(self, mesh: SectionMesh, place: float) -> int:
         """The arc node nearest to a place, mm."""

@@ -520,3 +520,23 @@ def test_the_films_of_a_rectangle_and_of_an_x_ring() -> None:
 def test_the_inlet_of_a_section_with_two_lobes_needs_more_segments() -> None:
     assert fewest_inlet_segments("fe", 4, lobes=2) == 2.0 * fewest_inlet_segments("fe", 4)
     assert fewest_inlet_segments("dg", 1, lobes=2) == fewest_inlet_segments("dg", 1)
+
+
+PEAKS: dict[str, dict[str, Any]] = {
+    "round": {},
+    "rectangular": {"groove_width": 4.6},
+    "x_ring": X_RING,
+    "d_ring": {"groove_width": 4.6},
+    "trapezoid": {"groove_width": 5.2},
+    "u_cup": {"groove_width": 6.0, "sealed_pressure": 8.0},
+}
+
+
+@pytest.mark.parametrize(
+    "section",
+    [pytest.param(s, marks=[pytest.mark.slow] if s == "x_ring" else []) for s in SECTIONS],
+)
+def test_a_thin_film_presses_as_much_as_dry_contact(section: str) -> None:
+    given = {"section": section, "sealed_pressure": 2.0, **PEAKS[section]}
+    (state,) = _curve(**given, density=1, stroke="out", speeds=(100.0,)).states
+    assert state.contact_p_max_MPa == pytest.approx(state.p_max_MPa, rel=0.07)
