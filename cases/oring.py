@@ -20,7 +20,6 @@ from softehl.cases.seal.rubber import soft
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmRow
 from softehl.cases.seal.telling import Teller
-from softehl.cases.seal.verdict import LARGEST_ERROR
 
 
 class ORingCase(Case[ORing, FilmRow]):
@@ -99,10 +98,6 @@ class ORingCase(Case[ORing, FilmRow]):
         """See :class:`Case`."""
         found = plan.doubts(rows, advice)
         doubts = [f"{words}: {self.named(some)}" for words, some in found.items()]
-        loose = [row for row in rows if abs(row.rod_friction_error_percent) > LARGEST_ERROR]
-        if loose:
-            words = f"friction not known to {LARGEST_ERROR:g} %"
-            doubts.append(f"{words}: {self.named(loose)}; {plan.FINER}")
         thin = [row for row in rows if not row.regime and row.h_min_um < plan.THIN]
         if not thin:
             return doubts

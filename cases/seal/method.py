@@ -65,8 +65,8 @@ def run(
         return _outcome(found[0], driver, states, failures)
 
     def report(state: FilmState) -> None:
-        states.append(state)
-        observer.film_state(state)
+        states.append(state.settled)
+        observer.film_state(states[-1])
 
     strokes: tuple[Stroke, ...] = ("out", "in")
     for stroke in strokes if parameters.stroke == "both" else (parameters.stroke,):

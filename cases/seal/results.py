@@ -101,7 +101,20 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         **rough_numbers(system, at),
         contacts=_contacts(at, (z, h), parts, film, level) if len(parts) > 1 else (),
         drag=drag,
+        beyond=_beyond(system, film, x, flow, h_star) / abs(friction),
     )
+
+
+def _beyond(system: SealSystem, film: FilmLoads, x: Array, flow: float, h_star: float) -> float:
+    """Friction (N) of the oil beyond the ends of the arc, as far as the section faces the rod.
+
+    flow: eta |U|, N/mm. Before the inlet oil fills the gap; behind the exit its sliding counts.
+    """
+    behind = wedge(system, replace(film, stroke="in" if film.stroke == "out" else "out"), x)
+    friction = abs(wedge_friction(system, *behind, flow, h_star)[0])
+    if not film.entrance:
+        friction += abs(wedge_friction(system, *wedge(system, film, x), flow, h_star)[1])
+    return friction
 
 
 def film_parts(h: Array, level: float = CONTACT_FILM) -> list[slice]:

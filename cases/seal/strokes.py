@@ -8,12 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from math import nan
 from typing import TypeAlias
 
 from softehl.cases.seal.contact_results import contact_peaks, contact_pressure, unsealed
 from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.estimate import coarser_density, estimated_error, finer_density
+from softehl.cases.seal.estimate import (
+    coarser_density,
+    estimated_error,
+    finer_density,
+    reservation,
+)
 from softehl.cases.seal.film_path import BuiltFilm, FilmPath, OnSpeed, below
 from softehl.cases.seal.film_transfer import (
     FilmTransfer,
@@ -234,11 +240,16 @@ class SealRun:
         wants_error = p.error_estimate and p.mesh == "graded"
 
         def judged(other: FilmNumbers | None, *, finer: bool = False) -> FilmState:
-            error, friction = _errors(p.density, last, other, finer=finer)
+            at = finer_density(p.density) if finer else coarser_density(p.density)
+            error, friction = _errors(p.density, last, other, at)
             told = replace(verdict, last=last, error=error if wants_error else None)
-            state = film_state(system, problem, film, x, told, iterations)
-            state = replace(state, h_star_error_percent=error, rod_friction_error_percent=friction)
-            if p.sensitivity and resolved(state) and not film.entrance:
+            state = replace(
+                film_state(system, problem, film, x, told, iterations),
+                h_star_error_percent=error,
+                rod_friction_error_percent=friction,
+                reservation=reservation(p, last, other, at),
+            )
+            if p.sensitivity and resolved(state.settled) and not film.entrance:
                 state = replace(state, sensitivity=self._differentiated(film, x))
             return state
 
@@ -285,12 +296,11 @@ class SealRun:
 
 
 def _errors(
-    density: int, film: FilmNumbers, other: FilmNumbers | None, *, finer: bool
+    density: int, film: FilmNumbers, other: FilmNumbers | None, at: Fraction
 ) -> tuple[float, float]:
-    """Estimated errors of h* and of friction, %, from the film of a coarser mesh or a finer one."""
+    """Estimated errors of h* and of friction, %, from the film of a mesh of another density."""
     if other is None:
         return nan, nan
-    at = finer_density(density) if finer else coarser_density(density)
     return (
         estimated_error(density, film.h_star, other.h_star, at),
         estimated_error(density, film.friction, other.friction, at),

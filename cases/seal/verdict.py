@@ -92,7 +92,8 @@ class FilmNumbers:
     over sigma, nan between smooth surfaces. asperity_load, boundary_friction: shares of asperities.
     contacts: from the sealed side on, where there are several; h_star is then that of the first one
     on the way of the oil that has a peak of its own. drag: the part of the friction that is not of
-    the slope of the pressure.
+    the slope of the pressure. beyond: friction of the oil beyond both ends of the arc, which it
+    does not have, relative to it.
     """
 
     speed: float
@@ -115,6 +116,7 @@ class FilmNumbers:
     boundary_friction: float = 0.0
     contacts: tuple[ContactNumbers, ...] = ()
     drag: float = nan
+    beyond: float = 0.0
 
     @property
     def mismatch(self) -> float:
