@@ -17,6 +17,7 @@ from softehl.cases.seal.report.section import boundary_edges
 from softehl.cases.seal.state import (
     COLLAPSED,
     OSCILLATING,
+    UNCERTAIN,
     UNDER_RESOLVED,
     ContactState,
     FilmState,
@@ -84,7 +85,7 @@ def test_every_requested_state_converges_and_is_told(default: tuple[Outcome, Rec
 def test_states_of_a_coarse_mesh_are_labelled(default: tuple[Outcome, Recorder]) -> None:
     """Density 2: outstroke is sound, instroke oscillates, its slow end has too short an inlet."""
     out, back = default[0].states[:5], default[0].states[5:]
-    assert [s.verdict for s in out] == [OK] * 5
+    assert [s.verdict for s in out] == [UNCERTAIN] * 5  # sound, but nothing says how accurate
     assert [s.verdict for s in back[-3:]] == [OSCILLATING, OSCILLATING, UNDER_RESOLVED]
     assert max(s.oscillation_index for s in out) < 0.2 < back[2].oscillation_index
     for states in (out, back):  # the inlet shortens as the film thins
