@@ -24,8 +24,8 @@ OSCILLATING = "oscillating"
 CLIPPED = "clipped"
 """Verdict of a state whose arc ends within its film: the inlet may be cut off."""
 UNCERTAIN = "uncertain"
-"""Verdict of a state whose estimated error is too large, or is not known though it was wanted, or is
-small where two meshes do not show it."""
+"""Verdict of a state whose estimated error is too large, or is not known though it was wanted, or
+is small where two meshes do not show it."""
 
 Section = Cells
 """A deformed section: points are (z, r)."""

@@ -97,7 +97,9 @@ def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
     assert outcome.converged
     assert h == pytest.approx([0.5953, 0.2581], rel=5e-3)
     assert [state.verdict for state in outcome.states] == ["ok", "ok"]
-    uniform = _curve(mesh="uniform", error_estimate=False, density=2, stroke="out", speeds=(100.0, 25.0))
+    uniform = _curve(
+        mesh="uniform", error_estimate=False, density=2, stroke="out", speeds=(100.0, 25.0)
+    )
     assert [state.verdict for state in uniform.states] == ["ok", "under-resolved"]
 
 
