@@ -91,7 +91,7 @@ def friction_bound(
 ) -> float:
     """Largest error of friction, %, by its two parts on two meshes; see `estimated_error`."""
     parts = [(k.drag, k.friction - k.drag) for k in (film, other)]
-    apart = sum(abs(a - b) for a, b in zip(*parts, strict=True))
+    apart = math.fsum(abs(a - b) for a, b in zip(*parts, strict=True))
     return abs(_percent(density, at)) * apart / abs(film.friction)
 
 

@@ -336,7 +336,7 @@ def test_the_loop_closes_and_costs_what_the_table_says() -> None:
     loops = {"cycle = 1": loop, "cycle = 2": loop}
     (axes,) = loop_figure(loops, [row.energy_mJ, row.energy_mJ]).axes
     _, second, _ = axes.lines
-    place, friction = second.get_data()
+    place, friction = (np.asarray(values) for values in second.get_data())
     assert place[0] == place[-1] == 0.0
     assert len(friction) == len(loop["t_s"]) + 1
     legend = axes.get_legend()

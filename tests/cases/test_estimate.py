@@ -5,7 +5,7 @@ from dataclasses import replace
 from fractions import Fraction
 from math import isnan, nan
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 import pytest
@@ -205,7 +205,7 @@ def test_where_coarser_films_mislead_the_path_is_followed(
 
 
 @pytest.mark.parametrize("density", [1, 2])
-def test_density_one_is_not_ok(density: int) -> None:
+def test_density_one_is_not_ok(density: Literal[1, 2]) -> None:
     # h* of density 1 is 2.3 % too small, and its estimate says 1 % too large
     (state,) = run(ORing(density=density, stroke="out", speeds=(60.0,)), Silent()).states
     assert state.verdict == (UNCERTAIN if density == 1 else OK)
@@ -243,7 +243,7 @@ def test_settings_whose_error_two_meshes_do_not_show(keys: dict[str, Any], words
     ],
 )
 def test_a_small_error_of_the_thickness_is_not_enough(
-    film: dict[str, float], other: dict[str, float], words: str
+    film: dict[str, Any], other: dict[str, Any], words: str
 ) -> None:
     said = reservation(ORing(), replace(NUMBERS, **film), replace(NUMBERS, **other))
     assert said.startswith(words) if words.startswith("friction") else words in said

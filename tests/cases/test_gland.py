@@ -19,7 +19,14 @@ from softehl.cases.seal.grading import film_thickness
 from softehl.cases.seal.method import run
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.state import CLIPPED, COLLAPSED, UNDER_RESOLVED, Outcome, Silent
+from softehl.cases.seal.state import (
+    CLIPPED,
+    COLLAPSED,
+    UNCERTAIN,
+    UNDER_RESOLVED,
+    Outcome,
+    Silent,
+)
 from softehl.cases.seal.system import BORE, ROD
 from softehl.runtime.solve.solution import Branch, Status
 from tests.cases.gland_matrix import drawn
@@ -156,7 +163,8 @@ def test_an_inlet_that_is_cut_off_lacks_pressure() -> None:
         run(ORing(arc_start=a, arc_end=43.0, speeds=(400.0,), stroke="out"), Silent()).states[0]
         for a in (-34.0, -25.0)
     )
-    assert (whole.verdict, cut.verdict) == (OK, OK)
+    # its friction lacks what the oil before the arc adds
+    assert (whole.verdict, cut.verdict) == (OK, UNCERTAIN)
     assert cut.h_star_um / whole.h_star_um == pytest.approx(0.997, abs=0.002)
 
 
