@@ -183,7 +183,7 @@ class _View:
         found, exact = self.found(task), self.expected(task, self.page)
         scale = self.scales(task, exact)
         errors = [abs(a - b) / s for a, b, s in zip(found, exact, scale, strict=True)]
-        return max((x if math.isfinite(x) else math.inf for x in errors), default=0.0)
+        return max(map(finite, errors), default=0.0)
 
     def spread(self, task: str, other: Page) -> float:
         """Largest difference between the page and another evaluation of it, over the scale."""
@@ -301,6 +301,11 @@ class _View:
                 rows = [max(a, b) for a, b in zip(rows, sizes, strict=True)]
             self._rows = [max(r, FLOOR * max(rows)) or 1.0 for r in rows]
         return self._rows
+
+
+def finite(error: float) -> float:
+    """Not-a-number compares with nothing: make it the largest error."""
+    return error if math.isfinite(error) else math.inf
 
 
 def _double(v: Any) -> float:

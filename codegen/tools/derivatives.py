@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from decimal import localcontext
 from functools import wraps
-from typing import Any
+from typing import ParamSpec, TypeVar
 
 import mpmath
 
@@ -16,11 +16,15 @@ from softehl.codegen.tools.exact import Evaluation, Evaluator, Vector
 Along = Sequence[Sequence[float]]
 
 
-def _in_digits(function: Any) -> Any:
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def _in_digits(function: Callable[P, T]) -> Callable[P, T]:
     @wraps(function)
-    def inside(*args: Any) -> Any:
+    def inside(*args: P.args, **named: P.kwargs) -> T:
         with localcontext(CONTEXT), mpmath.workdps(DIGITS):
-            return function(*args)
+            return function(*args, **named)
 
     return inside
 

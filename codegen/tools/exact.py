@@ -307,7 +307,7 @@ class Evaluation:
             return self._with(s, q, unknowns, values, equations)
 
         found, inverse = self.solved.get((s.slot, q), ([row[a] for a in s.args], None))
-        changed = None
+        changed: Number = None
         for _ in range(ITERATIONS):
             inverse = inverse or _inverse(_slopes(residual, found, n.coarse))
             g = residual(found)

@@ -72,7 +72,7 @@ def written_out(path: Path, seconds: float = math.inf) -> dict[str, Definition]:
         return {}
 
 
-class _Over(BaseException):  # noqa: N818 (SymPy is not to catch it)
+class _Over(BaseException):
     """Time is over."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import softehl
-from softehl.codegen.tools import cli, library, location, model_text, user, verify
+from softehl.codegen.tools import cli, compare, library, location, model_text, user, verify
 from softehl.codegen.tools import files as cli_files
 from softehl.codegen.tools.build import DIGEST, LIBRARY
 from softehl.codegen.tools.model_text import ModelFileError
@@ -331,7 +331,7 @@ def test_derivatives_that_a_page_gives_itself_are_not_compared(
 
 def test_not_a_number_fails_the_check() -> None:
     assert cli_files._judge("it", {"tangent": float("inf")}) == 1
-    assert verify._finite(float("nan")) == float("inf")
+    assert compare.finite(float("nan")) == float("inf")
 
 
 def test_a_model_far_from_its_domain_says_what_to_give(capsys: pytest.CaptureFixture[str]) -> None:
