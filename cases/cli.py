@@ -6,11 +6,14 @@ What is heavy is imported when a command needs it.
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from softehl.cases.shipped import SHIPPED
+
+if TYPE_CHECKING:
+    from softehl.cases.harness.earlier import Existing
 
 _NAMES = ", ".join(SHIPPED)
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -32,8 +35,9 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
     help=f"""Run CASE, a TOML file or the name of a case that ships ({_NAMES}).
 
     Writes curve.csv, the files of its rows, plots and run.json to DIR, each state as soon as it is
-    there. `softehl keys CASE` lists what can be set. Exit code: 0 done, 2 bad input, 3 not
-    converged (what was reached is saved).
+    there. Without --out, --resume and --overwrite mean the folder that was written to last.
+    `softehl keys CASE` lists what can be set. Exit code: 0 done, 2 bad input, 3 not converged
+    (what was reached is saved).
     """
 )
 @click.argument("case", metavar="CASE")
@@ -44,7 +48,7 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
     multiple=True,
     help="Change a parameter; VALUE is a TOML value, a bare word is a string. Repeatable.",
 )
-@_into("Folder for the files, results/<case> if left out.")
+@_into("Folder for the files  [default: results/CASE, or results/CASE-2, ... if that is taken]")
 @click.option(
     "--tolerance",
     metavar="PERCENT",
@@ -105,8 +109,8 @@ def run(
             assignments = (*assignments, _by_petsc(case))
         read = read_case(case, SHIPPED, assignments, options)
         read = replace(read, pictures=CHOICES[pictures])
-        target = Path("results", read.case.name) if folder is None else folder
         existing = existing_of(resume=resume, overwrite=overwrite)
+        target = folder or _unnamed(read.case.name, existing)
         code = run_case(read, target, existing, jobs=jobs, quiet=quiet)
         if report:
             code = _report_of(target, code, quiet=quiet)
@@ -118,7 +122,7 @@ def run(
 @click.option(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
 )
-@_into("Folder for table, pictures and runs, results/<name of the study> if left out.")
+@_into("Folder for table, pictures and runs  [default: results/STUDY, results/STUDY-2, ...]")
 @click.option("--resume", is_flag=True, help="Keep the runs that DIR has and run the others.")
 @click.option("--overwrite", is_flag=True, help="Begin anew in a DIR that holds a sweep.")
 @_jobs("N runs side by side, in a process each.")
@@ -148,8 +152,8 @@ def sweep(
     from softehl.cases.harness.sweep_record import SweepRecord
 
     read = read_study(study, SHIPPED, assignments)
-    target = Path("results", Path(study).stem) if folder is None else folder
     existing = existing_of(resume=resume, overwrite=overwrite)
+    target = folder or _unnamed(Path(study).stem, existing)
     return sweep_study(SweepRecord(target, read, existing), Workers(jobs, dask, mpi), quiet=quiet)
 
 
@@ -173,6 +177,16 @@ def report_runs(folders: tuple[Path, ...], out: Path | None, xlsx: bool) -> int:
     """
     _write_report(folders, out or folders[0] / "report.html", xlsx=xlsx, quiet=False)
     return 0
+
+
+def _unnamed(name: str, existing: "Existing") -> Path:
+    """The folder of results for a run of this name; which, is said where it is not the first."""
+    from softehl.cases.harness.folders import unnamed_folder
+
+    folder, word = unnamed_folder(Path("results", name), existing)
+    if word:
+        click.echo(word, err=True)
+    return folder
 
 
 def _report_of(folder: Path, code: int, *, quiet: bool) -> int:
