@@ -19,6 +19,7 @@ from softehl.cases.seal.assumed import assumed
 from softehl.cases.seal.idle import idle
 from softehl.cases.seal.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.reach import beyond_reach, reach
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
 
@@ -199,7 +200,8 @@ class CycleCase(Case[Cycle, CycleRow]):
 
     def warnings(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
-        words = [*idle(parameters), *unused(parameters)]
+        highest = parameters.path.pressure.largest
+        words = [*beyond_reach(parameters, highest), *idle(parameters), *unused(parameters)]
         if parameters.rough:
             return words
         return [
@@ -207,6 +209,10 @@ class CycleCase(Case[Cycle, CycleRow]):
             "between smooth surfaces a reversal squeezes the film to nanometres; give a roughness "
             "(rms of the seal in um, 0.2 to 0.4 is usual)",
         ]
+
+    def foreword(self, parameters: Cycle) -> list[str]:
+        """See :class:`Case`."""
+        return reach(parameters, parameters.path.pressure.largest)
 
     def requested(self, parameters: Cycle) -> list[float]:
         """See :class:`Case`."""

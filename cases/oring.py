@@ -14,6 +14,7 @@ from softehl.cases.seal.assumed import assumed
 from softehl.cases.seal.idle import idle
 from softehl.cases.seal.leakage import net_leakage
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.reach import beyond_reach, reach
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.rubber import soft
@@ -90,7 +91,12 @@ class ORingCase(Case[ORing, FilmRow]):
         """See :class:`Case`."""
         p = parameters
         gland = p.rod_diameter, p.housing_diameter, p.groove_width
-        return [*idle(p), *soft(p), *catalogue.warnings(p.free_ring, *gland)]
+        advised = catalogue.warnings(p.free_ring, *gland)
+        return [*beyond_reach(p, p.sealed_pressure), *idle(p), *soft(p), *advised]
+
+    def foreword(self, parameters: ORing) -> list[str]:
+        """See :class:`Case`."""
+        return reach(parameters, parameters.sealed_pressure)
 
     def notes(
         self, rows: Sequence[FilmRow], advice: Mapping[float, str] = MappingProxyType({})

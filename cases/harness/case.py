@@ -99,6 +99,10 @@ class Case(Generic[P, R]):
         """What is unusual about a run before it begins; it runs all the same."""
         return []
 
+    def foreword(self, parameters: P) -> list[str]:
+        """What a user should know of a run before it begins, a line each."""
+        return []
+
     def notes(
         self, rows: Sequence[R], advice: Mapping[float, str] = MappingProxyType({})
     ) -> list[str]:

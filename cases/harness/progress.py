@@ -1,7 +1,7 @@
 """What the user sees while a case runs: a bar on a terminal, plain lines elsewhere, or nothing."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
@@ -23,7 +23,13 @@ _LINES = 10.0  # seconds between lines where there is no terminal
 
 
 class Display:
-    """Shows the stages of one or more workers (runs side by side); this one shows nothing."""
+    """Shows the stages of one or more workers (runs side by side); this one shows nothing.
+
+    foreword: lines that are shown before the first stage.
+    """
+
+    def __init__(self, foreword: Sequence[str] = ()) -> None:
+        self._foreword = list(foreword)
 
     def __enter__(self) -> Self:
         """Start showing."""
@@ -39,6 +45,12 @@ class Display:
 
     def stage(self, worker: str, title: str) -> None:
         """A stage begins in a worker."""
+        for line in self._foreword:
+            self.say(line)
+        self._foreword.clear()
+
+    def say(self, line: str) -> None:
+        """Show a line of its own."""
 
     def step(self, worker: str, text: str, fraction: float | None) -> None:
         """A step converged; fraction: share of the stage done in [0, 1], if known."""
@@ -52,17 +64,23 @@ class Lines(Display):
 
     def stage(self, worker: str, title: str) -> None:
         """See :class:`Display`."""
-        click.echo(title, err=True)
+        super().stage(worker, title)
+        self.say(title)
+
+    def say(self, line: str) -> None:
+        """See :class:`Display`."""
+        click.echo(line, err=True)
 
     def state(self, row: Row) -> None:
         """See :class:`Display`."""
-        click.echo(f"  {row.line}", err=True)
+        self.say(f"  {row.line}")
 
 
 class Bars(Display):
     """A bar for each worker with stage and step, on stderr."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, foreword: Sequence[str] = ()) -> None:
+        super().__init__(foreword)
         self._progress = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=24),
@@ -89,6 +107,7 @@ class Bars(Display):
 
     def stage(self, worker: str, title: str) -> None:
         """See :class:`Display`."""
+        super().stage(worker, title)
         if worker in self._tasks:
             self._progress.remove_task(self._tasks[worker])
         self._tasks[worker] = self._progress.add_task(title, total=None, count=0, text="")
@@ -107,9 +126,13 @@ class Bars(Display):
             text=text,
         )
 
+    def say(self, line: str) -> None:
+        """See :class:`Display`."""
+        self._progress.console.print(line, highlight=False, markup=False)
+
     def state(self, row: Row) -> None:
         """See :class:`Display`."""
-        self._progress.console.print(f"  {row.line}", highlight=False, markup=False)
+        self.say(f"  {row.line}")
 
 
 @contextmanager
@@ -134,9 +157,9 @@ def make_counter(done: int, total: int) -> Iterator[Callable[[], None]]:
         yield count
 
 
-def make_display(*, quiet: bool) -> Display:
+def make_display(foreword: Sequence[str] = (), *, quiet: bool) -> Display:
     """The display that fits where stderr goes."""
     if quiet:
         return Display()
     console = Console(stderr=True)
-    return Bars(console) if console.is_terminal else Lines()
+    return Bars(console, foreword) if console.is_terminal else Lines(foreword)

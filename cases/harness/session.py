@@ -40,7 +40,7 @@ def run_case(run: Run, folder: Path, existing: Existing, *, jobs: int, quiet: bo
             click.echo(f"softehl: {doubt}", err=True)
         for warning in () if quiet else run.case.warnings(run.parameters):
             click.echo(f"softehl: {warning}", err=True)
-        with make_display(quiet=quiet) as display:
+        with make_display(run.case.foreword(run.parameters), quiet=quiet) as display:
             complaints = compute(record, jobs=jobs, display=display)
         with writing(folder):
             return _finish(record, complaints, quiet=quiet)

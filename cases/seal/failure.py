@@ -25,8 +25,8 @@ _EXTRUSION = (
     "harder rubber (mu_1, mu_2)"
 )
 _FILM = (
-    "the film is hardest to build on the instroke at p_s above twice the shear modulus; try a "
-    "finer mesh (larger density), a lower sealed_pressure or a harder rubber"
+    "films are hard to find at this sealed pressure, {:.2g} times the shear modulus; try a finer "
+    "mesh (larger density), a lower sealed_pressure or a harder rubber"
 )
 _ARC = (
     "part of it may be beyond the given arc, {:g} to {:g} degrees; leave arc_start and arc_end out"
@@ -80,7 +80,8 @@ def _film_advice(failed: StageFailed, p: ORing) -> str:
         return failed.advice
     if p.given_arc:
         return _ARC.format(*p.given_arc)
-    return _FILM if p.sealed_pressure > _HIGH * p.shear_modulus else _THICK
+    times = p.sealed_pressure / p.shear_modulus
+    return _FILM.format(times) if times > _HIGH else _THICK
 
 
 def _ring(p: ORing) -> str:

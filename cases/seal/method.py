@@ -73,7 +73,7 @@ def run(
         wanted = Wanted(report, parameters.speeds, observer.film_draft)
         failed, seal = seal.on_meshes(stroke, wanted)
         if failed is not None:
-            failures.append(explained(failed, f"stroke {stroke}", parameters))
+            failures.append(explained(failed, f"{stroke}stroke", parameters))
     numbers = contact_numbers(seal.system, seal.x)
     return _outcome(seal.system, driver, states, failures, numbers)
 

@@ -378,7 +378,20 @@ def test_a_run_writes_its_files(here: Path, invoke: Invoke) -> None:
     assert any("h*" in line and "friction" in line for line in out)
     assert sum("ok" in line for line in out) == 4
     assert out[-1] == "written to results/oring"
-    assert err[0] == "contact, p_s = 1 MPa, stroke both"
+    assert err[0].startswith("sealed pressure / shear modulus = 0.27: every film of a sample")
+    assert err[1] == "contact, p_s = 1 MPa, stroke both"
+
+
+def test_a_pressure_that_is_not_known_to_run_is_warned_of_first(here: Path, invoke: Invoke) -> None:
+    keys = ("--set", "sealed_pressure=160 bar", "--set", "shore_A=70")
+    _, _, err = invoke("run", "oring", *FAST, *keys)
+    assert err[0].startswith("softehl: sealed pressure / shear modulus = 8.7: ")
+    assert "nothing was tried above 5.4" in err[0]
+    assert "a harder rubber or a lower pressure helps" in err[0]
+    assert run_json(here / "results" / "oring")["warnings"] == [err[0].removeprefix("softehl: ")]
+    ring = ("--set", "section=x_ring", "--set", "groove_width=4.3")
+    _, _, err = invoke("run", "oring", *FAST, *ring, "--set", "sealed_pressure=4")
+    assert "modulus = 1.1: sections other than round were tried up to 2" in " ".join(err)
 
 
 def test_a_run_says_what_it_assumed(here: Path, invoke: Invoke) -> None:

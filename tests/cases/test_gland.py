@@ -90,7 +90,7 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        ({"sealed_pressure": 7.0}, "above twice the shear modulus"),
+        ({"sealed_pressure": 7.0}, "at this sealed pressure, 1.9 times the shear modulus"),
         ({"sealed_pressure": 0.5}, "lower speeds or a thinner oil"),
         ({"arc_start": -20.0, "arc_end": 20.0}, "beyond the given arc, -20 to 20 degrees"),
     ],
@@ -100,7 +100,10 @@ def test_a_film_that_is_not_found_is_told_why(given: dict[str, Any], says: str) 
     system = build_system(p.model_copy(update={"mesh": "uniform", "density": 1}))
     stage = replace(squeeze_stage(system, PathSettings()), name="contact to film")
     failed = StageFailed(stage, Branch((), Status.DIVERGED, ""))
-    assert says in explained(failed, "stroke in", p)[1]
+    words = explained(failed, "outstroke", p)[1]
+    assert words.startswith("outstroke: ")
+    assert says in words
+    assert "instroke" not in words
 
 
 def test_a_ring_that_overfills_its_gland_is_warned_of() -> None:

@@ -189,7 +189,7 @@ def test_a_collapsed_film_is_labelled_and_the_end_of_its_path_named() -> None:
     assert [(s.rod_speed_mm_s, s.verdict) for s in outcome.states] == [(-1600.0, COLLAPSED)]
     assert outcome.status is Status.STEP_TOO_SMALL
     found = re.search(
-        r"stroke in: falling speed -50 was not reached, only -([\d.]+)", outcome.message
+        r"instroke: falling speed -50 was not reached, only -([\d.]+)", outcome.message
     )
     assert found is not None
     assert 665.0 < float(found[1]) < 675.0
