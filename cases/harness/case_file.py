@@ -27,7 +27,7 @@ Shipped = Mapping[str, str]
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _FILE = re.compile(r"(\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./-]*\.[A-Za-z]{1,5}")
-_PHRASE = re.compile(r"[A-Za-z]\w*( [A-Za-z0-9][A-Za-z0-9.,]*)+( ?%)?", re.ASCII)
+_PHRASE = re.compile(r"[A-Za-z][\w-]*( [A-Za-z0-9][A-Za-z0-9.,-]*)+( ?%)?", re.ASCII)
 _SHOWN = 60
 _LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end
 

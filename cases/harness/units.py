@@ -22,7 +22,10 @@ _KINDS = {
         **{"mm/s": 1.0, "m/s": 1e3, "cm/s": 10.0, "um/s": 1e-3, "µm/s": 1e-3},
         **{"mm/min": 1.0 / 60.0, "m/min": 1e3 / 60.0, "in/s": 25.4},
     },
-    "MPa s": {"MPa s": 1.0, "Pa s": 1e-6, "mPa s": 1e-9, "cP": 1e-9, "P": 1e-7},
+    "MPa s": {
+        **{"MPa s": 1.0, "Pa s": 1e-6, "mPa s": 1e-9, "cP": 1e-9, "P": 1e-7},
+        **{"MPas": 1.0, "Pas": 1e-6, "mPas": 1e-9},
+    },
     "1/MPa": {"1/MPa": 1.0, "1/GPa": 1e-3, "1/Pa": 1e6, "1/bar": 10.0},
     "degrees": {"degrees": 1.0, "degree": 1.0, "deg": 1.0, "°": 1.0},
     "%": {"%": 1.0, "percent": 1.0},
@@ -32,6 +35,7 @@ _KINDS = {
     "kg/m3": {"kg/m3": 1.0, "kg/m^3": 1.0, "kg/m³": 1.0, "g/cm3": 1e3, "g/ml": 1e3, "kg/l": 1e3},
 }
 
+_TOLERANCE_CLASS = re.compile(r"[A-Za-z]{1,2} ?\d{1,2}")  # of ISO 286, as f7
 _KINEMATIC = ("cSt", "St", "mm2/s", "mm^2/s", "mm²/s", "m2/s")
 
 
@@ -53,5 +57,10 @@ def read_quantity(text: str, unit: str) -> float:
         raise ValueError(
             f'"{text}" is a kinematic viscosity; the dynamic one is meant, which is it times the '
             'density: of an oil of 870 kg/m3, 46 cSt are "40 mPa s"'
+        )
+    if found and unit == "mm" and _TOLERANCE_CLASS.fullmatch(given):
+        raise ValueError(
+            f'"{text}" is a size with a tolerance class, which is not read; write the size alone, '
+            f'"{found[1]} mm"'
         )
     raise ValueError(f'"{text}" is no number in {unit}; units: {", ".join(known)}')

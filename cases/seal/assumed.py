@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator
 
 from softehl.cases.seal import materials
 from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.rubber import shore_band
 from softehl.cases.seal.sections.keys import ROUND, dimensions
 
 _RUBBER = {"fit", "shore_A"}.union(*(m.keys for m in materials.MATERIALS.values()))
@@ -25,7 +26,13 @@ def _ring(p: ORing, said: frozenset[str]) -> Iterator[str]:
         yield f"the usual proportions of section {p.section}"
     if not said & {"ring", "inner_diameter"}:
         yield f"inner diameter {p.inner_diameter:g} mm"
-    if not said & _RUBBER:
+    if p.shore_A is not None:
+        low, high = shore_band(p.shore_A)
+        yield (
+            f"a shear modulus of {p.shear_modulus:.3g} MPa by hardness, known to {low:+.0f} and "
+            f"{high:+.0f} %"
+        )
+    elif not said & _RUBBER:
         yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
 
 
@@ -38,8 +45,12 @@ def _gland(p: ORing, said: frozenset[str]) -> Iterator[str]:
         "groove_width": (p.groove_width, {"gland"}),
     }
     unsaid = [k for k, (_, others) in sizes.items() if not said & {k, *others}]
+    if p.gland and not p.round:
+        unsaid = [k for k in sizes if k not in said]  # also where the gland was asked for by name
     if unsaid:
         kind = "its standard gland" if p.gland else "a gland"
+        if not p.round:
+            kind = f"the gland of an O-ring, as none is known for this {p.named}"
         yield f"{kind} ({', '.join(f'{k} = {sizes[k][0]:g} mm' for k in unsaid)})"
     if not said & {"backup", "extrusion_gap"}:
         yield "a back-up ring"

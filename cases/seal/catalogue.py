@@ -87,9 +87,10 @@ class Gland:
 
 
 def ring(name: str) -> Ring:
-    """The ring of a name: "AS568-226", "-226", "ISO 3601 50.4x3.55", "50.4 x 3.55".
+    """The ring of a name: "AS568-226", "-226", "50.4 x 3.55", also with "ISO 3601" or "DIN 3771".
 
-    An ISO ring has the tolerances of class B, for general use. Raises UnknownRingError.
+    A metric ring has the tolerances of ISO 3601-1, class B, for general use. Raises
+    UnknownRingError.
     """
     text = name.strip()
     if found := _DASH.fullmatch(text):
@@ -97,8 +98,10 @@ def ring(name: str) -> Ring:
     if found := _METRIC.fullmatch(text):
         inner, section = (float(found[k].replace(",", ".")) for k in ("inner", "section"))
         return _metric(text, inner, section)
+    sizes = re.findall(r"\d+(?:[.,]\d+)?", text)[-2:]
+    near = f' (did you mean "{sizes[0]}x{sizes[1]}"?)' if len(sizes) == 2 else ""
     raise UnknownRingError(
-        f'ring = "{name}" is not known; give a number, "AS568-226" ({_SERIES_TEXT}), '
+        f'ring = "{name}" is not known{near}; give a number, "AS568-226" ({_SERIES_TEXT}), '
         'or the diameters in mm, "ISO 3601 50.4x3.55"'
     )
 
@@ -114,9 +117,13 @@ def gland(section_diameter: float, kind: str = "dynamic") -> Gland:
         if abs(section_diameter - rule.section_diameter) <= 0.03 * rule.section_diameter:
             return rule
     known = ", ".join(f"{g.section_diameter:.2f}" for g in _GLANDS[kind])
+    near = min(_GLANDS[kind], key=lambda g: abs(g.section_diameter - section_diameter))
+    width = section_diameter * near.width.middle / near.section_diameter
+    taken = squeeze(near.section_diameter, near.depth.middle)
     raise UnknownGlandError(
         f'gland = "{kind}" has no groove for a section of {section_diameter:g} mm (only {known} '
-        "mm); give squeeze and groove_width instead"
+        "mm); give squeeze and groove_width instead: in the proportions of the nearest one, "
+        f"squeeze = {taken:.3g} and groove_width = {width:.3g}"
     )
 
 
@@ -180,12 +187,16 @@ def _row(row: dict[str, str]) -> Ring:
     )
 
 
-_DASH = re.compile(r"((AS\s?568[A-G]?|BS)[\s-]*|2-|-)?(?P<number>\d{1,3})", re.IGNORECASE)
+_DASH = re.compile(
+    r"(O-?ring\s+)?((AS\s?568[A-G]?|BS)[\s-]*|2-|-)?(?P<number>\d{1,3})", re.IGNORECASE
+)
+_STANDARD = r"(O-?ring|(DIN\s)?ISO\s?3601(-1)?|DIN\s?3771(-1)?)"
 _METRIC = re.compile(
-    r"""(ISO\s?3601(-1)?[\s-]+)?
+    rf"""({_STANDARD}[\s,-]+)*
     (?P<inner>\d+([.,]\d+)?)\s?(mm)?
     \s?[x\u00d7*]\s?
-    (?P<section>\d+([.,]\d+)?)(\s?mm)?""",
+    (?P<section>\d+([.,]\d+)?)(\s?mm)?
+    ([\s,-]+{_STANDARD})*""",
     re.IGNORECASE | re.VERBOSE,
 )
 _SERIES_TEXT = "-001 to -050, -102 to -178, -201 to -284, -309 to -395, -425 to -475"

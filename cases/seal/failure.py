@@ -87,7 +87,7 @@ def _film_advice(failed: StageFailed, p: ORing) -> str:
 def _ring(p: ORing) -> str:
     stretch = catalogue.stretch(p.inner_diameter, p.rod_diameter)
     ring = f"{p.inner_diameter:g} x {p.section_diameter:g} mm"
-    what = "a ring" if p.round else f"a {p.named}"
+    what = "a ring" if p.round else f"this {p.named}"
     return f"{what} of {ring}, stretched by {stretch:.2g} %,"
 
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isclose, log, log10
 from typing import Any
 
+from softehl.cases.harness.units import read_quantity
 from softehl.cases.seal.given import number, put
 
 GRADES = {
@@ -60,8 +62,16 @@ class Walther:
         return float(10.0 ** (10.0 ** (self.A - self.B * log10(temperature + _KELVIN))) - 0.7)
 
 
+def is_grade(text: str) -> bool:
+    """Whether an oil is given by its ISO grade, which says its viscosity to +-10 %."""
+    return _GRADE.fullmatch(text.strip()) is not None
+
+
 def read_oil(text: str) -> Walther:
-    """An oil from "ISO VG 46" or "46 cSt at 40 degC, 6.8 cSt at 100 degC".  Raises ValueError."""
+    """An oil from "ISO VG 46" or "46 cSt at 40 degC, 6.8 cSt at 100 degC".  Raises ValueError.
+
+    "HL 46", "HLP 46" (DIN 51524) and "HM 46" (ISO 6743) are mineral oils of that grade, too.
+    """
     if found := _GRADE.fullmatch(text.strip()):
         grade = int(found["grade"])
         if grade not in GRADES:
@@ -73,11 +83,7 @@ def read_oil(text: str) -> Walther:
         return Walther.through((float(grade), 40.0), (GRADES[grade], 100.0))
     points = [_POINT.fullmatch(part.strip()) for part in text.split(",")]
     if len(points) != 2 or not all(points):
-        one = " (one viscosity says nothing of another temperature)" if len(points) == 1 else ""
-        raise ValueError(
-            f'oil = "{text}" is not understood{one}; allowed: "ISO VG 46", or two viscosities, '
-            '"46 cSt at 40 degC, 6.8 cSt at 100 degC"'
-        )
+        raise ValueError(f'oil = "{text}" {_not_understood(text)}')
     first, second = ((float(p["nu"]), float(p["at"])) for p in points if p)
     for nu, at in (first, second):
         if not (0.7 < nu < 1e6 and -60.0 <= at <= 300.0):
@@ -85,11 +91,34 @@ def read_oil(text: str) -> Walther:
     return Walther.through(first, second)
 
 
-_GRADE = re.compile(r"(ISO[\s-]*)?VG[\s-]*(?P<grade>\d{1,5})", re.IGNORECASE)
+_GRADE = re.compile(
+    r"((ISO[\s-]*)?VG|(HLP|HL|HM)([\s-]+(ISO[\s-]*)?VG)?)[\s-]*(?P<grade>\d{1,5})", re.IGNORECASE
+)
+_IMPROVED = re.compile(r"(HVLP|HV)[\s-]*((ISO[\s-]*)?VG)?[\s-]*(?P<grade>\d{1,5})", re.IGNORECASE)
 _POINT = re.compile(
     r"(?P<nu>\d+\.?\d*)\s*(cSt|mm2/s|mm\^2/s|mm²/s)\s*(at|@)\s*(?P<at>-?\d+\.?\d*)\s*(degC|°C|C)",
     re.IGNORECASE,
 )
+
+
+def _not_understood(text: str) -> str:
+    """Why a text is no oil, and what to write."""
+    two = '"46 cSt at 40 degC, 6.8 cSt at 100 degC"'
+    if found := _IMPROVED.fullmatch(text.strip()):
+        return (
+            f"has a viscosity improver, and is no ISO VG {found['grade']} at other temperatures "
+            f"than 40 degC; write both viscosities of its data sheet, as {two}"
+        )
+    with suppress(ValueError):
+        eta = 1e9 * read_quantity(text, "MPa s")
+        return f'is a dynamic viscosity; leave oil out and write viscosity = "{eta:g} mPa s"'
+    if "," not in text and any(unit in text for unit in ("cSt", "mm2/s", "mm²/s")):
+        why = "is not understood (one viscosity says nothing of another temperature)"
+    else:
+        why = "is not understood"
+    numbers = [int(n) for n in re.findall(r"\d+", text)]
+    grade = next((n for n in numbers if n in GRADES), 46)
+    return f'{why}; allowed: "ISO VG {grade}", or two viscosities, {two}'
 
 
 def density(temperature: float, at_15: float = DENSITY) -> float:

@@ -134,7 +134,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
     ring: str | None = key(
         None,
         "a ring by its name, for inner_diameter and section_diameter",
-        bounds='"AS568-226", "ISO 3601 50.4x3.55", left out = by its diameters',
+        bounds='"AS568-226", "36x4", "ISO 3601 50.4x3.55", left out = by its diameters',
     )
     rod: float | None = key(None, "the same as rod_diameter", unit="mm", gt=0)
     squeeze: float | None = key(
@@ -194,7 +194,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
     oil: str | None = key(
         None,
         "an oil by its grade or two viscosities, for viscosity and pressure_viscosity",
-        bounds='"ISO VG 46", "46 cSt at 40 degC, 6.8 cSt at 100 degC"',
+        bounds='"ISO VG 46", "HLP 46", "46 cSt at 40 degC, 6.8 cSt at 100 degC"',
     )
     temperature: float | None = key(
         None, "temperature of oil and rubber, where they depend on it", unit="degC", ge=-60, le=200

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from softehl.cases.seal.given import number, put, shown
 from softehl.cases.seal.materials import KEYS, MATERIALS, Material, shear_modulus, unstable_at
 from softehl.cases.seal.rubber_data import fit, read_data
+from softehl.cases.seal.trade import hardness
 
 if TYPE_CHECKING:
     from softehl.cases.seal.rubber_keys import RubberKeys
@@ -48,6 +49,7 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
     refused with their keys.
     """
     values = dict(given)
+    _with_hardness(values)
     shore, table = values.get("shore_A"), values.get("fit")
     if shore is not None and table is not None:
         raise ValueError(f"shore_A = {shore} and fit = {table!r} contradict: leave one of them out")
@@ -58,7 +60,7 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
         return values
     source = _source(values, material)
     _require_own(values, material, source)
-    if number(shore) and SHORE[0] <= shore <= SHORE[1]:
+    if number(shore):
         _with_shore(values, material)
     if isinstance(table, str):
         _with_fit(values, material, Path(table))
@@ -66,6 +68,27 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
         values.update({k: v for k, v in _PAPER.items() if values.get(k) is None})
     _require_complete(values, material)
     return values
+
+
+def _with_hardness(values: dict[str, Any]) -> None:
+    """The hardness of a rubber that is given by its name, "NBR 70", and whether it can be used."""
+    text, shore = values.get("material"), values.get("shore_A")
+    if isinstance(shore, str):
+        values["shore_A"] = hardness(shore)
+        if values["shore_A"] is None:
+            raise ValueError(
+                f'shore_A = "{shore}" is not understood; write shore_A = 70 or "NBR 70"'
+            )
+    if isinstance(text, str) and (found := hardness(text)) is not None:
+        del values["material"]
+        put(values, "shore_A", found, f'material = "{text}"')
+    shore = values.get("shore_A")
+    if number(shore) and not SHORE[0] <= shore <= SHORE[1]:
+        raise ValueError(
+            f"shore_A = {shore:g}: a hardness gives a modulus from {SHORE[0]:g} to {SHORE[1]:g} "
+            "Shore A (Gent's rule); give the modulus of another rubber itself, as in material = "
+            '"neo-hooke" and mu = "15 MPa", a third of Young\'s modulus'
+        )
 
 
 def _source(values: Mapping[str, Any], material: Material) -> str:
@@ -120,8 +143,7 @@ def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
 
 def _require_complete(values: dict[str, Any], material: Material) -> None:
     missing = [key for key in material.keys if values.get(key) is None]
-    refused = values.get("shore_A") is not None and missing == ["mu"]  # a hardness out of range
-    if missing and not refused:
+    if missing:
         other = ", or shore_A" if material.shore and missing == ["mu"] else ""
         raise ValueError(
             f'material = "{values["material"]}" needs {" and ".join(missing)}{other}, '

@@ -41,7 +41,7 @@ class RubberKeys(Parameters):
     shore_A: float | None = key(
         None,
         "hardness Shore A, for mu by Gent's rule; +- 5 Shore are about +- 25 % of it",
-        bounds="20 to 90",
+        bounds='20 to 90, or "NBR 70"',
         ge=20,
         le=90,
     )

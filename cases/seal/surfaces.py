@@ -12,6 +12,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from softehl.cases.seal.trade import no_height
+
 MICROMETRE = 1e-3  # mm
 
 PRESSURE_SCALE, VOID_SCALE = 1.0, 1e-3
@@ -23,6 +25,9 @@ MIXED, FULL = 1.0, 3.0
 
 def _pair(given: object) -> object:
     """A single number is that of the surface that rests, over a smooth one that moves."""
+    for item in given if isinstance(given, (list, tuple)) else [given]:
+        if isinstance(item, str):
+            raise ValueError(no_height(item))
     single = isinstance(given, (int, float)) and not isinstance(given, bool)
     return (0.0, float(given)) if single else given  # type: ignore[arg-type]
 

@@ -11,6 +11,7 @@ from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
 from softehl.cases.seal import catalogue
 from softehl.cases.seal.leakage import LeakageRow, net_leakage
+from softehl.cases.seal.oils import is_grade
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
 from softehl.cases.seal.report.fit import fit_figure, fit_of
@@ -168,7 +169,7 @@ def _tolerances(runs: Sequence[FinishedRun]) -> Part:
             rows.append(
                 (run.name, f"shore_A = {p.shore_A:g}", f"+- 5: modulus {low:+.0f} to {high:+.0f} %")
             )
-        if p.oil and "VG" in p.oil.upper():
+        if p.oil and is_grade(p.oil):
             rows.append((run.name, f"oil = {p.oil}", "viscosity +- 10 % (ISO 3448)"))
     tables = [Table("Of what was given", ("run", "key", "tolerance"), rows)] if rows else []
     tables += [table for run in runs for table in _bands(run)]
