@@ -14,12 +14,16 @@ from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import KINDS, draw_columns, save
+from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Row, column
+from softehl.cases.seal.answer import leaks
 from softehl.cases.seal.assumed import assumed
 from softehl.cases.seal.idle import idle
 from softehl.cases.seal.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.parameters import ORing
 from softehl.cases.seal.reach import beyond_reach, reach
+from softehl.cases.seal.report.limits import LEFT_OUT
+from softehl.cases.seal.sections.keys import NAMES, ROUND
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
 
@@ -189,10 +193,12 @@ class CycleCase(Case[Cycle, CycleRow]):
     """Cycles of a reciprocating rod, one after the other."""
 
     name = "cycle"
-    title = "reciprocating O-ring seal in time: friction loop and leakage of every cycle"
+    title = "reciprocating O-ring, a rod seal, in time: friction loop and leakage of every cycle"
     parameters, row = Cycle, CycleRow
     selection = ("cycles", "animation")
     files = (*(f"{n}.{k}" for n in ("rows", *PICTURES) for k in KINDS), ANIMATION)
+
+    left_out = tuple(words for words in LEFT_OUT if not words.startswith("Time"))
 
     def assumed(self, parameters: Cycle, given: Collection[str]) -> list[str]:
         """See :class:`Case`."""
@@ -209,6 +215,27 @@ class CycleCase(Case[Cycle, CycleRow]):
             "between smooth surfaces a reversal squeezes the film to nanometres; give a roughness "
             "(rms of the seal in um, 0.2 to 0.4 is usual)",
         ]
+
+    def answer(self, parameters: Cycle, rows: Sequence[CycleRow]) -> list[str]:
+        """See :class:`Case`: the last cycle."""
+        if not rows:
+            return []
+        row = rows[-1]
+        end = "" if row.verdict == OK else f" ({row.verdict}: more cycles may change it)"
+        return [
+            f"cycle {row.cycle:g}: {leaks(row.leak_mm3)}; friction {row.friction_out_N:.3g} N out, "
+            f"{abs(row.friction_in_N):.3g} N in at most; its work {row.energy_mJ:.4g} mJ{end}"
+        ]
+
+    def titled(self, parameters: Cycle) -> str:
+        """See :class:`Case`."""
+        return self.title.replace(NAMES[ROUND], parameters.named)
+
+    def report(self, runs: Sequence[FinishedRun]) -> Sequence[Part]:
+        """See :class:`Case`."""
+        from softehl.cases.seal.report.cycle_parts import cycle_parts
+
+        return cycle_parts(runs, PICTURES)
 
     def foreword(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""

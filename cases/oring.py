@@ -10,6 +10,7 @@ from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
 from softehl.cases.seal import catalogue, plan
+from softehl.cases.seal.answer import answer
 from softehl.cases.seal.assumed import assumed
 from softehl.cases.seal.idle import idle
 from softehl.cases.seal.leakage import net_leakage
@@ -18,6 +19,7 @@ from softehl.cases.seal.reach import beyond_reach, reach
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.rubber import soft
+from softehl.cases.seal.sections.keys import NAMES, ROUND
 from softehl.cases.seal.sensitivity_table import resolved
 from softehl.cases.seal.state import FilmRow
 from softehl.cases.seal.telling import Teller
@@ -27,7 +29,7 @@ class ORingCase(Case[ORing, FilmRow]):
     """One curve: h* over the rod speed, of both strokes, at one sealed pressure."""
 
     name = "oring"
-    title = "reciprocating O-ring seal: film thickness, friction and leakage over the rod speed"
+    title = "reciprocating O-ring, a rod seal: film thickness, friction, leakage over the rod speed"
     parameters = ORing
     row = FilmRow
     selection = ("speeds", "stroke", "solver", "linear", "tolerance")
@@ -93,6 +95,14 @@ class ORingCase(Case[ORing, FilmRow]):
         gland = p.rod_diameter, p.housing_diameter, p.groove_width
         advised = catalogue.warnings(p.free_ring, *gland)
         return [*beyond_reach(p, p.sealed_pressure), *idle(p), *soft(p), *advised]
+
+    def answer(self, parameters: ORing, rows: Sequence[FilmRow]) -> list[str]:
+        """See :class:`Case`."""
+        return answer(rows)
+
+    def titled(self, parameters: ORing) -> str:
+        """See :class:`Case`."""
+        return self.title.replace(NAMES[ROUND], parameters.named)
 
     def foreword(self, parameters: ORing) -> list[str]:
         """See :class:`Case`."""

@@ -99,6 +99,14 @@ class Case(Generic[P, R]):
         """What is unusual about a run before it begins; it runs all the same."""
         return []
 
+    def answer(self, parameters: P, rows: Sequence[R]) -> list[str]:
+        """What is asked of rows that are results first, in words, a line each."""
+        return []
+
+    def titled(self, parameters: P) -> str:
+        """Title of a run with these parameters."""
+        return self.title
+
     def foreword(self, parameters: P) -> list[str]:
         """What a user should know of a run before it begins, a line each."""
         return []

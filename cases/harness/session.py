@@ -179,6 +179,8 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
         case.draw(record.run.parameters, record.folder, rows, rejected, record.run.pictures)
     if not quiet and (rows or rejected):
         table.print_rows(case, rows, rejected)
+        for line in case.answer(record.run.parameters, rows):
+            click.echo(line)
         if words := case.assumed(record.run.parameters, record.run.given):
             click.echo(f"assumed: {', '.join(words)}")
         for note in case.notes(rows, record.advice):

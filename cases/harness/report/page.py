@@ -29,7 +29,11 @@ def read_finished(folder: Path, shipped: Mapping[str, str]) -> FinishedRun:
     try:
         content = read_json(folder / "run.json")
         if "points" in content:
-            raise BadInput(f"{folder} holds a sweep; allowed: its runs, as in {folder}/runs/00001")
+            raise BadInput(
+                f"{folder} holds a sweep, which has no report: its results are in sweep.csv and "
+                f"response_*.png; its runs can be reported, as in softehl report "
+                f"{folder}/runs/00001 {folder}/runs/00002"
+            )
         case = load_case(shipped[content["case"]])
         parameters = case.parameters(**content["parameters"])
         curve, rejected = (CurveFolder(f, case.row) for f in (folder, folder / "rejected"))
@@ -84,13 +88,18 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part]) -> str:
     page.filters["shown"] = shown
     page.filters["base64"] = lambda data: base64.b64encode(data).decode()
     return page.get_template("report.html").render(
-        title=runs[0].case.title,
+        title=_title(runs),
         runs=runs,
         parts=parts,
         resources=resources.render() if plots else "",
         script=script,
         divs=divs,
     )
+
+
+def _title(runs: Sequence[FinishedRun]) -> str:
+    """What the runs are, each kind once."""
+    return "; ".join(dict.fromkeys(run.case.titled(run.parameters) for run in runs))
 
 
 def shown(value: Cell | None) -> str:
@@ -112,11 +121,13 @@ def write_xlsx(parts: Sequence[Part], path: Path) -> None:
         name = "".join(c for c in title if c not in "[]:*?/\\")[: _SHEET_NAME - 3]
         names[name] = names.get(name, 0) + 1
         sheet = book.create_sheet(name if names[name] == 1 else f"{name} {names[name]}")
-        sheet.append([table.caption])
-        sheet.append(list(table.header))
-        for row in table.rows:
+        for row in ([table.caption], table.header, *table.rows):
             known = [isinstance(c, str) or (c is not None and isfinite(c)) for c in row]
             sheet.append([c if good else None for c, good in zip(row, known, strict=True)])
+        for cell in (cell for cells in sheet.iter_rows() for cell in cells):
+            if isinstance(cell.value, str):  # never a formula, also where somebody edits it
+                cell.data_type = "s"
+                cell.quotePrefix = cell.value.startswith(("=", "+", "-", "@"))
     with replacing(path) as temporary, temporary.open("wb") as file:
         book.save(file)
 
