@@ -1,19 +1,29 @@
-"""Pictures of a sweep: each result over each key that varied."""
+"""Pictures of a sweep: each result over each key that varied; the other keys are told by colour."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from softehl.cases.harness.row import Column, Row
 from softehl.runtime.io import Cell, replacing
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 _LABELS = 8
-"""States of a run that are told apart by colour."""
+"""Values of the other keys, or states of a run, that are told apart by colour."""
+
+_MARKERS = "os^vD<>pPX*h"
+"""Of the states of a run, where colours tell the other keys."""
+
+Rows = Sequence[Mapping[str, Cell]]
 
 
-def draw_responses(
-    folder: Path, rows: Sequence[Mapping[str, Cell]], keys: Mapping[str, str], kind: type[Row]
-) -> list[str]:
+def draw_responses(folder: Path, rows: Rows, keys: Mapping[str, str], kind: type[Row]) -> list[str]:
     """Write response_KEY.png for each key that has two values or more; their names.
 
     rows: of `sweep.csv`.  keys: those that varied -> their units.  kind: the rows of a run; its
@@ -23,22 +33,56 @@ def draw_responses(
     results = [c for c in results if c.name not in keys]
     shown = [row for row in rows if row[kind.key_column().name] != ""]
     results = [c for c in results if any(_is_known(row[c.name]) for row in shown)]
-    names = []
-    for key, unit in keys.items():
-        if len({row[key] for row in shown}) > 1:
-            title = f"{key} [{unit}]" if unit else key
-            names.append(f"response_{key}.png")
-            _draw(folder / names[-1], shown, (key, title), results, kind)
-    return names
+    varied = {key: unit for key, unit in keys.items() if len({row[key] for row in shown}) > 1}
+    for key in varied:
+        _draw(folder / f"response_{key}.png", Response(key, varied, shown, kind), results)
+    return [f"response_{key}.png" for key in varied]
 
 
-def _draw(
-    path: Path,
-    rows: Sequence[Mapping[str, Cell]],
-    over: tuple[str, str],
-    results: Sequence[Column],
-    kind: type[Row],
-) -> None:
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What is drawn over a key.  keys: all that varied -> their units."""
+
+    key: str
+    keys: Mapping[str, str]
+    rows: Rows
+    kind: type[Row]
+
+    @property
+    def others(self) -> list[str]:
+        """The other keys that varied."""
+        return [key for key in self.keys if key != self.key]
+
+    def series(self) -> list[tuple[str, str, Rows]]:
+        """Rows that belong together: the values of the other keys, the state of a run, the rows.
+
+        Words are empty where they would be too many to be told apart.
+        """
+        column, found = self.kind.key_column().name, dict[tuple[str, str], list[Any]]()
+        for row in self.rows:
+            other = ", ".join(titled_value(key, row[key], self.keys[key]) for key in self.others)
+            state = self.kind.label(float(row[column]))
+            found.setdefault((other, state), []).append(row)
+        few = [len({pair[k] for pair in found}) for k in (0, 1)]
+        many_others, many_states = few[0] > _LABELS, few[1] > len(_MARKERS)
+        return [
+            ("" if many_others else other, "" if many_states else state, some)
+            for (other, state), some in found.items()
+        ]
+
+
+def titled(key: str, unit: str) -> str:
+    """A key on an axis."""
+    return f"{key} [{unit}]" if unit else key
+
+
+def titled_value(key: str, value: Cell, unit: str) -> str:
+    """A value of a key in a legend."""
+    text = f"{value:g}" if isinstance(value, int | float) else str(value)
+    return f"{key} = {text} {unit}".rstrip()
+
+
+def _draw(path: Path, response: Response, results: Sequence[Column]) -> None:
     from matplotlib.figure import Figure  # late: it is slow to import
 
     wide = min(len(results), 3)
@@ -46,35 +90,56 @@ def _draw(
     figure = Figure(figsize=(3.6 * wide, 2.7 * high), layout="constrained")
     panels = figure.subplots(high, wide, sharex=True, squeeze=False).ravel()
     for axes, column in zip(panels, results, strict=False):
-        for label, some in _by_state(rows, kind).items():
-            points = [(_place(row[over[0]]), row[column.name] or nan) for row in some]
-            axes.plot(*zip(*points, strict=True), ".", label=label, alpha=0.7)
+        legend = draw_panel(axes, response, column)
         axes.set_ylabel(f"{column.head} [{column.unit}]" if column.unit else column.head)
         axes.grid(alpha=0.35)
     for axes in panels[len(results) :]:
         axes.set_visible(False)
     for axes in panels[max(0, len(results) - wide) : len(results)]:
-        axes.set_xlabel(over[1])
+        axes.set_xlabel(titled(response.key, response.keys[response.key]))
         axes.tick_params(labelbottom=True)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    figure.legend(*legend, loc="outside upper center", ncols=4, fontsize="small")
     with replacing(path) as temporary:
         figure.savefig(temporary, format="png", dpi=120)
+
+
+def draw_panel(axes: Axes, response: Response, column: Column) -> tuple[list[Any], list[str]]:
+    """A result over the key; handles and words of a legend."""
+    from matplotlib.lines import Line2D
+
+    series = response.series()
+    others = [word for word in dict.fromkeys(other for other, _, _ in series) if word]
+    states = [word for word in dict.fromkeys(state for _, state, _ in series) if word]
+    colours = {word: f"C{k}" for k, word in enumerate(others or states)}
+    for other, state, rows in series:
+        points = sorted(
+            ((_place(row[response.key]), _height(row[column.name])) for row in rows),
+            key=lambda point: (isinstance(point[0], str), point[0]),
+        )
+        look = {
+            "color": colours.get(other or state, "C0"),
+            "marker": _MARKERS[states.index(state)] if others and state else ".",
+            "linestyle": "-" if other and len(points) > 1 else "",
+        }
+        axes.plot(*zip(*points, strict=True), alpha=0.7, linewidth=0.8, markersize=4, **look)
+    handles = [Line2D([], [], color=c, marker=".", linestyle="") for c in colours.values()]
+    words = list(colours)
+    if others:
+        marks = dict(zip(states, _MARKERS, strict=False))
+        handles += [Line2D([], [], color="0.3", marker=m, linestyle="") for m in marks.values()]
+        words += list(marks)
+    return handles, words or ["all states"]
 
 
 def _is_known(value: Cell) -> bool:
     return isinstance(value, float) and isfinite(value)
 
 
+def _height(value: Cell) -> Cell:
+    """Where a result stands; one that is not there is not drawn."""
+    return nan if value == "" else value
+
+
 def _place(value: Cell) -> Cell:
     """Where a value stands on the axis; words and lists side by side."""
     return float(value) if isinstance(value, int) else value
-
-
-def _by_state(
-    rows: Sequence[Mapping[str, Cell]], kind: type[Row]
-) -> dict[str, list[Mapping[str, Cell]]]:
-    """The rows of each state of a run, by its label; together where there are too many."""
-    column, found = kind.key_column().name, dict[str, list[Mapping[str, Cell]]]()
-    for row in rows:
-        found.setdefault(kind.label(float(row[column])), []).append(row)
-    return found if len(found) <= _LABELS else {"all states": list(rows)}

@@ -1,4 +1,4 @@
-"""The answer of a run in words, and reports of what is not one curve: cycles and sweeps."""
+"""The answer of a run in words, reports of cycles, titles, and text in sheets."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-import softehl
 from softehl.cases import cycle, oring
 from softehl.cases.harness.report.page import parts_of, render, write_xlsx
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
@@ -75,17 +74,6 @@ def test_a_report_is_titled_by_its_seal() -> None:
     ]
     for title, name in zip(titles, ("O-ring", "X-ring", "U-cup"), strict=True):
         assert title.startswith(f"reciprocating {name}, a rod seal")
-
-
-def test_a_sweep_has_no_report_and_says_what_to_do(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "run.json").write_text('{"points": []}')
-    assert softehl.main(["report", str(tmp_path)]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "its results are in sweep.csv and response_*.png" in error
-    assert f"softehl report {tmp_path}/runs/00001 {tmp_path}/runs/00002" in error
 
 
 def test_no_text_of_a_sheet_is_a_formula(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from softehl.cases.seal.report.section import (
     nodal_von_mises,
     section_figure,
 )
+from softehl.cases.seal.report.sensitivity import PANELS, tornado_figure
 from softehl.cases.seal.report.stribeck import crossing, hersey_um, stribeck_figure
 from softehl.cases.seal.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
 from softehl.cases.seal.surfaces import regime
@@ -147,6 +148,20 @@ def test_one_speed_has_no_slope() -> None:
     assert "slope" not in texts(curve_figure(SEAL, rows))
 
 
+def test_one_speed_is_a_bar_for_each_stroke() -> None:
+    rows = [row(400.0, 1.5, error=2.0), row(-400.0, 1.0, error=nan, verdict=OSCILLATING)]
+    figure = curve_figure(SEAL, rows)
+    (axes,) = figure.axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "linear")
+    assert [patch.get_height() for patch in axes.patches] == [1.5, 1.0]  # type: ignore[attr-defined]
+    said = texts(figure)
+    for words in ("|U| = 400 mm/s", "1.5 µm", "± 2 %", "1 µm\noscillating", "instroke"):
+        assert words in said
+    lost = texts(curve_figure(SEAL, [], [replace(row(400.0, 0.1), verdict=COLLAPSED)]))
+    assert "no result" in lost
+    assert "0.1 µm" not in lost
+
+
 def test_a_slope_is_not_fitted_to_doubtful_states() -> None:
     rows = [*power_law(0.6)[:3], row(25.0, 9.9, verdict=OSCILLATING)]
     assert fitted_exponent(rows) == pytest.approx(0.6, abs=1e-12)
@@ -162,8 +177,9 @@ def test_error_bars_have_the_estimated_length() -> None:
 
 
 def test_without_an_estimate_there_are_no_bars() -> None:
-    axes = curve_figure(SEAL, [row(100.0, 0.5, error=nan)]).axes[0]
-    assert legend(axes) == ["outstroke"]
+    rows = [row(speed, 0.5, error=nan) for speed in (100.0, 200.0)]
+    axes = curve_figure(SEAL, rows).axes[0]
+    assert legend(axes)[0] == "outstroke"
     assert list(axes.containers) == []
 
 
@@ -256,6 +272,28 @@ def test_the_section_shows_both_strokes_with_one_scale() -> None:
     assert "contact pressure, max 3 MPa" in written
     assert out.get_aspect() == 1.0
     assert (out.get_xlabel(), out.get_ylabel()) == ("z [mm]", "r [mm]")
+
+
+@pytest.mark.parametrize("factor", [1.0, 40.0, 400.0])
+def test_the_label_of_the_colours_is_on_the_picture(factor: float) -> None:
+    r, section = power_law(0.6)[2], square()
+    data = {name: factor * values for name, values in section.point_data.items()}
+    figure = section_figure(
+        SEAL, [View(r, profile(r.h_star_um), replace(section, point_data=data))]
+    )
+    figure.draw_without_rendering()
+    label = figure.axes[-1].yaxis.label.get_window_extent()
+    assert label.x1 < figure.bbox.x1
+
+
+def test_the_legend_of_a_tornado_is_beside_its_bars() -> None:
+    slopes = {quantity: {f"key_{k}": 10.0 - k for k in range(10)} for quantity in PANELS}
+    figure = tornado_figure(SEAL, {400.0: slopes, -400.0: slopes})
+    figure.draw_without_rendering()
+    (found,) = figure.legends
+    for axes in figure.axes:
+        assert not found.get_window_extent().overlaps(axes.get_tightbbox())
+        assert axes.get_legend() is None
 
 
 def test_pressure_bands_are_to_scale() -> None:

@@ -267,7 +267,10 @@ def test_a_sweep_is_its_runs(reference: Path) -> None:
 
 def test_a_sweep_is_no_run_to_report(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert softehl.main(["report", str(reference)]) == 2
-    assert f"holds a sweep; allowed: its runs, as in {reference}/runs" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "its results are in sweep.csv and response_*.png" in error
+    assert f"as in softehl report {reference}/runs/00001 {reference}/runs/00002" in error
 
 
 def test_a_folder_with_a_sweep(

@@ -28,11 +28,14 @@ _ENOUGH, _MANY = 3, 7
 def curve_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()) -> Figure:
     """h* over |U|, both logarithmic, a line a stroke; rejected states are marked on the axis.
 
-    Not drawn: rough films so slow that the sealed pressure drives oil against the rod, h* < 0.
+    Bars of both strokes where there is one speed. Not drawn: rough films so slow that the sealed
+    pressure drives oil against the rod, h* < 0.
     """
     from matplotlib.figure import Figure
 
     rows = [row for row in rows if row.h_star_um > 0.0]
+    if len({abs(row.rod_speed_mm_s) for row in (*rows, *rejected)}) == 1:
+        return _one_speed_figure(p, rows, rejected)
     figure = Figure(figsize=(5.4, 4.4))
     axes = figure.subplots()
     _set_limits(axes, rows, rejected)
@@ -47,6 +50,33 @@ def curve_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] 
     axes.set_xlabel(style.SPEED)
     axes.set_ylabel(style.H_STAR)
     axes.legend(loc="upper left")
+    style.set_margins(figure, left=0.62, right=0.12, bottom=0.5, top=0.6)
+    style.write_head(figure, style.subject(p), left=0.62)
+    return figure
+
+
+def _one_speed_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> Figure:
+    """A bar for each stroke with its error, its number and what is wrong with it."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.2, 3.8))
+    axes = figure.subplots()
+    states = sorted((*rows, *rejected), key=lambda row: -row.rod_speed_mm_s)
+    for place, row in enumerate(states):
+        height = row.h_star_um if row in rows else 0.0
+        known = np.isfinite(row.h_star_error_percent) and height
+        error = 0.01 * abs(row.h_star_error_percent) * height if known else None
+        axes.bar(place, height, 0.5, yerr=error, capsize=4, color=style.COLOURS[row.stroke])
+        words = [f"{height:.4g} µm"] if height else ["film collapsed:", "no result"]
+        words += [f"± {abs(row.h_star_error_percent):.2g} %"] if known else []
+        words += [row.verdict] if height and row.verdict != OK else []
+        offset = {"xytext": (0, 5), "textcoords": "offset points", "ha": "center"}
+        axes.annotate("\n".join(words), (place, height + (error or 0.0)), **offset)
+    axes.set_xticks(range(len(states)), [style.STROKES[row.stroke] for row in states])
+    axes.set_xlabel(f"|U| = {abs(states[0].rod_speed_mm_s):g} mm/s")
+    axes.set(ylabel=style.H_STAR, xlim=(-0.7, len(states) - 0.3))
+    axes.set_ylim(0.0, 1.35 * max((row.h_star_um for row in rows), default=1.0))
+    axes.grid(visible=False, axis="x")
     style.set_margins(figure, left=0.62, right=0.12, bottom=0.5, top=0.6)
     style.write_head(figure, style.subject(p), left=0.62)
     return figure

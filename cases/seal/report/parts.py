@@ -13,6 +13,7 @@ from softehl.cases.seal import catalogue
 from softehl.cases.seal.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.oils import is_grade
 from softehl.cases.seal.report import style
+from softehl.cases.seal.report.curve import curve_figure
 from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
 from softehl.cases.seal.report.fit import fit_figure, fit_of
 from softehl.cases.seal.report.interactive import curve_plot, film_plot, friction_plot
@@ -35,8 +36,8 @@ def parts(runs: Sequence[FinishedRun]) -> list[Part]:
 
     with matplotlib.rc_context(style.STYLE):
         found = [_gland(runs), *_rubber(runs), _section(runs)]
-        surfaces = _surfaces(runs)
-    found += [_film(runs), _curve(runs), _friction(runs), *_leakage(runs), *surfaces]
+        surfaces, curve = _surfaces(runs), _curve(runs)
+    found += [_film(runs), curve, _friction(runs), *_leakage(runs), *surfaces]
     return [*found, _tolerances(runs)]
 
 
@@ -104,12 +105,27 @@ def _curve(runs: Sequence[FinishedRun]) -> Part:
         "h* over the rod speed; bars are the estimated error, a hollow mark is a state that is no "
         "plain result. 'ok' means right within the stated error, and within 2 %."
     )
-    return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)
+    if _several_speeds(runs):
+        return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)
+    pictures = [Picture(run.name, _png(curve_figure(run.parameters, run.rows))) for run in runs]
+    return Part("Film thickness", text, pictures=pictures, lines=lines)
 
 
 def _friction(runs: Sequence[FinishedRun]) -> Part:
     text = "Of the film on the rod, its magnitude."
-    return Part("Friction", text, plots=[friction_plot(runs)])
+    if _several_speeds(runs):
+        return Part("Friction", text, plots=[friction_plot(runs)])
+    lines = [
+        f"{run.name}, {style.STROKES[row.stroke]}: {abs(row.rod_friction_N):.4g} N"
+        for run in runs
+        for row in run.rows
+    ]
+    return Part("Friction", text, lines=lines)
+
+
+def _several_speeds(runs: Sequence[FinishedRun]) -> bool:
+    """Whether there is anything to be drawn over the speed."""
+    return len({abs(row.rod_speed_mm_s) for run in runs for row in run.rows}) > 1
 
 
 def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:

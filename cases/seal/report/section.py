@@ -86,7 +86,7 @@ def section_figure(p: ORing, views: Sequence[View]) -> Figure:
     """A panel for each state, all with one scale of stress and one of pressure."""
     from matplotlib.figure import Figure
 
-    scale, left, panel, bar = Scale.of(p, views), 0.5, 3.3, 0.75
+    scale, left, panel, bar = Scale.of(p, views), 0.5, 3.3, 1.0  # room for "100.0" and the label
     figure = Figure(figsize=(left + panel * len(views) + bar, 4.3))
     panels = figure.subplots(1, len(views), sharey=True, squeeze=False)[0]
     for axes, view in zip(panels, views, strict=True):

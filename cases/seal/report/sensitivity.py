@@ -91,7 +91,8 @@ def tornado_figure(p: ORing, table: Table) -> Figure:
         axes.set_xlabel("% for 1 % of the parameter")
         axes.set_title(title)
         axes.axvline(0.0, color="0.2", linewidth=0.8)
-    panels[-1].legend(loc="lower right", fontsize="x-small")
+    handles, labels = panels[-1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper right")  # above the panels, where no bar is
     style.write_head(figure, style.subject(p), 0.3)
     style.set_margins(figure, 1.45, 0.15, 0.5, 0.85, 0.75)
     return figure
