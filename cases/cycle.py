@@ -18,6 +18,7 @@ from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.seal.answer import leaks
 from softehl.cases.seal.assumed import assumed
+from softehl.cases.seal.headings import CYCLE
 from softehl.cases.seal.idle import idle
 from softehl.cases.seal.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.parameters import ORing
@@ -38,6 +39,8 @@ Points = tuple[Annotated[tuple[float, float], Field(strict=False)], ...]
 
 class Cycle(ORing):
     """An O-ring and how its rod moves; the film conserves mass. `speeds`, `stroke` are not used."""
+
+    headings = CYCLE
 
     motion: Points | None = key(
         None,

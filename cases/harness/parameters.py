@@ -1,15 +1,16 @@
 """Parameters of a case: data with a default, a unit, bounds and a meaning for every key."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from softehl.cases.harness.units import is_quantity, read_quantity
 
-_BOUNDS = {"gt": "> {}", "ge": ">= {}", "lt": "< {}", "le": "<= {}"}
+_BOUNDS = {"gt": "> {:g}", "ge": ">= {:g}", "lt": "< {:g}", "le": "<= {:g}"}
 
 
 def _different(numbers: tuple[float, ...]) -> tuple[float, ...]:
@@ -41,6 +42,8 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     names: ClassVar[tuple[str, ...]] = ()
     """Keys that do no more than give values to others, such as the name of a standard part."""
+    headings: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
+    """Heading -> keys, in the order in which they are listed; the others follow without one."""
 
     @model_validator(mode="before")
     @classmethod
@@ -121,13 +124,17 @@ def _item(kind: Any) -> Any:
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a case.  meaning, unit and bounds together are what an error message shows."""
+    """A key of a case.  meaning, unit and bounds together are what an error message shows.
+
+    heading: what it is listed under, empty for none.
+    """
 
     name: str
     default: Any
     unit: str
     bounds: str
     meaning: str
+    heading: str = ""
 
 
 def key(
@@ -170,8 +177,11 @@ def files_of(kind: type[Parameters]) -> tuple[str, ...]:
 
 
 def keys_of(kind: type[Parameters]) -> Iterator[Key]:
-    """The keys of a parameter class, in order."""
-    for name, field in kind.model_fields.items():
+    """The keys of a parameter class, by their headings."""
+    under = {name: heading for heading, names in kind.headings.items() for name in names}
+    for name in [*under, *(name for name in kind.model_fields if name not in under)]:
+        field = kind.model_fields[name]
         extra = field.json_schema_extra
         assert isinstance(extra, dict)
-        yield Key(name, field.default, *(str(extra[k]) for k in ("unit", "bounds", "meaning")))
+        words = (str(extra[k]) for k in ("unit", "bounds", "meaning"))
+        yield Key(name, field.default, *words, under.get(name, ""))

@@ -66,13 +66,17 @@ def rows_table(
 
 
 def print_keys(kind: type[Parameters]) -> None:
-    """Print every key with its default, unit, bounds and meaning to stdout."""
+    """Print every key under its heading with its default, unit, bounds and meaning to stdout."""
     table = Table(box=SIMPLE, padding=(0, 2, 0, 0), pad_edge=False)
     for name in ("key", "default", "unit", "allowed", "meaning"):
         table.add_column(name, no_wrap=name in ("key", "unit"), overflow="fold")
-    for key in keys_of(kind):
-        cells = (key.name, default_text(key), key.unit, key.bounds, key.meaning)
-        table.add_row(*(Text(cell) for cell in cells))
+    for heading, keys in groupby(keys_of(kind), key=lambda key: key.heading):
+        if heading:
+            table.add_section()
+            table.add_row(Text(heading.upper(), style="bold"))
+        for key in keys:
+            cells = (key.name, default_text(key), key.unit, key.bounds, key.meaning)
+            table.add_row(*(Text(cell) for cell in cells))
     _print(table, 2 * _WIDTH)
 
 
@@ -84,9 +88,12 @@ def default_text(key: Key) -> str:
 def key_lines(kind: type[Parameters]) -> list[str]:
     """The keys of a case as a table for the documentation."""
     lines = ["| key | default | unit | allowed | meaning |", "|---|---|---|---|---|"]
-    for key in keys_of(kind):
-        default = "-" if key.default is None else f"`{default_text(key)}`"
-        lines.append(_line(f"`{key.name}`", default, key.unit, key.bounds, key.meaning))
+    for heading, keys in groupby(keys_of(kind), key=lambda key: key.heading):
+        if heading:
+            lines.append(_line(f"**{heading}**", "", "", "", ""))
+        for key in keys:
+            default = "-" if key.default is None else f"`{default_text(key)}`"
+            lines.append(_line(f"`{key.name}`", default, key.unit, key.bounds, key.meaning))
     return lines
 
 

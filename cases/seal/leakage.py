@@ -28,7 +28,7 @@ class LeakageRow(Record):
     leak_in_mm3_s: float = column("mm3/s", "the same of the instroke")
     net_mm3_per_mm: float = column(
         "mm3/mm",
-        "net volume that leaves in a cycle for each mm of stroke, pi R (h*_out - h*_in) by (16); "
+        "net volume that leaves in a cycle for each mm of stroke, pi R (h*_out - h*_in); "
         "negative where the instroke could take back more than there is: dry on balance",
     )
     net_film_um: float = column("um", "h*_out - h*_in")

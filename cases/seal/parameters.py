@@ -12,6 +12,7 @@ from softehl.cases.harness.parameters import key
 from softehl.cases.seal.catalogue import Ring
 from softehl.cases.seal.contradictions import require_consistent
 from softehl.cases.seal.fitting import fitted
+from softehl.cases.seal.headings import SEAL
 from softehl.cases.seal.oils import with_oil
 from softehl.cases.seal.regions import MATERIALS, Region, with_regions
 from softehl.cases.seal.rubber import with_rubber
@@ -46,6 +47,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
         *("ring", "rod", "squeeze", "gland", "backup", "shore_A", "fit"),
         *("oil", "oil_density", "roelands"),
     )
+    headings = SEAL
 
     density: Literal[1, 2, 4, 8, 16] = key(
         2,
@@ -106,9 +108,13 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
         strict=False,
     )
     pressure_viscosity: float = key(
-        0.02, "pressure-viscosity coefficient alpha of (13)", unit="1/MPa", ge=0, le=1
+        0.02,
+        "coefficient alpha of eta = eta_0 exp(alpha p)",
+        unit="1/MPa",
+        ge=0,
+        le=1,
     )
-    shear_traction: bool = key(True, "whether the shear stress (17) acts on the seal")
+    shear_traction: bool = key(True, "whether the shear stress of the film acts on the seal")
     rotation: Literal["fixed", "free"] = key(
         "fixed", "mean rotation of the section", bounds='"fixed" (held at zero) or "free"'
     )
@@ -185,7 +191,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
     housing_diameter: float = key(56.30, "inner diameter of the housing D_housing", unit="mm", gt=0)
     viscosity: float = key(
         6.59e-8,
-        "viscosity eta_0 at zero pressure of (13)",
+        "dynamic viscosity eta_0 at zero pressure",
         unit="MPa s",
         bounds='1e-12 to 1e-3; 1e-9 MPa s is 1 mPa s, and "46 mPa s" may be written too',
         ge=1e-12,
@@ -217,14 +223,14 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
     cavitation: Literal["penalty", "mass-conserving"] | None = key(
         None,
         "model of cavitation",
-        bounds='"penalty" (25) or "mass-conserving", left out = the latter with roughness, '
+        bounds='"penalty" or "mass-conserving", left out = the latter with roughness, '
         "with a cavitation_pressure and where a section has two lobes",
     )
     cavitation_pressure: float = key(
         0.0, "mass-conserving: pressure of the ruptured film", unit="MPa", ge=-0.1, le=0
     )
     cavitation_penalty: float = key(
-        1.0e4, "cavitation penalty epsilon of (25)", unit="mm/(MPa s)", gt=0
+        1.0e4, "penalty of pressures below zero, flux for a pressure", unit="mm/(MPa s)", gt=0
     )
     roughness: Roughness = key(
         (0.0, 0.0), "rms heights of rod and seal, 0 = smooth", unit="um", bounds=ROUGHNESS

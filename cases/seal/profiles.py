@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import model_validator
 
 from softehl.cases.harness.parameters import Nonzeros, key
+from softehl.cases.seal.headings import SLIDER
 from softehl.cases.seal.shear_thinning import ThinningKeys
 from softehl.cases.seal.surfaces import ROUGHNESS, Roughness
 from softehl.runtime.arrays import Array
@@ -13,6 +14,8 @@ from softehl.runtime.arrays import Array
 
 class Slider(ThinningKeys):
     """Everything that defines one run of the slider."""
+
+    headings = SLIDER
 
     profile: Literal["wedge", "parabola", "cosine", "exponential", "pocket"] = key(
         "parabola", "gap h(x)"
@@ -39,7 +42,7 @@ class Slider(ThinningKeys):
     end_pressure: float = key(0.0, "pressure at the end", unit="MPa", ge=0)
     supply: float | None = key(
         None,
-        "mass-conserving: film thickness that the plane brings in, as h* of (16)",
+        "mass-conserving: film thickness that the plane brings in, as h*",
         unit="mm",
         bounds="> 0, left out = flooded",
         gt=0,

@@ -20,8 +20,14 @@ class RubberKeys(Parameters):
     """What a seal, or a region of it, is made of."""
 
     material: materials.Name = key("mooney-rivlin", "rubber")
-    mu_1: float | None = key(3.04, "Mooney-Rivlin parameter mu_1 of (3)", unit="MPa", gt=0, le=1000)
-    mu_2: float | None = key(0.62, "Mooney-Rivlin parameter mu_2 of (3)", unit="MPa", ge=0, le=1000)
+    mu_1: float | None = key(
+        3.04,
+        "Mooney-Rivlin modulus mu_1; mu_1 + mu_2 is the shear modulus",
+        unit="MPa",
+        gt=0,
+        le=1000,
+    )
+    mu_2: float | None = key(0.62, "Mooney-Rivlin modulus mu_2", unit="MPa", ge=0, le=1000)
     mu: float | None = key(
         None, "modulus mu of neo-hooke, arruda-boyce and gent", unit="MPa", gt=0, le=1000
     )
@@ -52,7 +58,7 @@ class RubberKeys(Parameters):
         file=True,
     )
     ogden_terms: int = key(3, "terms of an Ogden fit", bounds="1, 2 or 3", ge=1, le=3)
-    bulk_modulus: float = key(500.0, "bulk modulus kappa of (6)", unit="MPa", gt=0, le=1e5)
+    bulk_modulus: float = key(500.0, "bulk modulus kappa", unit="MPa", gt=0, le=1e5)
 
     @property
     def energy(self) -> str:

@@ -55,9 +55,7 @@ class FilmRow(Row):
     rod_speed_mm_s: float = column(
         "mm/s", "rod speed U, + = outstroke (to the air side)", head="U", shown="+g"
     )
-    h_star_um: float = column(
-        "um", "film thickness h* = q / u of (16), u = U / 2", head="h*", shown=".4g"
-    )
+    h_star_um: float = column("um", "film thickness h* = q / u, u = U / 2", head="h*", shown=".4g")
     h_star_error_percent: float = column(
         "%",
         "estimated error of h*, + where it is too large; nan where not known",

@@ -1,5 +1,6 @@
 """Tables of the documentation that follow from declarations."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from softehl.cases.document import DOCS, renewed
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.parameters import keys_of
+from softehl.cases.harness.table import print_keys
 from softehl.cases.shipped import SHIPPED
 
 
@@ -40,6 +42,22 @@ def test_every_key_has_a_meaning_and_bounds(name: str) -> None:
     for key in keys_of(case.parameters):
         assert key.meaning
         assert key.bounds
+        assert not re.search(r"\(\d+\)", f"{key.meaning} {key.bounds}"), "the number of an equation"
+
+
+def test_keys_are_listed_from_the_ring_to_the_numerics(capsys: pytest.CaptureFixture[str]) -> None:
+    seal = ["ring", "gland", "rubber", "oil", "motion", "film", "mesh", "numerics"]
+    for name in SHIPPED:
+        case = load_case(SHIPPED[name])
+        keys = list(keys_of(case.parameters))
+        headings = list(dict.fromkeys(key.heading for key in keys))
+        assert headings == (seal if name != "slider" else ["gap", *seal[3:]])
+        assert sorted(key.name for key in keys) == sorted(case.parameters.model_fields)
+    print_keys(load_case(SHIPPED["oring"]).parameters)
+    printed = capsys.readouterr().out
+    places = [printed.index(f"{heading.upper()} ") for heading in seal]
+    assert places == sorted(places)
+    assert printed.index(" ring ") < printed.index(" shear_thinning ")
 
 
 def test_an_old_table_is_noticed() -> None:
