@@ -302,7 +302,7 @@ def reproduce(
     """Reproduce the paper: all of it, or each ITEM (table1, table2, fig4 ... fig20).
 
     Writes ITEM.png, ITEM.csv (what is drawn) and ITEM.txt (the caption) to DIR; items share the
-    runs in DIR/runs. States that are no plain results are marked and named in the caption. Exit
+    runs in DIR/runs. States whose verdict is not ok are marked and named in the caption. Exit
     code: 0 done, 2 bad input.
     """
     from softehl.cases.paper.command import reproduce_items

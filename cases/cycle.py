@@ -75,11 +75,13 @@ class Cycle(ORing):
     @model_validator(mode="after")
     def _moves(self) -> Self:
         if self.cavitation == "penalty":
-            raise ValueError('cavitation = "penalty" loses oil in time; leave cavitation out')
+            raise ValueError(
+                'cavitation = "penalty" does not conserve oil over a cycle; leave cavitation out'
+            )
         if self.rubs:
             raise ValueError(
-                f"housing_friction = {self.housing_friction:g}: a film in time knows a section "
-                "that is held, not what rubs on its housing; leave housing_friction out"
+                f"housing_friction = {self.housing_friction:g} is not available in a cycle, which "
+                "holds the section; leave housing_friction out"
             )
         if not self.path.speed.largest > 0.0 or not self.path.speed.values[0] > 0.0:
             raise ValueError("motion: the rod must begin with an outstroke, U > 0 at t = 0")

@@ -60,7 +60,7 @@ class Earlier:
 
 
 def advice_of(content: Mapping[str, Any], rows: Sequence[Row]) -> dict[float, str]:
-    """What run.json says of rows that are no plain results, by their keys."""
+    """What run.json says of rows whose verdict is not ok, by their keys."""
     found = {}
     for row in rows:
         name = row.key_column().name
@@ -119,7 +119,7 @@ def _states(content: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """The rows of run.json.  Raises ValueError."""
     states = content.get("states")
     if not isinstance(states, list) or not all(isinstance(s, dict) for s in states):
-        raise ValueError("it names no states")
+        raise ValueError("it has no list of states")
     return states
 
 
@@ -129,7 +129,7 @@ def _difference(content: Mapping[str, Any], run: Run, version: str | None) -> st
         return f"other parameters: case = {content.get('case')!r}, now {run.case.name!r}"
     before, now = content.get("parameters"), run.parameters.model_dump(mode="json")
     if not isinstance(before, dict):
-        return "other parameters: it names none"
+        return "other parameters: run.json has none"
     for key in [*now, *before]:
         if key not in run.case.selection and before.get(key) != now.get(key):
             return f"other parameters: {key} = {before.get(key)!r}, now {now.get(key)!r}"

@@ -55,12 +55,12 @@ def read_quantity(text: str, unit: str) -> float:
         return float(found[1]) * known[given]
     if unit == "MPa s" and given in _KINEMATIC:
         raise ValueError(
-            f'"{text}" is a kinematic viscosity; the dynamic one is meant, which is it times the '
-            'density: of an oil of 870 kg/m3, 46 cSt are "40 mPa s"'
+            f'"{text}" is a kinematic viscosity; write the dynamic one, which is it times the '
+            'density: for an oil of 870 kg/m3, 46 cSt are "40 mPa s"'
         )
     if found and unit == "mm" and _TOLERANCE_CLASS.fullmatch(given):
         raise ValueError(
             f'"{text}" is a size with a tolerance class, which is not read; write the size alone, '
             f'"{found[1]} mm"'
         )
-    raise ValueError(f'"{text}" is no number in {unit}; units: {", ".join(known)}')
+    raise ValueError(f'"{text}" is not a number in {unit}; allowed units: {", ".join(known)}')

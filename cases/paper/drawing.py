@@ -1,4 +1,4 @@
-"""Drawing in the paper's axes, the same every time; what is no plain result looks like none."""
+"""Drawing in the paper's axes, the same every time; states that are not ok look different."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def draw_profile(
     label: str,
     color: Any,
 ) -> None:
-    """A line along the film: full for a plain result, dotted and labelled otherwise."""
+    """A line along the film: full for a state that is ok, dotted and labelled otherwise."""
     if not state.usable:
         axes.plot([], [], color=color, linestyle="", marker="x", label=f"{label} ({state.verdict})")
         return
@@ -110,7 +110,7 @@ class Line:
 
 
 def draw_line(axes: Axes, line: Line) -> None:
-    """A curve whose markers are full for plain results only; others are hollow, with a letter."""
+    """A curve whose markers are full for states that are ok; others are hollow, with a letter."""
     usable = [(x, s) for x, s in zip(line.x, line.states, strict=True) if s.usable]
     axes.plot(
         [x for x, _ in usable],

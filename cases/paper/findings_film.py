@@ -217,7 +217,7 @@ def _shear(query: Query) -> Finding:
         if a.plain and b.plain:
             changes.append(100.0 * (a.h_star / b.h_star - 1.0))
     if not changes:
-        return Finding("no plain results", None)
+        return Finding("no state with the verdict ok", None)
     (error,) = mesh_errors(query, d, [4])
     ends = min(changes), max(changes)
     text = f"with it h* changes by {numbers(ends, '+.2f')} % (down, up); h* is {error:+.2f} % off"

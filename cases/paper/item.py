@@ -136,7 +136,7 @@ def density_words(used: int | Sequence[int], paper: int | Sequence[int]) -> str:
 
 
 def doubts(states: Sequence[State]) -> str:
-    """The states that are no plain results, by verdict; empty if there are none."""
+    """The states whose verdict is not ok, by verdict; empty if there are none."""
     found: dict[str, list[str]] = {}
     for state in states:
         if not state.plain:

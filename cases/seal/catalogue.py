@@ -235,7 +235,7 @@ def _metric(name: str, inner: float, section: float) -> Ring:
     if not 0.5 * section <= inner <= 1500.0 or not 0.5 <= section <= 20.0:
         raise UnknownRingError(
             f'ring = "{name}" has an inside diameter of {inner:g} and a section of {section:g} mm; '
-            "inside diameter x section is meant, of 0.5 to 20 mm, in mm"
+            "write inside diameter x section in mm, the section 0.5 to 20 mm"
         )
     band = next((t for most, t in _CLASS_B if section <= most), None)
     tolerance = round(0.009 * inner**0.95 + 0.11, 2)

@@ -79,9 +79,11 @@ def _film_has_its_model(p: ORing) -> None:
         ("cavitation_pressure", p.cavitation_pressure < 0.0),
     ):
         if given and not p.conserving:
-            raise ValueError(f'cavitation = "penalty" knows no {name}; leave cavitation out')
+            raise ValueError(
+                f'cavitation = "penalty" does not work with {name}; leave cavitation out'
+            )
     if p.conserving and p.reynolds == "dg":
-        raise ValueError('reynolds = "dg" knows the penalty only; use "fe", or leave it out')
+        raise ValueError('reynolds = "dg" works with cavitation = "penalty" only; use "fe"')
     p.require_smooth_film(dg=p.reynolds == "dg", rough=p.rough)
 
 

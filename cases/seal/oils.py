@@ -46,7 +46,7 @@ class Walther:
         """The line through two viscosities, each (cSt, degC).  ValueError where there is none."""
         (nu_1, t_1), (nu_2, t_2) = sorted([first, second], key=lambda point: point[1])
         if t_1 == t_2:
-            raise ValueError(f"both viscosities are at {t_1:g} degC: two temperatures are meant")
+            raise ValueError(f"both viscosities are at {t_1:g} degC; give them at two temperatures")
         if not nu_1 > nu_2:
             raise ValueError(
                 f"{nu_1:g} cSt at {t_1:g} degC and {nu_2:g} cSt at {t_2:g} degC: an oil is "
@@ -151,8 +151,8 @@ def with_oil(given: Mapping[str, Any]) -> dict[str, Any]:
     oil, heat, z = (values.get(key) for key in ("oil", "temperature", "roelands"))
     if isinstance(oil, int | float):
         raise ValueError(
-            f'oil = {oil}: a text is meant, as "ISO VG 46" or "46 cSt at 40 degC, '
-            '6.8 cSt at 100 degC"; a dynamic viscosity is viscosity = "40 mPa s"'
+            f'oil = {oil}: write a text, as "ISO VG 46" or "46 cSt at 40 degC, '
+            '6.8 cSt at 100 degC"; a dynamic viscosity is given by viscosity = "40 mPa s"'
         )
     if isinstance(oil, str):
         _with_grade(values, oil, heat)

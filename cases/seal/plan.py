@@ -22,13 +22,13 @@ DOUBTS = {
     UNDER_RESOLVED: f"the inlet is too short for this mesh, h* may be far off; {FINER}",
     CLIPPED: "the arc ends within the film, h* may be far off",
     UNCERTAIN: DOUBTFUL,
-    OSCILLATING: f"the film zigzags from node to node; h* holds, the profile does not; {FINER}",
+    OSCILLATING: f"the film zigzags from node to node; h* is right, the profile is not; {FINER}",
 }
-"""Verdict of a state that is kept but is no plain result -> what is to be known of it."""
+"""Verdict of a state that is kept but is not ok -> what is to be known of it."""
 
 
 def doubts(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, list[FilmRow]]:
-    """What is wrong with states that are no plain results -> these states, worst first.
+    """What is wrong with states that are not ok -> these states, worst first.
 
     advice: what states came with, by U: why one is clipped or uncertain, other than by its error.
     """

@@ -81,11 +81,11 @@ class Slider(ThinningKeys):
                 f"{self.end:g} mm, the ends of the film: give pocket_start and pocket_end"
             )
         if self.conserving and self.reynolds == "dg":
-            raise ValueError('reynolds = "dg" knows the penalty only; use "fe", or leave it out')
+            raise ValueError('reynolds = "dg" works with cavitation = "penalty" only; use "fe"')
         if not self.conserving and self._beyond_penalty:
             raise ValueError(
-                'cavitation = "penalty" knows no roughness, supply, pocket or cavitation_pressure; '
-                "leave cavitation out"
+                'cavitation = "penalty" does not work with roughness, supply, a pocket or '
+                "cavitation_pressure; leave cavitation out"
             )
         self.require_smooth_film(dg=self.reynolds == "dg", rough=any(self.roughness))
         return self

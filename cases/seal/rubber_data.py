@@ -84,7 +84,7 @@ def read_data(path: Path) -> RubberData:
         _point(f"{path}, line {n}", dict(zip(header, row, strict=False))) for n, row in rows[1:]
     ]
     if not points:
-        raise ValueError(f"{path} holds no test: a line for each measured point is meant")
+        raise ValueError(f"{path} holds no test; write a line for each measured point")
     test, *numbers = zip(*points, strict=True)
     return RubberData(np.array(test), *(np.array(column, dtype=np.float64) for column in numbers))
 

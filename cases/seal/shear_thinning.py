@@ -86,7 +86,7 @@ class ThinningKeys(Parameters):
         for given, what in ((dg, 'reynolds = "dg"'), (rough, "roughness")):
             if given and self.thins:
                 raise ValueError(
-                    f"{what} knows Newtonian oils only; leave it out, or the keys of {self.thins}"
+                    f"{what} needs a Newtonian oil; leave it or the keys of {self.thins} out"
                 )
 
     def _given(self, keys: tuple[str, ...]) -> list[str]:

@@ -168,7 +168,7 @@ class FilmRow(Row):
         return "out" if self.rod_speed_mm_s > 0 else "in"
 
     def within(self, tolerance: float) -> bool:
-        """Whether h* is a plain result whose error is known to be at most so many per cent."""
+        """Whether h* is ok and its error known to be at most so many per cent."""
         return self.verdict == OK and abs(self.h_star_error_percent) <= tolerance
 
 

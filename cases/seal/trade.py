@@ -43,8 +43,8 @@ def no_height(text: str) -> str:
     height = float(found["height"])
     if found["kind"] == "a":
         return (
-            f'"{text}" is a mean height and an rms height is meant, {RMS_OF_RA:.3g} times as much '
-            f"where heights are distributed normally: write {RMS_OF_RA * height:.3g}"
+            f'"{text}" is a mean height; write the rms height, {RMS_OF_RA:.3g} times as much '
+            f"where heights are distributed normally: {RMS_OF_RA * height:.3g}"
         )
     if found["kind"] == "q":
         return f'"{text}" is an rms height: write {height:g}'

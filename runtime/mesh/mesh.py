@@ -151,7 +151,7 @@ class Mesh:
             inside = _told(where, self.points[nodes].mean(axis=1), name)
             chosen[kind] = np.flatnonzero(inside)
         if not any(map(len, chosen.values())):
-            raise MeshError(f"group {name!r}: no cell is meant")
+            raise MeshError(f"group {name!r}: the predicate chooses no cell")
         return replace(self, groups={**self.groups, name: chosen})
 
     # looking at it ------------------------------------------------------------------------------
@@ -212,7 +212,7 @@ class Mesh:
         if callable(where):
             chosen = np.flatnonzero(_told(where, self.points, "the predicate"))
             if not len(chosen):
-                raise MeshError("no node is meant by the predicate")
+                raise MeshError("the predicate chooses no node")
             return chosen
         if where in self.groups and where not in self.sides:
             parts = [self.cells[kind][chosen] for kind, chosen in self.groups[where].items()]

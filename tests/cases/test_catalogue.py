@@ -109,7 +109,7 @@ def test_metric_rings(name: str) -> None:
         ("000", 'nearest: "AS568-001"'),
         ("quad ring", 'give a number, "AS568-226"'),
         ("", 'or the diameters in mm, "ISO 3601 50.4x3.55"'),
-        ("ISO 3601 3.55x50.4", "inside diameter x section is meant"),
+        ("ISO 3601 3.55x50.4", "write inside diameter x section in mm"),
     ],
 )
 def test_unknown_rings_name_the_nearest(name: str, says: str) -> None:

@@ -59,11 +59,11 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({**POLYMER, "carreau_stress": 0.1}, "one follows from the other"),
     ({"eyring_stress": 0.0}, "greater than 0"),
     ({**POLYMER, "carreau_exponent": 1.5}, "less than or equal to 1"),
-    ({**POLYMER, "carreau_rate": "1e5 mm/s"}, "is no number in 1/s"),
-    ({"eyring_stress": "5 1/s"}, "is no number in MPa"),
+    ({**POLYMER, "carreau_rate": "1e5 mm/s"}, "is not a number in 1/s"),
+    ({"eyring_stress": "5 1/s"}, "is not a number in MPa"),
     ({"shear_thinning": "ostwald"}, "'eyring' or 'carreau'"),
-    ({"eyring_stress": 5, "reynolds": "dg"}, 'reynolds = "dg" knows Newtonian oils only'),
-    ({"eyring_stress": 5, "roughness": 0.2}, "roughness knows Newtonian oils only"),
+    ({"eyring_stress": 5, "reynolds": "dg"}, 'reynolds = "dg" needs a Newtonian oil'),
+    ({"eyring_stress": 5, "roughness": 0.2}, "roughness needs a Newtonian oil"),
 ]
 
 

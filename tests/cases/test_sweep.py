@@ -188,7 +188,7 @@ HEAD = 'case = "slider"\n'
         (HEAD + "speed = [1]\n[grid]\nh0 = [1]", "unknown key 'speed'"),
         (HEAD + "h0 = 1\n[grid]\nh0 = [1]", "h0 is fixed and varied"),
         (HEAD + "[grid]\nh0 = [1, -1]", "h0 = -1: "),
-        (HEAD + '[grid]\nh0 = ["1 bar"]', "is no number in mm"),
+        (HEAD + '[grid]\nh0 = ["1 bar"]', "is not a number in mm"),
         (HEAD + "[grid]\nh0 = {from = 1, to = 2}", "count is missing"),
         (HEAD + "[grid]\nh0 = {from = 2, to = 1, count = 3}", "from 2 to 1; allowed: the smaller"),
         (HEAD + "[grid]\nh0 = {from = 1, to = 2, count = 3, scale = 1}", "unknown 'scale'"),

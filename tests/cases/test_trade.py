@@ -46,7 +46,7 @@ def test_an_oil_by_its_din_name_and_a_viscosity_in_one_word() -> None:
     [
         (("rod=36 f7",), 'which is not read; write the size alone, "36 mm"'),
         (("roughness=Ra 0.2",), "1.25 times as much where heights are distributed normally"),
-        (("roughness=Ra 0.2",), "write 0.251"),
+        (("roughness=Ra 0.2",), "distributed normally: 0.251"),
         (("roughness=Rz 1",), "write the rms height Rq"),
         (("shore_A=PU 95",), "a hardness gives a modulus from 20 to 90 Shore A"),
         (("material=PU 95",), 'material = "neo-hooke" and mu = "15 MPa"'),

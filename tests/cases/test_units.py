@@ -36,7 +36,7 @@ def test_other_texts_are_no_quantities(text: str) -> None:
 
 
 def test_a_wrong_unit_names_those_that_fit() -> None:
-    with pytest.raises(ValueError, match='"3 mm" is no number in MPa; units: MPa, GPa'):
+    with pytest.raises(ValueError, match='"3 mm" is not a number in MPa; allowed units: MPa, GPa'):
         read_quantity("3 mm", "MPa")
     with pytest.raises(ValueError, match="is a kinematic viscosity"):
         read_quantity("46 cSt", "MPa s")
@@ -47,7 +47,7 @@ def test_a_case_takes_them_in_every_key_with_a_unit() -> None:
     assert case.sealed_pressure == pytest.approx(3.0)
     assert case.speeds == (200.0, 100.0)
     assert case.viscosity == pytest.approx(4e-8)
-    with pytest.raises(ValueError, match=r"sealed_pressure: .* is no number in MPa"):
+    with pytest.raises(ValueError, match=r"sealed_pressure: .* is not a number in MPa"):
         ORing(sealed_pressure="30 mm")  # type: ignore[arg-type]
 
 

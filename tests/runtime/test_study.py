@@ -268,7 +268,11 @@ MISTAKES: list[tuple[str, Callable[[Any], object], str]] = [
         lambda s: s.add("b", pages.solid(), **{**SOLID, "thickness": np.ones(3)}),
         "thickness: one real number, or (8,) of them is needed; given float64 of shape (3,)",
     ),
-    ("predicate", lambda s: s.fix(lambda x: x[:, 0] > 9.0, u_x=0.0), "no node is meant"),
+    (
+        "predicate",
+        lambda s: s.fix(lambda x: x[:, 0] > 9.0, u_x=0.0),
+        "predicate chooses no node",
+    ),
     ("tie", lambda s: s.tie("left", "top", "u_x"), "3 and 5 nodes"),
     ("load of nothing", lambda s: s.load("left"), "load('left'): name an unknown"),
     ("spring of nothing", lambda s: s.spring("left"), "spring('left'): name an unknown"),

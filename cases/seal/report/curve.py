@@ -85,7 +85,7 @@ def _one_speed_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[Film
 def fitted_exponent(rows: Sequence[FilmRow]) -> float | None:
     """n of h* ~ |U|^n, one for both strokes, by least squares of the logarithms.
 
-    Only plain results count. None where no stroke has two of them.
+    Only states that are ok count. None where no stroke has two of them.
     """
     products = squares = 0.0
     for stroke in style.STROKES:

@@ -102,8 +102,8 @@ def _curve(runs: Sequence[FinishedRun]) -> Part:
         if run.rejected
     ]
     text = (
-        "h* over the rod speed; bars are the estimated error, a hollow mark is a state that is no "
-        "plain result. 'ok' means right within the stated error, and within 2 %."
+        "h* over the rod speed; bars are the estimated error, a hollow mark is a state whose "
+        "verdict is not ok. 'ok' means right within the stated error, and within 2 %."
     )
     if _several_speeds(runs):
         return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)

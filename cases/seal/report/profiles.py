@@ -26,7 +26,7 @@ _SHOWN = 20.0
 
 
 def profiles_figure(p: ORing, results: Results) -> Figure:
-    """Pressure above film thickness; what is no plain result is dotted and says why."""
+    """Pressure above film thickness; a state that is not ok is dotted, with its verdict."""
     from matplotlib.figure import Figure
 
     strokes = [stroke for stroke in style.STROKES if any(r.stroke == stroke for r, _ in results)]
