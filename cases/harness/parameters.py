@@ -183,5 +183,5 @@ def keys_of(kind: type[Parameters]) -> Iterator[Key]:
         field = kind.model_fields[name]
         extra = field.json_schema_extra
         assert isinstance(extra, dict)
-        words = (str(extra[k]) for k in ("unit", "bounds", "meaning"))
-        yield Key(name, field.default, *words, under.get(name, ""))
+        unit, bounds, meaning = (str(extra[k]) for k in ("unit", "bounds", "meaning"))
+        yield Key(name, field.default, unit, bounds, meaning, under.get(name, ""))

@@ -116,7 +116,7 @@ def draw_panel(axes: Axes, response: Response, column: Column) -> tuple[list[Any
             ((_place(row[response.key]), _height(row[column.name])) for row in rows),
             key=lambda point: (isinstance(point[0], str), point[0]),
         )
-        look = {
+        look: dict[str, Any] = {
             "color": colours.get(other or state, "C0"),
             "marker": _MARKERS[states.index(state)] if others and state else ".",
             "linestyle": "-" if other and len(points) > 1 else "",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import nan
 from pathlib import Path
 
 import pytest
@@ -79,10 +80,8 @@ def test_a_report_is_titled_by_its_seal() -> None:
 def test_no_text_of_a_sheet_is_a_formula(tmp_path: Path) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     texts = ("=1+1", "+1+1", "-1+1", "@A1")
-    write_xlsx(
-        [Part("x", tables=[Table("=1+1", texts, [texts, (1.0, 2, None, "ok")])])],
-        tmp_path / "a.xlsx",
-    )
+    table = Table("=1+1", texts, [texts, (1.0, 2, nan, "ok")])
+    write_xlsx([Part("x", tables=[table])], tmp_path / "a.xlsx")
     book = openpyxl.load_workbook(tmp_path / "a.xlsx")
     cells = [cell for line in book.worksheets[0].iter_rows() for cell in line]
     given = [cell for cell in cells if str(cell.value)[0] in "=+-@"]

@@ -292,7 +292,9 @@ def test_the_legend_of_a_tornado_is_beside_its_bars() -> None:
     figure.draw_without_rendering()
     (found,) = figure.legends
     for axes in figure.axes:
-        assert not found.get_window_extent().overlaps(axes.get_tightbbox())
+        box = axes.get_tightbbox()
+        assert box is not None
+        assert not found.get_window_extent().overlaps(box)
         assert axes.get_legend() is None
 
 

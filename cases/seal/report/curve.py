@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def _one_speed_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[Film
         words = [f"{height:.4g} µm"] if height else ["film collapsed:", "no result"]
         words += [f"± {abs(row.h_star_error_percent):.2g} %"] if known else []
         words += [row.verdict] if height and row.verdict != OK else []
-        offset = {"xytext": (0, 5), "textcoords": "offset points", "ha": "center"}
+        offset: Any = {"xytext": (0, 5), "textcoords": "offset points", "ha": "center"}
         axes.annotate("\n".join(words), (place, height + (error or 0.0)), **offset)
     axes.set_xticks(range(len(states)), [style.STROKES[row.stroke] for row in states])
     axes.set_xlabel(f"|U| = {abs(states[0].rod_speed_mm_s):g} mm/s")
