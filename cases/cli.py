@@ -34,6 +34,9 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
 @click.command(
     help=f"""Run CASE, a TOML file or the name of a case that ships ({_NAMES}).
 
+    The seals are rod seals: they sit in the housing, and the rod slides in them. There are no
+    piston seals.
+
     Writes curve.csv, the files of its rows, plots and run.json to DIR, each state as soon as it is
     there. Without --out, --resume and --overwrite mean the folder that was written to last.
     `softehl keys CASE` lists what can be set. Exit code: 0 done, 2 bad input, 3 not converged

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from softehl.cases.harness.case import AnyCase, Run, load_case
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.parameters import Parameters, files_of
+from softehl.cases.harness.parameters import Parameters, files_of, keys_of
 from softehl.cases.harness.units import is_quantity
 from softehl.runtime.library import KernelError
 from softehl.runtime.names import meant
@@ -145,7 +145,7 @@ def _text(path: Path) -> str:
 
 def require_known(kind: type[Parameters], keys: Iterable[str], origins: Mapping[str, str]) -> None:
     """Raise BadInput unless a case has all these keys.  origins: where they were given."""
-    known = list(kind.model_fields)
+    known = [one.name for one in keys_of(kind)]
     for key in keys:
         if key not in kind.model_fields:
             near = meant(key, known)

@@ -1,7 +1,7 @@
 """Up to which sealed pressure films are known to be found, told before a run.
 
-What counts is the sealed pressure over the shear modulus. The numbers are those of docs/limits.md
-(a random sample of 300 glands of O-rings) and docs/sections.md (a sample of other sections).
+What counts is the sealed pressure over the shear modulus. The numbers are those of docs/limits.md,
+of a random sample of 300 glands of O-rings and one of other sections.
 """
 
 from __future__ import annotations
@@ -18,9 +18,7 @@ _ROUND_WORDS = (
     f"every film of a sample of O-rings was right up to {_SURE:g}, 98 % up to 4, 89 % from 4 to 5, "
     f"and nothing was tried above {_TRIED:g} (docs/limits.md)"
 )
-_OTHER_WORDS = (
-    f"sections other than round were tried up to {_OTHER:g}, not above (docs/sections.md)"
-)
+_OTHER_WORDS = f"sections other than round were tried up to {_OTHER:g}, not above (docs/limits.md)"
 _DO = "the run may take minutes and end without a film; a harder rubber or a lower pressure helps"
 
 

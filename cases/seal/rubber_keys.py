@@ -46,7 +46,7 @@ class RubberKeys(Parameters):
     J_m: float | None = key(None, "Gent limit of I1bar - 3", gt=0, le=1e6)
     shore_A: float | None = key(
         None,
-        "hardness Shore A, for mu by Gent's rule; +- 5 Shore are about +- 25 % of it",
+        "hardness Shore A, for mu by Gent's rule; 5 Shore are 20 to 28 % of it at 70, more above",
         bounds='20 to 90, or "NBR 70"',
         ge=20,
         le=90,
