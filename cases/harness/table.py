@@ -17,6 +17,9 @@ from softehl.cases.harness.row import OK, Column, Record, Row
 _WIDTH = 110
 """Width where stdout is no terminal."""
 
+_DEFAULT = 15
+"""Width of the defaults in the table of keys, which is to be readable at 80 columns."""
+
 
 def print_rows(case: AnyCase, rows: Sequence[Row], rejected: Sequence[Row] = ()) -> None:
     """Print the rows to stdout, at full width where stdout is not a terminal.
@@ -68,16 +71,17 @@ def rows_table(
 def print_keys(kind: type[Parameters]) -> None:
     """Print every key under its heading with its default, unit, bounds and meaning to stdout."""
     table = Table(box=SIMPLE, padding=(0, 2, 0, 0), pad_edge=False)
-    for name in ("key", "default", "unit", "allowed", "meaning"):
-        table.add_column(name, no_wrap=name in ("key", "unit"), overflow="fold")
+    table.add_column("key", no_wrap=True)
+    table.add_column("default", max_width=_DEFAULT, overflow="fold")
+    table.add_column(Text("meaning [unit]; what is allowed"))
     for heading, keys in groupby(keys_of(kind), key=lambda key: key.heading):
         if heading:
             table.add_section()
             table.add_row(Text(heading.upper(), style="bold"))
         for key in keys:
-            cells = (key.name, default_text(key), key.unit, key.bounds, key.meaning)
-            table.add_row(*(Text(cell) for cell in cells))
-    _print(table, 2 * _WIDTH)
+            meaning = str(kind.model_fields[key.name].description)
+            table.add_row(*map(Text, (key.name, default_text(key), meaning)))
+    _print(table, _WIDTH)
 
 
 def default_text(key: Key) -> str:

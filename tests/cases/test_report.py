@@ -351,6 +351,11 @@ def test_smooth_surfaces_have_no_stribeck_picture() -> None:
     assert stribeck_figure(SEAL, power_law(0.6)) is None
 
 
+def test_one_speed_has_no_stribeck_picture() -> None:
+    p = ORing.model_validate({"roughness": 0.3})
+    assert stribeck_figure(p, [r for r in rough_rows() if abs(r.rod_speed_mm_s) == 4.0]) is None
+
+
 def test_films_that_flow_against_the_rod_are_left_out_of_the_curve() -> None:
     """Pressure drives oil through asperities faster than a slow rod: h* < 0."""
     rows = [*rough_rows(), replace(row(-0.01, 1.0), h_star_um=-0.2)]

@@ -324,7 +324,7 @@ def test_keys(capsys: pytest.CaptureFixture[str]) -> None:
     assert softehl.main(["keys", "slider"]) == 0
     lines = capsys.readouterr().out.splitlines()
     for name in Slider.model_fields:
-        assert sum(line.split()[:1] == [name] for line in lines) == 1
+        assert sum(line.startswith(f" {name} ") for line in lines) == 1
     assert any("viscosity" in line and "MPa s" in line and "> 0" in line for line in lines)
 
 

@@ -43,7 +43,7 @@ def crossing(p: ORing, rows: Sequence[FilmRow], ratio: float) -> float | None:
 
 
 def stribeck_figure(p: ORing, rows: Sequence[FilmRow]) -> Figure | None:
-    """Friction of both strokes and the shares of asperities; None for smooth surfaces."""
+    """Friction of both strokes and the shares of asperities; None for smooth ones or one speed."""
     from matplotlib.figure import Figure
 
     strokes = {
@@ -51,7 +51,7 @@ def stribeck_figure(p: ORing, rows: Sequence[FilmRow]) -> Figure | None:
         for stroke in style.STROKES
         if (found := [row for row in rows if row.regime and row.stroke == stroke])
     }
-    if not strokes:
+    if len({abs(row.rod_speed_mm_s) for found in strokes.values() for row in found}) < 2:
         return None
     figure = Figure(figsize=(5.4, 5.6))
     friction, shares = figure.subplots(2, 1, sharex=True, height_ratios=_PANELS)
