@@ -121,7 +121,7 @@ def test_what_is_whole_is_kept(done: Path, monkeypatch: pytest.MonkeyPatch) -> N
         (lambda c: c["versions"].update(softehl="0.0.1"), "another version: softehl 0.0.1, now"),
         (lambda c: c["kernels"].update(film="0123"), "other kernels: film"),
         (lambda c: c.update(kernels=None), "unknown kernels"),
-        (lambda c: c.update(parameters=[1]), "it names none"),
+        (lambda c: c.update(parameters=[1]), "run.json has none"),
         (lambda c: c.update(case="slider"), "case = 'slider'"),
         (lambda c: c.update(states={"a": 1}), "is damaged"),
         (lambda c: c.pop("states"), "is damaged"),
