@@ -29,10 +29,9 @@
  */
 #include "softehl_kernels.h"
 
-/* Lanes in which an equation g is far from zero: compared with the sum of
-   |slope * value| over the local unknowns and all that comes from outside. */
-static M softehl_unsolved_lanes(V g, double tolerance, int n, const V *A, const V *s,
-    int m, const V *B, const V *p)
+/* What cancels in an equation: the sum of |slope * value| over the local unknowns
+   and all that comes from outside. */
+static V softehl_terms_lanes(int n, const V *A, const V *s, int m, const V *B, const V *p)
 {
     V terms = softehl_splat(0.0);
     for (int k = 0; k < n; ++k) terms += softehl_vfabs(A[k] * s[k]);
@@ -40,7 +39,7 @@ static M softehl_unsolved_lanes(V g, double tolerance, int n, const V *A, const 
         const V term = softehl_vfabs(B[k] * p[k]);
         terms += softehl_blend(softehl_lt(term, softehl_splat(HUGE_VAL)), term, softehl_splat(0.0));
     }
-    return ~softehl_le(softehl_vfabs(g), tolerance * terms);
+    return terms;
 }
 
 /* Solve A x = b for `count` columns b in place, with partial pivoting in every lane
@@ -598,9 +597,16 @@ static void softehl_film_carreau_level_lanes(
         B[53] = softehl_splat(1.0);
         B[54] = softehl_splat(0.0);
         B[55] = softehl_splat(0.0);
-        for (int i = 0; i < 7; ++i)
-            far |= softehl_unsolved_lanes(
-                g[i], tolerance, 7, A + 7 * i, s, 8, B + 8 * i, p);
+        V felt[7];
+        for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
+        for (int i = 0; i < 7; ++i) {
+            const V terms = softehl_terms_lanes(7, A + 7 * i, s, 8, B + 8 * i, p);
+            far |= ~softehl_le(softehl_vfabs(g[i]), tolerance * terms);
+            for (int k = 0; k < 7; ++k) {
+                const V share = softehl_vfabs(A[7 * i + k]) / terms;
+                felt[k] = softehl_blend(softehl_lt(felt[k], share), share, felt[k]);
+            }
+        }
         failed |= softehl_eliminate_lanes(7, A, 1, g);
         spoilt |= active & failed;
         active &= ~failed;
@@ -608,7 +614,9 @@ static void softehl_film_carreau_level_lanes(
             s[k] = softehl_blend(active, s[k] - g[k], s[k]);
             const V change = softehl_vfabs(g[k]);
             const V close = tolerance * (0.0 + softehl_vfabs(s[k]));
-            far |= ~(softehl_le(change, close) | softehl_lt(0.9 * before[k], change));
+            const M rounding = softehl_lt(0.9 * before[k], change)
+                | softehl_le(felt[k] * change, softehl_splat(3.3306690738754696e-15));
+            far |= ~(softehl_le(change, close) | rounding);
             before[k] = change;
         }
         active &= far;

@@ -2,8 +2,12 @@
 #ifndef SOFTEHL_KERNELS_H
 #define SOFTEHL_KERNELS_H
 
-#include <math.h>
 #include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#else
+#include <math.h>
 
 /* One lane per element: 8 with AVX-512, else 4.  Without vector extensions a group is one element.
    A file of kernels in which 8 lanes do not pay says SOFTEHL_MOST_LANES 4. */
@@ -118,6 +122,13 @@ static inline V softehl_vpow(V a, double e)
 {
     V out;
     for (int l = 0; l < SOFTEHL_LANES; ++l) out[l] = pow(a[l], e);
+    return out;
+}
+
+static inline V softehl_vpower(V a, V e)
+{
+    V out;
+    for (int l = 0; l < SOFTEHL_LANES; ++l) out[l] = pow(a[l], e[l]);
     return out;
 }
 
@@ -263,6 +274,7 @@ typedef long long M;
 #define softehl_lane(a, l) (a)
 #define softehl_vfabs(a) fabs(a)
 #define softehl_vpow(a, e) pow(a, e)
+#define softehl_vpower(a, e) pow(a, e)
 #define softehl_vrcbrt(a) softehl_rcbrt(a)
 #define softehl_vexp(a) exp(a)
 #define softehl_vlog(a) log(a)
@@ -361,1030 +373,1036 @@ static inline void softehl_pad(double *to, const double *from, ptrdiff_t width, 
         for (ptrdiff_t k = 0; k < width; ++k)
             to[e * width + k] = from[(e < count ? e : count - 1) * width + k];
 }
+#endif
 
+/* No two arrays of a call overlap. */
 void softehl_solid_q4_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_q4_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_q4_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_q4_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_q4_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_fbar_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_fbar_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_fbar_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_fbar_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_yeoh_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_yeoh_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_yeoh_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_yeoh_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_yeoh_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_ogden_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_ogden_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_ogden_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_ogden_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_ogden_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_arruda_boyce_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_arruda_boyce_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_arruda_boyce_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_arruda_boyce_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_arruda_boyce_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_gent_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_gent_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_gent_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_gent_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_solid_taylor_mean_gent_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_follower_pressure_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_follower_pressure_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_follower_pressure_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_contact_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_contact_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_contact_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_contact_friction_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_contact_friction_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_contact_corner_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_contact_corner_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_contact_corner_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_upwind_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_upwind_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_upwind_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_facet_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_facet_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_facet_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_facet_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_facet_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_rough_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_rough_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_rough_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_rough_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_rough_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_upwind_rough_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_upwind_rough_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_upwind_rough_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_void_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_void_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_void_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_eyring_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_eyring_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_eyring_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_eyring_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_eyring_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_carreau_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_carreau_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_carreau_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_carreau_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_carreau_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_eyring_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_eyring_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_eyring_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_eyring_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_eyring_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_carreau_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_carreau_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_carreau_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_carreau_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_conserving_carreau_fields_rate(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_squeeze_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_squeeze_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_squeeze_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_squeeze_rough_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_squeeze_rough_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_squeeze_rough_fields(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_mean_rotation_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_mean_rotation_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_mean_rotation_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_mean_rotation_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_mean_axial_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_mean_axial_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_mean_axial_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_mean_axial_pseudo_load(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_axial_spring_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_axial_spring_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_axial_spring_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_mooney_rivlin_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_mooney_rivlin_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_mooney_rivlin_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_mooney_rivlin_d_mu_1(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_mooney_rivlin_d_mu_2(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_yeoh_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_yeoh_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_yeoh_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_yeoh_d_c_1(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_yeoh_d_c_2(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_yeoh_d_c_3(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_d_mu_1(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_d_alpha_1(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_d_mu_2(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_d_alpha_2(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_d_mu_3(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_ogden_d_alpha_3(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_arruda_boyce_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_arruda_boyce_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_arruda_boyce_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_arruda_boyce_d_mu(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_arruda_boyce_d_lambda_m(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_gent_energy(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_gent_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_gent_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_gent_d_mu(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_sheet_gent_d_J_m(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent);
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 
 const char *softehl_signature(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
