@@ -312,8 +312,10 @@ class Explorer:
                     sides.setdefault(f.values[k][0] > 0, f)
             if len(sides) == 2:
                 times = 10  # halves: NEAR of the line
-                first, second = sides.values()
-                near = {f.values[k][0] > 0: f for f in self._bisected(first, second, k, times)}
+                near = {
+                    f.values[k][0] > 0: f
+                    for f in self._bisected(sides[False], sides[True], k, times)
+                }
                 yield from (f.state for f in near.values())
 
 
