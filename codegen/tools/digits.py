@@ -84,7 +84,7 @@ class Exact:
 
     def __init__(self) -> None:
         self.functions = _guarded(mpmath, _by_mpmath)
-        self.functions["sqrt"] = lambda a: a.sqrt()
+        self.functions["sqrt"] = _root
 
     def number(self, value: Any) -> Number:
         """A float, fraction or decimal text, exactly."""
@@ -165,6 +165,11 @@ def _in_range(v: Number) -> Number:
     if size > LARGEST:
         raise OverflowError
     return Decimal(0) if size < SMALLEST else v
+
+
+def _root(a: Number) -> Number:
+    _inside(a >= 0)
+    return a.sqrt()
 
 
 def _total(*args: Number) -> Number:

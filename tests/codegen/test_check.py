@@ -157,6 +157,7 @@ def test_a_conductivity_that_is_constant_near_the_ordinary_state(
         lambda u, k: k * sp.exp(sp.cosh(u)) / (1 + sp.exp(sp.cosh(u))),  # overflows far away
         lambda u, k: k * sp.atan2(sp.sin(u), sp.cos(u)) * u,
         lambda u, k: sp.Piecewise((sp.log(u), u > k), (u - k, True)) * sp.erf(u),
+        lambda u, k: sp.Piecewise((sp.sqrt(sp.log(u)), u > 2), (k * u, True)),
         lambda u, k: sp.Max(sp.Abs(u - 40), k) ** sp.Rational(3, 2) + sp.sign(u + 9),
     ],
 )
