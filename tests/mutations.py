@@ -258,8 +258,8 @@ FAULTS = (
     ),
     Fault(
         "cases/seal/estimate.py",
-        "100.0 * (other / value - 1.0)",
-        "100.0 * (value / other - 1.0)",
+        "_percent(density, at) * (other / value - 1.0)",
+        "_percent(density, at) * (value / other - 1.0)",
         "tests/cases/test_estimate.py",
     ),
     Fault(
