@@ -218,7 +218,9 @@ def outcomes(family: str, branch: Node) -> set[bool]:
 
 
 def branches(d: Definition) -> list[Node]:
-    return [n for n in reachable([d.potential]) if n.op is Op.BRANCH]
+    """Those of a potential but for `x == x`, which asks for not-a-number."""
+    found = [n for n in reachable([d.potential]) if n.op is Op.BRANCH]
+    return [n for n in found if n.args[0].op is not Op.EQ or len(set(n.args[0].args)) > 1]
 
 
 # --------------------------------------------------------------------------- what must be refused
