@@ -16,7 +16,7 @@ _OTHER = 2.0
 
 _ROUND_WORDS = (
     f"every film of a sample of O-rings was right up to {_SURE:g}, 98 % up to 4, 89 % from 4 to 5, "
-    f"and nothing was tried above {_TRIED:g} (docs/limits.md)"
+    f"above that states are uncertain, and nothing was tried above {_TRIED:g} (docs/limits.md)"
 )
 _OTHER_WORDS = f"sections other than round were tried up to {_OTHER:g}, not above (docs/limits.md)"
 _DO = "the run may take minutes and end without a film; a harder rubber or a lower pressure helps"
