@@ -2,6 +2,7 @@
 // Every operation counts one, also a division, a root, a power, a logarithm; so does a change of
 // sign, but no copy, conversion, comparison or absolute value.
 #pragma once
+#define SOFTEHL_SOURCE  // the header gives what the kernels are made of, too
 #include <cmath>
 #include <cstddef>
 #include <cstdint>

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-#ifdef __cplusplus
+#if defined(__cplusplus) && !defined(SOFTEHL_SOURCE)
 extern "C" {
 #else
 #include <math.h>
@@ -1401,7 +1401,7 @@ void softehl_sheet_gent_d_J_m(
 
 const char *softehl_signature(void);
 
-#ifdef __cplusplus
+#if defined(__cplusplus) && !defined(SOFTEHL_SOURCE)
 }
 #endif
 

@@ -54,9 +54,10 @@ class ArcSteps:
             results.append(Result(system, problem, point, state[0][1]))
             self.on_step(results[-1])
 
-        problem, first_step = problem_at(begin + self.step), FirstStep(self.newton)
-        require_held(system, problem, x0)
+        first_step = FirstStep(self.newton)
         with np.errstate(all="ignore"):
+            problem = problem_at(begin + self.step)
+            require_held(system, problem, x0)
             first = first_step.newton.solve(problem, x0)
         if not first.converged:
             raise NotConverged(first)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from softehl.runtime.begin import SMALLEST, Beginning
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
@@ -43,7 +45,8 @@ class LoadSteps:
             self.on_step(reached[0])
 
         first = abs(until - begin) / self.steps or 1.0  # nowhere to go: one solution there
-        require_held(system, problem_at(begin + (until - begin) / self.steps), x0)
+        with np.errstate(all="ignore"):
+            require_held(system, problem_at(begin + (until - begin) / self.steps), x0)
         rule = StepRule(first, min(SMALLEST, first), first)
         path = Continuation(first_step.newton, rule, name="load factor")
         branch = path.follow(problem_at, begin, until, x0, on_point=keep)

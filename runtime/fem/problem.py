@@ -183,6 +183,15 @@ class Problem:
         found = size(balance.squares(self.layout.fields), balance.worst())
         return max(found, self._by_scales(defect))
 
+    def merit(self, x: Array) -> float:
+        """Norm of the residuals at x, (n,), each field relative to its forces there."""
+        if self.absolute:
+            return self.norm(self.residual(x))
+        r, forces = self.assembler.residual_and_size(x, self.parameters)
+        r[self.fixed] = 0.0
+        sizes = [[float(np.linalg.norm(v[f])) for v in (r, forces)] for f in self.layout.fields]
+        return float(np.linalg.norm([a / (b or 1.0) for a, b in sizes]))
+
     def _terms(self, magnitudes: Array, K: csc_array[np.float64]) -> Array:
         """What cancels in each equation, (n,), where unknowns have these magnitudes, (n,).
 

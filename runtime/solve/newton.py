@@ -73,6 +73,15 @@ class MeasuredProblem(NonlinearProblem, Protocol):
 
 
 @runtime_checkable
+class SearchedProblem(NonlinearProblem, Protocol):
+    """A problem with a number for line searches, which need one that is not bounded by 1."""
+
+    def merit(self, x: Array) -> float:
+        """Size of R(x), (n,), that falls along a good step."""
+        ...
+
+
+@runtime_checkable
 class RoundedProblem(NonlinearProblem, Protocol):
     """A problem that knows how well double precision can fulfil its equations."""
 
@@ -210,13 +219,15 @@ class Newton:
         fraction = min(problem.step_limit(state.x, dx), 1.0)  # in this order nan stays nan
         if not fraction > 0.0:
             return _end(state, Status.DIVERGED, "no part of the Newton step is admissible")
-        best, best_norm = state.x, math.inf
+        best, best_norm, least = state.x, math.inf, math.inf
+        before = self._merit(problem, state.x, state.norms[-1])
         for _ in range(self.halvings + 1):
             x = state.x + fraction * dx
             norm = _norm_at(problem, x, K)
-            if norm < best_norm:
-                best, best_norm = x, norm
-            if self._acceptable(norm, state.norms[-1], fraction):
+            merit = self._merit(problem, x, norm) if math.isfinite(norm) else math.inf
+            if merit < least:
+                best, best_norm, least = x, norm, merit
+            if math.isfinite(merit) and self._falls(merit, before, fraction):
                 break
             fraction *= 0.5
         if not math.isfinite(best_norm):
@@ -244,10 +255,14 @@ class Newton:
         r = problem.residual(state.x)
         return problem.beyond_rounding(r, state.x, K) <= self.tolerance
 
-    def _acceptable(self, norm: float, before: float, fraction: float) -> bool:
-        if not math.isfinite(norm):
-            return False
-        return not self.line_search or norm <= (1.0 - _SUFFICIENT_DECREASE * fraction) * before
+    def _merit(self, problem: NonlinearProblem, x: Array, norm: float) -> float:
+        """What a line search looks at."""
+        if self.line_search and isinstance(problem, SearchedProblem):
+            return problem.merit(x)
+        return norm
+
+    def _falls(self, merit: float, before: float, fraction: float) -> bool:
+        return not self.line_search or merit <= (1.0 - _SUFFICIENT_DECREASE * fraction) * before
 
 
 def _norm_at(problem: NonlinearProblem, x: Array, K: SparseMatrix | None = None) -> float:

@@ -50,5 +50,5 @@ def test_a_kernel_is_called_from_cpp(tmp_path: Path) -> None:
 
 def test_cffi_reads_the_prototypes() -> None:
     text = source.header([abi.declaration("spring", "energy")])
-    prototypes = text[text.index("void softehl_spring") : text.rindex("#ifdef __cplusplus")]
+    prototypes = text[text.index("void softehl_spring") : text.rindex("#if defined(__cplusplus)")]
     cffi.FFI().cdef(prototypes)
