@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from softehl.cases.harness.row import OK
@@ -16,6 +18,11 @@ def pressed(number: int) -> float:
     return p.sealed_pressure / p.shear_modulus
 
 
+def are_found(states: list[dict[str, Any]]) -> bool:
+    """Whether all h* hold: states are `ok`, or `uncertain` for their friction alone."""
+    return all(s["verdict"] == OK or s["advice"].startswith("friction ") for s in states)
+
+
 TENTH = [number for number in range(0, 300, 10) if pressed(number) <= MODULI]
 
 
@@ -26,10 +33,11 @@ def test_a_tenth_of_the_sample_is_what_its_page_says() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", TENTH)
-def test_every_state_of_a_drawn_gland_is_ok(number: int) -> None:
+def test_every_film_of_a_drawn_gland_is_found(number: int) -> None:
     found = solved(number, limit=200.0)
     assert found["message"] == ""
-    assert [state["verdict"] for state in found["states"]] == [OK] * (2 * len(SPEEDS))
+    assert len(found["states"]) == 2 * len(SPEEDS)
+    assert are_found(found["states"])
     assert all(abs(state["h_star_error_percent"]) < 2.0 for state in found["states"])
 
 
@@ -43,7 +51,8 @@ def test_a_ring_in_a_corner_has_its_films(number: int) -> None:
     """
     found = solved(number, limit=600.0)
     assert found["message"] == ""
-    assert [state["verdict"] for state in found["states"]] == [OK] * (2 * len(SPEEDS))
+    assert len(found["states"]) == 2 * len(SPEEDS)
+    assert are_found(found["states"])
 
 
 @pytest.mark.slow
@@ -51,14 +60,16 @@ def test_a_ring_in_a_corner_has_its_films(number: int) -> None:
 def test_a_rod_that_leaves_a_corner_has_its_films(number: int) -> None:
     """4.3 shear moduli, carried with patience, and 4.6, with the end of its arc on the wall."""
     found = solved(number, limit=600.0, stroke="out")
-    assert [state["verdict"] for state in found["states"]] == [OK] * len(SPEEDS)
+    assert len(found["states"]) == len(SPEEDS)
+    assert are_found(found["states"])
 
 
 @pytest.mark.slow
 def test_a_rod_that_pulls_a_ring_off_its_wall_has_its_films() -> None:
     # without an arc that goes up the wall none: 500 s
     found = solved(12, limit=1200.0, stroke="in")
-    assert [state["verdict"] for state in found["states"]] == [OK] * len(SPEEDS)
+    assert len(found["states"]) == len(SPEEDS)
+    assert are_found(found["states"])
 
 
 def test_the_arc_of_a_thick_film_is_made_longer() -> None:
