@@ -12,11 +12,11 @@ from softehl.codegen.graph.traverse import reachable
 
 Known = frozenset[Node]
 """Nodes that the sides of branches around a value say to be positive."""
-_ROOTS = (Op.SQRT, Op.CBRT, Op.RCBRT)
-_EVERYWHERE = frozenset(
+EVERYWHERE = frozenset(
     {Op.ADD, Op.SUB, Op.MUL, Op.NEG, Op.NAME, Op.SUM, Op.EXP, Op.SIN, Op.COS, Op.TAN, Op.ATAN}
     | {Op.SINH, Op.COSH, Op.TANH, Op.ASINH, Op.ERF, Op.ERFC, Op.ATAN2}
 )
+"""Operations with a value for all arguments that have one."""
 _WIDER = (Op.LOG, Op.ATANH)
 """Functions whose derivative has values where they have none."""
 _PLAIN = (Op.NAME, Op.NEG, Op.ADD, Op.SUB)
@@ -60,7 +60,7 @@ class Domain:
             return all(self.exists(n.args[k], side, depth) for k, side in sides)
         if not all(a.op in BOOLEAN or self.exists(a, known, depth) for a in n.args):
             return False
-        return n.op in _EVERYWHERE or not n.args or self._allowed(n, known)
+        return n.op in EVERYWHERE or not n.args or self._allowed(n, known)
 
     def _allowed(self, n: Node, known: Known) -> bool:
         """Whether the argument of a function lies in its domain."""

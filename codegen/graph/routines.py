@@ -18,7 +18,7 @@ from softehl.codegen.graph.arithmetic import number
 from softehl.codegen.graph.differentiate import gradient, guarded, plus
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, Place, Routine
 from softehl.codegen.graph.partials import DifferentiationError
-from softehl.codegen.graph.traverse import reachable, substitute
+from softehl.codegen.graph.traverse import reachable, substitute, written_out
 
 Matrix = list[list[Node]]
 Pairs = list[tuple[Node, Node]]
@@ -72,24 +72,13 @@ def sums_written_out(
     g: Graph, values: Sequence[Node], inside: set[Node], points: Sequence[Sequence[Fraction]]
 ) -> list[Node]:
     """`values` with the sums among `inside` as sums of one term for each of the `points`."""
-    new: dict[Node, Node] = {}
-    copies: list[dict[Node, Node]] = [{} for _ in points]
-    for n in reachable(values):
-        if n.op is Op.SUM:
-            new[n] = g.zero if n in inside else n
-            for copy in copies if n in inside else ():
-                new[n] = g.add(new[n], copy.get(n.args[0]) or new[n.args[0]])
-        elif not n.varying:
-            args = tuple(new[a] for a in n.args)
-            new[n] = g.rebuild(n.op, args, n.payload) if n in inside else n
-        elif isinstance(n.payload, Input):
-            for copy, point in zip(copies, points, strict=True):
-                copy[n] = g.const(point[n.payload.index]) if n.payload.array == "rule" else n
-        else:
-            for copy in copies:
-                args = tuple(copy[a] if a.varying else new[a] for a in n.args)
-                copy[n] = g.rebuild(n.op, args, n.payload)
-    return [new[v] for v in values]
+
+    def leaf(n: Node, q: int) -> Node:
+        source = n.payload
+        assert isinstance(source, Input)
+        return g.const(points[q][source.index]) if source.array == "rule" else n
+
+    return written_out(g, values, len(points), leaf, inside)
 
 
 def lifted(

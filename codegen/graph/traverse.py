@@ -100,3 +100,37 @@ def substitute(
         else:
             new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
     return [new[r] for r in roots], new
+
+
+def written_out(
+    g: Graph,
+    roots: Sequence[Node],
+    points: int,
+    leaf: Callable[[Node, int], Node],
+    inside: Collection[Node] | None = None,
+) -> list[Node]:
+    """Roots with sums over points as one term for each of the `points`.
+
+    leaf: what an argument that varies is at a point. inside: values that do not vary and are not
+    among these stay as they are, with the sums below them; None: nothing stays.
+    """
+    new: dict[Node, Node] = {}
+    copies: list[dict[Node, Node]] = [{} for _ in range(points)]
+
+    def at(n: Node, q: int) -> Node:
+        return copies[q][n] if n.varying else new[n]
+
+    for n in reachable(roots):
+        if not n.varying and inside is not None and n not in inside:
+            new[n] = n
+        elif n.op is Op.SUM:
+            new[n] = g.zero
+            for q in range(points):
+                new[n] = g.add(new[n], at(n.args[0], q))
+        elif not n.varying:
+            new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
+        else:
+            for q, copy in enumerate(copies):
+                args = tuple(at(a, q) for a in n.args)
+                copy[n] = g.rebuild(n.op, args, n.payload) if args else leaf(n, q)
+    return [new[r] for r in roots]

@@ -24,17 +24,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from softehl.codegen.graph.domain import EVERYWHERE
 from softehl.codegen.graph.field import PRIME, image, root
 from softehl.codegen.graph.graph import BOOLEAN, ODD, Graph, Node, Op, Payload
 from softehl.codegen.graph.traverse import reachable
 
-_EVERYWHERE = (
-    frozenset(
-        {Op.EXP, Op.SIN, Op.COS, Op.SINH, Op.COSH, Op.TANH, Op.ATAN, Op.ASINH, Op.ERF, Op.ERFC}
-    )
-    | frozenset({Op.INPUT, Op.PI, Op.SUM, Op.BRANCH, Op.ITEM})
-    | BOOLEAN
-)
+_EVERYWHERE = EVERYWHERE | BOOLEAN | {Op.CONST, Op.INPUT, Op.PI, Op.BRANCH, Op.ITEM}
 """Operations with a value for all arguments that have one."""
 _APART = frozenset({Op.CONST, Op.PI, Op.CALL}) | BOOLEAN
 """What is never replaced: it costs nothing, or is no number."""
@@ -127,7 +122,7 @@ class _Values:
         return self.atoms[key]
 
     def _own_conditions(self, n: Node) -> int:
-        if n.op in (Op.CONST, Op.NAME, Op.ADD, Op.SUB, Op.MUL, Op.NEG) or n.op in _EVERYWHERE:
+        if n.op in _EVERYWHERE:
             return 0
         if n.op in (Op.RECIP, Op.POW) and _exponent(n).denominator == 1:
             return self._nonzero(n.args[0]) if _exponent(n) < 0 else 0
@@ -140,7 +135,7 @@ class _Values:
         stack = [n]
         while stack:
             a = stack.pop()
-            if a.op is Op.MUL or (a.op is Op.NEG):
+            if a.op in (Op.MUL, Op.NEG):
                 stack += a.args
             elif a.op is not Op.CONST:
                 value = self.of[a]

@@ -21,6 +21,7 @@ from softehl.codegen.graph.traverse import (
     reachable,
     recursion,
     rewrite,
+    written_out,
 )
 from softehl.codegen.optimise.factors import chain, factor, product, uses
 from softehl.codegen.optimise.identity import merge_equal
@@ -210,30 +211,13 @@ def unrolled(points: Sequence[Sequence[Fraction]], data: tuple[int, int] = (0, 0
     """
 
     def apply(g: Graph, roots: Roots) -> Roots:
-        new: dict[Node, Node] = {}
-        copies: list[dict[Node, Node]] = [{} for _ in points]
+        def leaf(n: Node, q: int) -> Node:
+            assert isinstance(n.payload, Input)
+            if n.payload.array == "point data":
+                return g.input("data", data[0] + data[1] * q + n.payload.index)
+            return g.const(points[q][n.payload.index])
 
-        def at(n: Node, q: int) -> Node:
-            return copies[q][n] if n.varying else new[n]
-
-        for n in reachable(roots):
-            if n.op is Op.SUM:
-                new[n] = g.zero
-                for q in range(len(points)):
-                    new[n] = g.add(new[n], at(n.args[0], q))
-            elif not n.varying:
-                new[n] = g.rebuild(n.op, tuple(new[a] for a in n.args), n.payload)
-            else:
-                for q, point in enumerate(points):
-                    if isinstance(n.payload, Input) and n.payload.array == "point data":
-                        index = data[0] + data[1] * q + n.payload.index
-                        copies[q][n] = g.input("data", index)
-                    elif isinstance(n.payload, Input):
-                        copies[q][n] = g.const(point[n.payload.index])
-                    else:
-                        args = tuple(at(a, q) for a in n.args)
-                        copies[q][n] = g.rebuild(n.op, args, n.payload)
-        return [new[r] for r in roots]
+        return written_out(g, roots, len(points), leaf)
 
     return Pass("unroll", apply)
 
