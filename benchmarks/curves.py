@@ -50,8 +50,8 @@ def watched(clock: Clock) -> Iterator[None]:
     from softehl.cases.harness.record import RunRecord
     from softehl.cases.harness.session import Reporter
     from softehl.cases.oring import ORingCase
-    from softehl.cases.seal.contact_route import ContactRoute
-    from softehl.cases.seal.path import PathDriver
+    from softehl.cases.seal.solve.contact_route import ContactRoute
+    from softehl.cases.seal.solve.path import PathDriver
 
     watched = [
         (PathDriver, "follow", part_of),
@@ -118,7 +118,7 @@ def measure(name: str) -> dict[str, float]:
         begun = time.process_time()
         import softehl.cases.cli
         import softehl.cases.oring
-        import softehl.cases.seal.method  # noqa: F401
+        import softehl.cases.seal.solve.method  # noqa: F401
 
         imports = time.process_time() - begun
         if name == "default run":

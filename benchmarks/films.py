@@ -21,9 +21,9 @@ import numpy as np
 
 from softehl.cases.cycle import CASE, Cycle
 from softehl.cases.harness.observer import Observer, Outcome, State
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import Silent
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import Silent
 
 ROUGHNESS = 0.3
 SMOOTH, STRIBECK = (50.0, 2000.0), (0.01, 2000.0)

@@ -16,10 +16,11 @@ from unittest.mock import patch
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded
 
 from benchmarks.clock import Clock
-from softehl.cases.seal import method, sensitivity, strokes
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.quantities import QUANTITIES
-from softehl.cases.seal.state import Silent
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.sensitivity import sensitivity
+from softehl.cases.seal.sensitivity.quantities import QUANTITIES
+from softehl.cases.seal.solve import method, strokes
+from softehl.cases.seal.states.state import Silent
 
 
 def measured(p: ORing, wanted: Sequence[str]) -> tuple[float, float, int]:

@@ -24,9 +24,9 @@ from typing import Any
 
 from benchmarks.solver_summary import difference, summary
 from softehl.cases.paper.states import PAPER
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import COLLAPSED, Silent
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import COLLAPSED, Silent
 from softehl.runtime.io import write_json
 
 

@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.sections import SECTIONS
-from softehl.cases.seal.state import Silent
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import Silent
 
 SEED = 32
 QUANTITIES = ("h_star_um", "rod_friction_N", "leak_rate_mm3_s")

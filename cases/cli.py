@@ -271,8 +271,8 @@ def design(case: str, words: tuple[str, ...], key: str, assignments: tuple[str, 
     """Find the value of a key."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.errors import BadInput
-    from softehl.cases.seal.design_command import design_case
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.sensitivity.design_command import design_case
 
     read = read_case(case, SHIPPED, assignments)
     if type(read.parameters) is not ORing:

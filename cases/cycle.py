@@ -16,15 +16,15 @@ from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Row, column
-from softehl.cases.seal.answer import leaks
-from softehl.cases.seal.assumed import assumed
-from softehl.cases.seal.headings import CYCLE
-from softehl.cases.seal.idle import idle
-from softehl.cases.seal.motion import Motion, motion_keys, motion_of
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.reach import beyond_reach, reach
+from softehl.cases.seal.cycle.motion import Motion, motion_keys, motion_of
+from softehl.cases.seal.gland.assumed import assumed
+from softehl.cases.seal.gland.headings import CYCLE
+from softehl.cases.seal.gland.idle import idle
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.reach import beyond_reach, reach
+from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
 from softehl.cases.seal.report.limits import LEFT_OUT
-from softehl.cases.seal.sections.keys import NAMES, ROUND
+from softehl.cases.seal.states.answer import leaks
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
 
@@ -145,7 +145,7 @@ class CycleRow(Row):
 
 
 def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) -> CycleRow:
-    """A cycle in numbers; films: what happened in it, see `cases.seal.cycles.Films`.
+    """A cycle in numbers; films: what happened in it, see `cases.seal.cycle.cycles.Films`.
 
     before: the reading at its start, last: the row before it or None.
     """
@@ -260,7 +260,7 @@ class CycleCase(Case[Cycle, CycleRow]):
 
     def solve(self, parameters: Cycle, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`."""
-        from softehl.cases.seal.cycles import run_cycles
+        from softehl.cases.seal.cycle.cycles import run_cycles
 
         def log(number: int, films: Any, before: Any, last: Any) -> CycleRow:
             row = cycle_row(number, 0.5 * parameters.rod_diameter, films, before, last)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.table import column_lines, key_lines
-from softehl.cases.seal.sections import SECTIONS
-from softehl.cases.seal.sections.keys import dimensions
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.keys import dimensions
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.io import write_text
 

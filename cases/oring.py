@@ -9,20 +9,21 @@ from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
-from softehl.cases.seal import catalogue, plan
-from softehl.cases.seal.answer import answer
-from softehl.cases.seal.assumed import assumed
-from softehl.cases.seal.idle import idle
-from softehl.cases.seal.leakage import net_leakage
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.reach import beyond_reach, reach
+from softehl.cases.seal.gland import catalogue
+from softehl.cases.seal.gland.assumed import assumed
+from softehl.cases.seal.gland.idle import idle
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.reach import beyond_reach, reach
+from softehl.cases.seal.gland.rubbers.rubber import soft
+from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
-from softehl.cases.seal.rubber import soft
-from softehl.cases.seal.sections.keys import NAMES, ROUND
-from softehl.cases.seal.sensitivity_table import resolved
-from softehl.cases.seal.state import FilmRow
-from softehl.cases.seal.telling import Teller
+from softehl.cases.seal.states import plan
+from softehl.cases.seal.states.answer import answer
+from softehl.cases.seal.states.leakage import net_leakage
+from softehl.cases.seal.states.sensitivity_table import resolved
+from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.seal.states.telling import Teller
 
 
 class ORingCase(Case[ORing, FilmRow]):
@@ -44,7 +45,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def solve(self, parameters: ORing, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`; runs of one section share their contact states."""
-        from softehl.cases.seal.method import run
+        from softehl.cases.seal.solve.method import run
 
         return run(parameters, Teller(observer), contacts=shared)
 
@@ -144,7 +145,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def share(self, parameters: ORing) -> tuple[float, str]:
         """See :class:`Case`."""
-        from softehl.cases.seal.contact_store import contact_key
+        from softehl.cases.seal.solve.contact_store import contact_key
 
         return parameters.density, contact_key(parameters)
 

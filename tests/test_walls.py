@@ -49,8 +49,17 @@ ORDER = {
         *("follow load march", "study"),
     ),
     "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "cli document"),
+    "cases/seal": (
+        *("gland", "section", "equations", "states"),
+        *("solve", "sensitivity", "cycle", "report"),
+    ),
 }
 """Folders and files of a room, each of which imports only those before it; some are one level."""
+EXCEPTIONS: dict[str, dict[str, set[str]]] = {
+    # a stroke differentiates its films as it reports them
+    "cases/seal": {"cases/seal/solve/strokes.py": {"sensitivity"}},
+}
+"""Files of a room that import what comes after them."""
 PENDING: dict[str, str] = {}
 """Rooms that are still being put in order, and why."""
 SOLVERS = sorted(path.stem for path in (ROOT / "runtime" / "solve").glob("*.py"))
@@ -90,8 +99,9 @@ def later_imports(room: str, path: Path, source: str | None = None) -> set[str]:
     """What a file imports from its room and must not, because it comes later."""
     place = {unit: n for n, level in enumerate(ORDER[room]) for unit in level.split()}
     text = path.read_text(encoding="utf-8") if source is None else source
-    names = [name.removeprefix("softehl.").split(".") for name in imports_of(text)]
-    units = {name[1] for name in names if name[0] == room and len(name) > 1}
+    names, inside = imports_of(text), room.replace("/", ".") + "."
+    found = [name.removeprefix("softehl.") for name in names]
+    units = {n.removeprefix(inside).split(".")[0] for n in found if n.startswith(inside)}
     limit = place[unit_of(room, path)]
     return {unit for unit in units & set(place) if place[unit] > limit}
 
@@ -113,7 +123,7 @@ def test_rooms_import_only_what_they_may(room: str) -> None:
         ("cases", "import softehl.codegen.tools.build"),
         ("cases", "def f():\n    from codegen import graph"),
         ("runtime", "from softehl.codegen.graph.graph import Graph"),
-        ("runtime", "import softehl.cases.seal.method"),
+        ("runtime", "import softehl.cases.seal.solve.method"),
         ("codegen", "from softehl.runtime.fem.rules import gauss"),
     ],
 )
@@ -128,7 +138,8 @@ def test_folders_import_only_what_comes_before_them(room: str) -> None:
         for path in files_of(room)
         if path.parent != ROOT / room or path.stem != "__init__"
     }
-    assert {path: names for path, names in found.items() if names} == {}
+    late = {path: names for path, names in found.items() if names}
+    assert late == EXCEPTIONS.get(room, {})
 
 
 @pytest.mark.parametrize("room", ORDER)
@@ -145,9 +156,13 @@ def test_every_folder_has_its_place(room: str) -> None:
         ("codegen", "emit/c.py", "from softehl.codegen import pipeline"),
         ("runtime", "mesh/mesh.py", "def f():\n    import softehl.runtime.fem.dofs"),
         ("runtime", "fem/dofs.py", "from softehl.runtime.solve.newton import Newton"),
-        ("cases", "harness/record.py", "from softehl.cases.seal.state import FilmRow"),
-        ("cases", "seal/method.py", "from softehl.cases import oring"),
+        ("cases", "harness/record.py", "from softehl.cases.seal.states.state import FilmRow"),
+        ("cases", "seal/solve/method.py", "from softehl.cases import oring"),
         ("cases", "paper/states.py", "import softehl.cases.cli"),
+        ("cases/seal", "gland/oils.py", "from softehl.cases.seal.section import layout"),
+        ("cases/seal", "gland/sections/keys.py", "import softehl.cases.seal.states.state"),
+        ("cases/seal", "states/verdict.py", "from softehl.cases.seal import solve"),
+        ("cases/seal", "solve/film.py", "def f():\n    from softehl.cases.seal import cycle"),
     ],
 )
 def test_an_import_out_of_order_is_seen(room: str, path: str, source: str) -> None:

@@ -21,8 +21,8 @@ from softehl.cases.paper.item import (
     state_table,
 )
 from softehl.cases.paper.states import PAPER, STABILISED, Request, State, Store, ask, setup
-from softehl.cases.seal.leakage import LeakageRow, net_leakage
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
 from softehl.runtime.io import Cell
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def _leakage_setups(scope: Scope) -> list[ORing]:
 
 
 def leakage(store: Store, scope: Scope) -> Product:
-    """Net leakage of a cycle over sealed pressure and speed, `cases.seal.leakage`."""
+    """Net leakage of a cycle over sealed pressure and speed, `cases.seal.states.leakage`."""
     setups, speeds = _leakage_setups(scope), both(scope.some_speeds())
     rows = []
     for p in setups:

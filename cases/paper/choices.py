@@ -8,7 +8,7 @@ from typing import Any
 from softehl.cases.paper.item import Item, Product, Scope, Table, both, density_words, with_all
 from softehl.cases.paper.states import PAPER, STABILISED, Request, Store, ask, setup
 from softehl.cases.paper.tables import counted
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.runtime.io import Cell
 
 ARCS = ((-34.0, 43.0), (-33.0, 42.0), (-36.0, 46.0), (-38.0, 49.0))

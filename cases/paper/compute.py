@@ -14,8 +14,8 @@ from softehl.cases.harness.processes import processes
 from softehl.cases.harness.sweep import Curve, Task, shared_folder, solved
 from softehl.cases.oring import CASE
 from softehl.cases.paper.states import ENDED, Request, Store
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.plan import rod_speeds, strokes_of
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.plan import rod_speeds, strokes_of
 from softehl.runtime.io import read_json
 
 

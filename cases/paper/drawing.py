@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from softehl.cases.paper.item import Product
 from softehl.cases.paper.states import State
-from softehl.cases.seal.state import Profile
+from softehl.cases.seal.states.state import Profile
 from softehl.runtime.io import replacing
 
 if TYPE_CHECKING:

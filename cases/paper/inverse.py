@@ -19,7 +19,7 @@ import numpy as np
 
 from softehl.cases.paper.item import STUDY_DENSITIES, Item, Product, Scope, Table, both
 from softehl.cases.paper.states import Request, State, Store, ask, setup
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import Cell
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from softehl.cases.paper.item import Scope
 from softehl.cases.paper.states import State, Store, setup
-from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 
 

@@ -14,10 +14,10 @@ from softehl.cases.harness.curve import CurveFolder
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.sweep import differences
 from softehl.cases.oring import CASE
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.plan import SIGNS
-from softehl.cases.seal.state import COLLAPSED, FilmRow, Profile
-from softehl.cases.seal.telling import read_profile
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.plan import SIGNS
+from softehl.cases.seal.states.state import COLLAPSED, FilmRow, Profile
+from softehl.cases.seal.states.telling import read_profile
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import number_text, read_columns, read_json
 
@@ -106,7 +106,7 @@ class State:
 
     @property
     def verdict(self) -> str:
-        """One of `cases.seal.state`, or :data:`NOT_REACHED`."""
+        """One of `cases.seal.states.state`, or :data:`NOT_REACHED`."""
         return self.row.verdict if self.row else NOT_REACHED
 
     @property

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from softehl.__main__ import main
     from softehl.cases.harness.processes import processes
     from softehl.cases.harness.sweep import Curve
-    from softehl.cases.seal.method import run as run_oring
-    from softehl.cases.seal.parameters import ORing
-    from softehl.cases.seal.state import FilmState, Observer, Outcome, Silent
+    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.solve.method import run as run_oring
+    from softehl.cases.seal.states.state import FilmState, Observer, Outcome, Silent
     from softehl.cases.shipped import solve_cases
     from softehl.codegen.language import kinematics
     from softehl.codegen.language.definition import Definition
@@ -47,23 +47,23 @@ _PUBLIC = {
     "Curve": "softehl.cases.harness.sweep",
     "DofLayout": "softehl.runtime.fem.dofs",
     "ElementBlock": "softehl.runtime.fem.assembly",
-    "FilmState": "softehl.cases.seal.state",
+    "FilmState": "softehl.cases.seal.states.state",
     "Kernel": "softehl.runtime.kernels",
     "Mesh": "softehl.runtime.mesh.mesh",
     "Newton": "softehl.runtime.solve.newton",
-    "ORing": "softehl.cases.seal.parameters",
-    "Observer": "softehl.cases.seal.state",
-    "Outcome": "softehl.cases.seal.state",
+    "ORing": "softehl.cases.seal.gland.parameters",
+    "Observer": "softehl.cases.seal.states.state",
+    "Outcome": "softehl.cases.seal.states.state",
     "Problem": "softehl.runtime.fem.problem",
     "ProblemError": "softehl.runtime.fem.checks",
-    "Silent": "softehl.cases.seal.state",
+    "Silent": "softehl.cases.seal.states.state",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
     "StepRule": "softehl.runtime.solve.steps",
     "Study": "softehl.runtime.study",
     "main": "softehl.__main__",
     "processes": "softehl.cases.harness.processes",
-    "run_oring": "softehl.cases.seal.method:run",
+    "run_oring": "softehl.cases.seal.solve.method:run",
     "solve_cases": "softehl.cases.shipped",
 }
 _MODELLING = {

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 import softehl
-from softehl.cases.seal.sections import SECTIONS
+from softehl.cases.seal.gland.sections import SECTIONS
 
 SEED = 16
 LIMIT = 60  # seconds

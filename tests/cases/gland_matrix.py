@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.catalogue import as568
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import FilmState, Silent
+from softehl.cases.seal.gland.catalogue import as568
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import FilmState, Silent
 
 SEED = 13
 SPEEDS = (1000.0, 100.0, 10.0)

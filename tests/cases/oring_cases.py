@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.state import FilmRow
 
 
 def oring(**changes: Any) -> ORing:

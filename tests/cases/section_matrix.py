@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.sections import SECTIONS
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.sections import SECTIONS
 from tests.cases.gland_matrix import SPEEDS, main
 
 SEED = 17

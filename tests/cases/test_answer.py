@@ -12,9 +12,9 @@ from softehl.cases import cycle, oring
 from softehl.cases.harness.report.page import parts_of, render, write_xlsx
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.answer import answer
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import UNCERTAIN, FilmRow
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.answer import answer
+from softehl.cases.seal.states.state import UNCERTAIN, FilmRow
 from tests.cases.test_leakage import row
 
 

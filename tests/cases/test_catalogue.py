@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import pytest
 
-from softehl.cases.seal import catalogue
-from softehl.cases.seal.catalogue import (
+from softehl.cases.seal.gland import catalogue
+from softehl.cases.seal.gland.catalogue import (
     INCH,
     Range,
     UnknownGlandError,

@@ -24,10 +24,10 @@ from softehl.cases.harness.report.page import read_finished
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import NOT_CONVERGED
 from softehl.cases.oring import ORingCase
-from softehl.cases.seal.method import run as solve_really
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.report import PICTURES
-from softehl.cases.seal.state import (
+from softehl.cases.seal.solve.method import run as solve_really
+from softehl.cases.seal.states.state import (
     COLLAPSED,
     UNCERTAIN,
     ContactState,
@@ -39,7 +39,7 @@ from softehl.cases.seal.state import (
     StageRecord,
     place,
 )
-from softehl.cases.seal.telling import Teller
+from softehl.cases.seal.states.telling import Teller
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.kernels import MissingKernelsError
 from softehl.runtime.library import library_of

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal.contact import contact_problem
-from softehl.cases.seal.contact_store import (
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.keys import dimensions
+from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.solve.contact_store import (
     WITHOUT_INFLUENCE,
     ContactStore,
     contact_key,
     stored_contact,
 )
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.sections import SECTIONS
-from softehl.cases.seal.sections.keys import dimensions
-from softehl.cases.seal.state import Outcome, Silent
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.solve.newton import Newton
 

@@ -17,10 +17,13 @@ from pydantic import ValidationError
 import softehl
 from softehl.cases.cycle import CASE, Cycle, cycle_row
 from softehl.cases.harness.pictures import titled
-from softehl.cases.seal import cycles
-from softehl.cases.seal.cycles import Films
-from softehl.cases.seal.motion import Motion, RodFilm, Table, differences
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.cycle import cycles
+from softehl.cases.seal.cycle.cycles import Films
+from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table, differences
+from softehl.cases.seal.cycle.strip import Oil, Strip
+from softehl.cases.seal.cycle.transient import Reading
+from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE, VOID
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.report.cycle import (
     MovingSection,
     film_map,
@@ -28,9 +31,6 @@ from softehl.cases.seal.report.cycle import (
     map_figure,
     write_animation,
 )
-from softehl.cases.seal.strip import Oil, Strip
-from softehl.cases.seal.system import FILM, PRESSURE, SQUEEZE, VOID
-from softehl.cases.seal.transient import Reading
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, read_table
 from softehl.runtime.solve.newton import Newton

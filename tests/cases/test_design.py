@@ -11,11 +11,18 @@ from typing import Any
 import pytest
 
 from softehl.__main__ import main
-from softehl.cases.seal.design import Change, NoDesignError, Step, Target, designed, settled
-from softehl.cases.seal.held import HeldFilm
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import FilmState, Silent
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.sensitivity.design import (
+    Change,
+    NoDesignError,
+    Step,
+    Target,
+    designed,
+    settled,
+)
+from softehl.cases.seal.sensitivity.held import HeldFilm
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import FilmState, Silent
 from tests.cases.oring_cases import film_values
 
 P = ORing()

@@ -8,14 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softehl.cases.seal import grading
-from softehl.cases.seal.contact import contact_problem, lies_in_corner
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.contacts import contact_edges
-from softehl.cases.seal.drag import dragged, pushed
-from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.film import film_on, start_speed
-from softehl.cases.seal.grading import (
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.loads import Stroke
+from softehl.cases.seal.equations.scales import film_flux
+from softehl.cases.seal.solve import grading
+from softehl.cases.seal.solve.contact import contact_problem, lies_in_corner
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.drag import dragged, pushed
+from softehl.cases.seal.solve.film import film_on, start_speed
+from softehl.cases.seal.solve.grading import (
     COVERED,
     FINEST,
     MULTIPLE,
@@ -27,11 +28,10 @@ from softehl.cases.seal.grading import (
     placed_layout,
     sweeps,
 )
-from softehl.cases.seal.loads import Stroke
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.pressure_newton import roughly
-from softehl.cases.seal.scales import film_flux
-from softehl.cases.seal.state import Silent
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.pressure_newton import roughly
+from softehl.cases.seal.states.contacts import contact_edges
+from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
 from tests.cases.gland_matrix import drawn

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.entrance import built_up, facing, wedge_friction
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.loads import FilmLoads, Stroke
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import CLIPPED, FilmState, Silent
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.loads import FilmLoads, Stroke
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.entrance import built_up, facing, wedge_friction
+from softehl.cases.seal.states.state import CLIPPED, FilmState, Silent
 
 FLOW, SLOPE, H_STAR = 4e-4, 0.3, 2e-3
 

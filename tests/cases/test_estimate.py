@@ -11,23 +11,25 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal import method
-from softehl.cases.seal.coarser_films import CoarserFilms
-from softehl.cases.seal.estimate import (
+from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.gland.parameters import DENSITIES, ORing
+from softehl.cases.seal.solve import method
+from softehl.cases.seal.solve.coarser_films import CoarserFilms
+from softehl.cases.seal.solve.film import FastFilm
+from softehl.cases.seal.solve.film_path import OnSpeed
+from softehl.cases.seal.solve.film_transfer import FilmTransfer
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import Stage, StageFailed
+from softehl.cases.seal.solve.stroke_start import StrokeStart
+from softehl.cases.seal.solve.wanted import Found, Wanted
+from softehl.cases.seal.states.estimate import (
     ORDER,
     coarser_density,
     estimated_error,
     finer_density,
     reservation,
 )
-from softehl.cases.seal.film import FastFilm
-from softehl.cases.seal.film_path import OnSpeed
-from softehl.cases.seal.film_transfer import FilmTransfer
-from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import DENSITIES, ORing
-from softehl.cases.seal.path import Stage, StageFailed
-from softehl.cases.seal.state import (
+from softehl.cases.seal.states.state import (
     CLIPPED,
     COLLAPSED,
     UNCERTAIN,
@@ -36,9 +38,7 @@ from softehl.cases.seal.state import (
     Outcome,
     Silent,
 )
-from softehl.cases.seal.stroke_start import StrokeStart
-from softehl.cases.seal.verdict import LARGEST_ERROR, FilmNumbers
-from softehl.cases.seal.wanted import Found, Wanted
+from softehl.cases.seal.states.verdict import LARGEST_ERROR, FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import Disc, disc_mesh
 from softehl.runtime.solve.solution import Point

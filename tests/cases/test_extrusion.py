@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal.contact import load_stage
-from softehl.cases.seal.contact_results import contact_numbers
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.failure import explained
-from softehl.cases.seal.loading import State
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.state import Silent
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact import load_stage
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.failure import explained
+from softehl.cases.seal.solve.loading import State
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.states.contact_results import contact_numbers
+from softehl.cases.seal.states.state import Silent
 from softehl.runtime.solve.solution import Branch, Status
 
 

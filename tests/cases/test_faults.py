@@ -23,8 +23,8 @@ from softehl.cases.harness import table
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.lock import FolderLock
 from softehl.cases.oring import CASE
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import FilmRow, Observer
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.state import FilmRow, Observer
 from tests.cases.test_cli import FAST, Fake, film_state, solve
 
 FOLDER = ("run", "oring", *FAST, "--out", "a")

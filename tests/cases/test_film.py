@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal import film as seal_film
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.film import first_film
-from softehl.cases.seal.layers import film_layer
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathSettings
-from softehl.cases.seal.state import Outcome
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.layers import film_layer
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve import film as seal_film
+from softehl.cases.seal.solve.film import first_film
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import PathSettings
+from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layered
 from softehl.runtime.solve.backends import choose

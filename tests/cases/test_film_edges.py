@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from softehl.cases.seal.contacts import Edge
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.film_edges import between, film_edges
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import COLLAPSED, OSCILLATING, FilmRow, doubt
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.contacts import Edge
+from softehl.cases.seal.states.film_edges import between, film_edges
+from softehl.cases.seal.states.state import COLLAPSED, OSCILLATING, FilmRow, doubt
 from softehl.runtime.arrays import Array
 from tests.cases.oring_cases import film_values
 

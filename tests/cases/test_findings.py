@@ -14,7 +14,7 @@ from softehl.cases.paper.item import Scope
 from softehl.cases.paper.query import Query
 from softehl.cases.paper.states import State, Store, setup
 from softehl.cases.paper.tables import TABLE_2, unknowns
-from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.states.state import FilmRow
 from tests.cases.oring_cases import film_values
 
 Told = Callable[..., dict[str, Any]]

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
 
 
 def test_a_ring_on_a_rod_comes_with_its_standard_gland() -> None:

@@ -9,17 +9,18 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
-from softehl.cases.seal.contact import along, lean_stage, load_stage, squeeze_stage
-from softehl.cases.seal.contact_results import unsealed
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.contacts import contact_edges
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.failure import explained
-from softehl.cases.seal.grading import film_thickness
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.state import (
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.system import BORE, ROD
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact import along, lean_stage, load_stage, squeeze_stage
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.failure import explained
+from softehl.cases.seal.solve.grading import film_thickness
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.states.contact_results import unsealed
+from softehl.cases.seal.states.contacts import contact_edges
+from softehl.cases.seal.states.state import (
     CLIPPED,
     COLLAPSED,
     UNCERTAIN,
@@ -27,7 +28,6 @@ from softehl.cases.seal.state import (
     Outcome,
     Silent,
 )
-from softehl.cases.seal.system import BORE, ROD
 from softehl.runtime.solve.solution import Branch, Status
 from tests.cases.gland_matrix import drawn
 

@@ -6,19 +6,19 @@ from math import inf, radians
 import numpy as np
 import pytest
 
-from softehl.cases.seal import round_layout
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.contacts import contact_edges
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.grading import graded_layout
-from softehl.cases.seal.layout import Layout
-from softehl.cases.seal.method import run
-from softehl.cases.seal.order import OrderPair
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.round_layout import MOST_LAYERS, STEEPEST_GROWTH, RoundLayout
-from softehl.cases.seal.state import Outcome, Silent
-from softehl.cases.seal.uniform_layout import uniform_layout
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.section import round_layout
+from softehl.cases.seal.section.layout import Layout
+from softehl.cases.seal.section.round_layout import MOST_LAYERS, STEEPEST_GROWTH, RoundLayout
+from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.grading import graded_layout
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.order import OrderPair
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.states.contacts import contact_edges
+from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import SHORT, corner_jacobians
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded

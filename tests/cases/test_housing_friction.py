@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.contact import contact_problem
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.state import Outcome, Silent
-from softehl.cases.seal.system import FRICTION, SHEAR, WALLS
+from softehl.cases.seal.equations.system import FRICTION, SHEAR, WALLS
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.states.state import Outcome, Silent
 
 
 def solved(**changes: Any) -> Outcome:
@@ -75,6 +75,6 @@ def test_without_friction_nothing_of_it_is_in_the_system() -> None:
 
 
 def _system(p: ORing) -> Any:
-    from softehl.cases.seal.equations import build_system
+    from softehl.cases.seal.equations.equations import build_system
 
     return build_system(p)

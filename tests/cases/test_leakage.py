@@ -14,11 +14,11 @@ from softehl.cases.harness.record import RunRecord
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import Reporter
 from softehl.cases.oring import CASE
-from softehl.cases.seal.leakage import LeakageRow, net_leakage
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import OSCILLATING, UNDER_RESOLVED, FilmRow
-from softehl.cases.seal.telling import Teller
-from softehl.cases.seal.transient import March, Reading
+from softehl.cases.seal.cycle.transient import March, Reading
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
+from softehl.cases.seal.states.state import OSCILLATING, UNDER_RESOLVED, FilmRow
+from softehl.cases.seal.states.telling import Teller
 from softehl.runtime.io import read_csv, read_json
 from tests.cases.test_cli import film_state
 

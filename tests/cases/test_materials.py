@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.materials import (
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.rubbers.materials import (
     MATERIALS,
     nominal_stress,
     shear_modulus,
     strains,
     unstable_at,
 )
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.rubber import shore_band, youngs_modulus
-from softehl.cases.seal.rubber_data import Fit, fit, read_data
+from softehl.cases.seal.gland.rubbers.rubber import shore_band, youngs_modulus
+from softehl.cases.seal.gland.rubbers.rubber_data import Fit, fit, read_data
 
 TRELOAR = Path(__file__).parents[2] / "docs" / "treloar.csv"
 PUBLISHED: dict[str, Any] = {"ogden_mu": (0.63, 0.0012, -0.01), "ogden_alpha": (1.3, 5.0, -2.0)}

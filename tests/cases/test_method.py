@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.contact import squeeze_stage
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.method import run
-from softehl.cases.seal.path import PathSettings, StageFailed
+from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.report.section import boundary_edges
-from softehl.cases.seal.state import (
+from softehl.cases.seal.solve.contact import squeeze_stage
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import PathSettings, StageFailed
+from softehl.cases.seal.states.state import (
     COLLAPSED,
     OSCILLATING,
     UNCERTAIN,
@@ -24,7 +24,7 @@ from softehl.cases.seal.state import (
     Outcome,
     Silent,
 )
-from softehl.cases.seal.verdict import FilmNumbers
+from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.solve.solution import Branch, Point, Solution, Status
 from tests.cases.oring_cases import oring

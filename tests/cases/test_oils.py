@@ -8,8 +8,15 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from softehl.cases.seal.oils import GRADES, Walther, barus, barus_of_roelands, density, read_oil
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.oils import (
+    GRADES,
+    Walther,
+    barus,
+    barus_of_roelands,
+    density,
+    read_oil,
+)
+from softehl.cases.seal.gland.parameters import ORing
 
 VG46 = (
     "ISO VG 46",

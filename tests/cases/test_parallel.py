@@ -22,7 +22,7 @@ from softehl.cases.harness.processes import completed, processes
 from softehl.cases.harness.sweep import Curve, Task, in_order
 from softehl.cases.harness.workers import solve_side_by_side
 from softehl.cases.oring import CASE
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.shipped import solve_cases
 from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
 from softehl.runtime.solve.backends import MissingBackend

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from softehl.cases.harness.case_file import read_assignment, read_case
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.shipped import SHIPPED
 
 TABLE_1 = {

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.files import write_content
-from softehl.cases.seal.contact import contact_problem
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathSettings
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.report.paraview import PARTS, gland_outlines, write_paraview
-from softehl.cases.seal.section_view import film_pressure, principal_stretches, section_view
-from softehl.cases.seal.state import FilmRow, Silent
+from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import PathSettings
+from softehl.cases.seal.states.section_view import film_pressure, principal_stretches, section_view
+from softehl.cases.seal.states.state import FilmRow, Silent
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.watch import read_series
 from tests.cases.oring_cases import film_values, oring

@@ -8,16 +8,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softehl.cases.seal.contact_results import contact_pressure, unsealed
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.grading import placed_layout
-from softehl.cases.seal.loading import State
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.round_layout import RoundLayout
-from softehl.cases.seal.state import Silent
-from softehl.cases.seal.system import BORE, ROD
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.system import BORE, ROD
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.section.round_layout import RoundLayout
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.grading import placed_layout
+from softehl.cases.seal.solve.loading import State
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.states.contact_results import contact_pressure, unsealed
+from softehl.cases.seal.states.state import Silent
 from softehl.runtime.mesh.sections import Disc
 
 P = ORing(ring="AS568-210", rod=19.0, gland="dynamic", density=1, sealed_pressure=3.0)

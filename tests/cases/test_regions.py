@@ -8,15 +8,15 @@ import pytest
 
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.seal.contact_results import contact_pressure
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.grading import inlet_length
-from softehl.cases.seal.loads import ContactLoads
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.regions import PRESETS
-from softehl.cases.seal.state import Silent
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.loads import ContactLoads
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.rubbers.regions import PRESETS
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.grading import inlet_length
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.states.contact_results import contact_pressure
+from softehl.cases.seal.states.state import Silent
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.arrays import Array
 

@@ -15,7 +15,8 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.surfaces import regime
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure, fitted_exponent, plain_ticks
 from softehl.cases.seal.report.profiles import profiles_figure
@@ -28,8 +29,7 @@ from softehl.cases.seal.report.section import (
 )
 from softehl.cases.seal.report.sensitivity import PANELS, tornado_figure
 from softehl.cases.seal.report.stribeck import crossing, hersey_um, stribeck_figure
-from softehl.cases.seal.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
-from softehl.cases.seal.surfaces import regime
+from softehl.cases.seal.states.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
 from tests.cases.oring_cases import film_values
 
 SEAL = ORing()

@@ -24,8 +24,8 @@ from softehl.cases.paper.inverse import film_of, largest_inlet_gradient
 from softehl.cases.paper.item import Scope
 from softehl.cases.paper.query import angle, ripple
 from softehl.cases.paper.states import NOT_REACHED, Store, ask, merged, setup
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import write_csv, write_json
 
 SMALL = Scope(density=1, speeds=(1600.0,), pressures=(1.0,))

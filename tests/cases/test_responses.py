@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from softehl.cases.harness.responses import Response, draw_panel, draw_responses
-from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import Cell
 from tests.cases.oring_cases import film_values
 

@@ -8,21 +8,32 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.contact import contact_problem
-from softehl.cases.seal.contact_results import contact_pressure
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.film_signs import (
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.loads import FilmLoads, Stroke
+from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.solve.path import PathSettings
+from softehl.cases.seal.states.contact_results import contact_pressure
+from softehl.cases.seal.states.film_signs import (
     THIN,
     end_gap,
     inlet_ratio,
     inlet_segments,
     oscillation,
 )
-from softehl.cases.seal.loads import FilmLoads, Stroke
-from softehl.cases.seal.path import PathSettings
-from softehl.cases.seal.results import film_numbers, film_state
-from softehl.cases.seal.state import CLIPPED, COLLAPSED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED
-from softehl.cases.seal.verdict import INLET_RATIO, FilmNumbers, Verdict, fewest_inlet_segments
+from softehl.cases.seal.states.results import film_numbers, film_state
+from softehl.cases.seal.states.state import (
+    CLIPPED,
+    COLLAPSED,
+    OSCILLATING,
+    UNCERTAIN,
+    UNDER_RESOLVED,
+)
+from softehl.cases.seal.states.verdict import (
+    INLET_RATIO,
+    FilmNumbers,
+    Verdict,
+    fewest_inlet_segments,
+)
 from tests.cases.oring_cases import oring
 
 HEALTHY = FilmNumbers(

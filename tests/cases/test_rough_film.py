@@ -11,12 +11,12 @@ from pydantic import ValidationError
 
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.grading import inlet_length
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import FilmRow, FilmState, Silent
-from softehl.cases.seal.surfaces import Surfaces, regime
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.surfaces import Surfaces, regime
+from softehl.cases.seal.solve.grading import inlet_length
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import FilmRow, FilmState, Silent
 from softehl.runtime.fem.guards import ChangesLittle
 
 SPEEDS = (2000.0, 500.0, 200.0, 50.0, 10.0, 1.0, 0.1, 0.01)

@@ -11,7 +11,7 @@ from softehl.cases.harness.case import Case
 from softehl.cases.harness.parameters import Nonzeros, Parameters, key, keys_of
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.harness.table import column_lines, key_lines, rows_table
-from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.states.state import FilmRow
 from tests.cases.test_report import row as film_row
 
 

@@ -10,33 +10,33 @@ import numpy as np
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.contact import contact_problem
-from softehl.cases.seal.contact_results import contact_peaks, contact_pressure
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.contact_store import contact_key
-from softehl.cases.seal.contacts import (
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.loads import FilmLoads, Stroke
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.section.layout import dam
+from softehl.cases.seal.section.outline_layout import OutlineLayout
+from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.contact_store import contact_key
+from softehl.cases.seal.solve.film_path import FilmPath
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.pockets import fed, traps
+from softehl.cases.seal.solve.stroke_start import emptied
+from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure
+from softehl.cases.seal.states.contacts import (
     CONTACT_FILM,
     contact_edges,
     contact_film,
     contacts,
     groups,
 )
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.film_path import FilmPath
-from softehl.cases.seal.layout import dam
-from softehl.cases.seal.loads import FilmLoads, Stroke
-from softehl.cases.seal.method import run
-from softehl.cases.seal.outline_layout import OutlineLayout
-from softehl.cases.seal.overlap import crossing, overlap
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.pockets import fed, traps
-from softehl.cases.seal.results import filled_ratio, film_parts, metering
-from softehl.cases.seal.sections import SECTIONS
-from softehl.cases.seal.state import OSCILLATING, Outcome, Silent
-from softehl.cases.seal.stroke_start import emptied
-from softehl.cases.seal.uniform_layout import uniform_layout
-from softehl.cases.seal.verdict import (
+from softehl.cases.seal.states.overlap import crossing, overlap
+from softehl.cases.seal.states.results import filled_ratio, film_parts, metering
+from softehl.cases.seal.states.state import OSCILLATING, Outcome, Silent
+from softehl.cases.seal.states.verdict import (
     INLET_RATIO,
     ContactNumbers,
     FilmNumbers,

@@ -13,14 +13,14 @@ import pytest
 from ezdxf.filemanagement import new
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.sections import SECTIONS
-from softehl.cases.seal.sections.files import finer, outline_of, read_mesh, read_outline
-from softehl.cases.seal.state import FilmState, Silent
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.files import finer, outline_of, read_mesh, read_outline
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.cases.shipped import solve_cases
 from softehl.runtime.mesh.outline import Arc, Outline, Shape
 from softehl.runtime.mesh.outline_mesh import outline_mesh

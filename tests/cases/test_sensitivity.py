@@ -16,23 +16,23 @@ from pydantic import ValidationError
 
 from softehl.__main__ import main
 from softehl.cases.oring import CASE
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.contacts import CONTACT_FILM
-from softehl.cases.seal.film_path import FilmPath
-from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.quantities import QUANTITIES
-from softehl.cases.seal.results import film_numbers
-from softehl.cases.seal.sections import SECTIONS
-from softehl.cases.seal.sections.keys import dimensions
-from softehl.cases.seal.sensitivity import rates_of, sensitivities
-from softehl.cases.seal.sensitivity_table import SensitivityRow, resolved
-from softehl.cases.seal.state import FilmRow, Silent
-from softehl.cases.seal.stroke_start import StrokeStart
-from softehl.cases.seal.tolerances import band, read_tolerances
-from softehl.cases.seal.variation import SPEED, FilmCase
-from softehl.cases.seal.varied import LENGTHS
+from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.keys import dimensions
+from softehl.cases.seal.gland.tolerances import band, read_tolerances
+from softehl.cases.seal.gland.varied import LENGTHS
+from softehl.cases.seal.sensitivity.quantities import QUANTITIES
+from softehl.cases.seal.sensitivity.sensitivity import rates_of, sensitivities
+from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.film_path import FilmPath
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.stroke_start import StrokeStart
+from softehl.cases.seal.states.contacts import CONTACT_FILM
+from softehl.cases.seal.states.results import film_numbers
+from softehl.cases.seal.states.sensitivity_table import SensitivityRow, resolved
+from softehl.cases.seal.states.state import FilmRow, Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
 from softehl.runtime.fem.postprocess import interval_below

@@ -11,9 +11,9 @@ from scipy.integrate import fixed_quad
 from scipy.optimize import brentq
 
 from softehl.cases.cycle import Cycle
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.profiles import Slider
-from softehl.cases.seal.system import FILM, blocks_of
+from softehl.cases.seal.equations.system import FILM, blocks_of
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.profiles import Slider
 from tests.cases.test_slider import row
 
 POLYMER: dict[str, Any] = {

@@ -25,7 +25,7 @@ from softehl.cases.harness import sampling
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.study_file import WAYS, Study, read_study
-from softehl.cases.seal.tolerances import band
+from softehl.cases.seal.gland.tolerances import band
 from softehl.cases.shipped import SHIPPED
 
 GRID = """

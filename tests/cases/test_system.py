@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softehl.cases.seal.declared import Block, Numbering
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.round_layout import RoundLayout
-from softehl.cases.seal.scales import film_flux
-from softehl.cases.seal.section import SealSection
-from softehl.cases.seal.system import BLOCKS, DISPLACEMENT, FIELDS, PRESSURE
+from softehl.cases.seal.equations.declared import Block, Numbering
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.equations.scales import film_flux
+from softehl.cases.seal.equations.system import BLOCKS, DISPLACEMENT, FIELDS, PRESSURE
+from softehl.cases.seal.section.round_layout import RoundLayout
+from softehl.cases.seal.section.section import SealSection
 from softehl.runtime.mesh.sections import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
@@ -173,7 +173,7 @@ def test_a_pressure_is_rounded_to_far_less_than_the_tolerance() -> None:
 # --- declared once --------------------------------------------------------------------------------
 
 CASES = Path(__file__).parents[2] / "cases"
-DECLARATIONS = (CASES / "seal" / "system.py", CASES / "slider.py")
+DECLARATIONS = (CASES / "seal" / "equations" / "system.py", CASES / "slider.py")
 """The system of a seal, and the slider, which has one of its own."""
 ASKED = ("part", "dofs", "count", "rows", "columns", "block", "fields", "pressures")
 """Methods that take the name of a field or of a block."""
@@ -245,5 +245,7 @@ def test_a_kernel_that_asks_for_what_nobody_gives_is_named() -> None:
     p = oring(density=1)
     system = SealSystem.of(p, build_system(p).section, blocks=(*BLOCKS, stranger))
     film = FilmLoads(1.0, "out", 400.0, np.zeros(28), np.zeros(28))
-    with pytest.raises(KeyError, match=r"'stranger' asks for offset; cases/seal/system.py gives"):
+    with pytest.raises(
+        KeyError, match=r"'stranger' asks for offset; cases/seal/equations/system.py gives"
+    ):
         system.film_problem(film)

@@ -10,27 +10,27 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal import film_path, method
-from softehl.cases.seal.contact import approach_stage
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.equations import SealSystem
-from softehl.cases.seal.film import METHOD, FastFilm, shear_stage
-from softehl.cases.seal.film_path import FilmPath
-from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.method import run
-from softehl.cases.seal.nearing import NearRod, neared, nearing_stage, without_rounding
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import Followed, PathDriver, PathSettings, Stage, StageFailed
-from softehl.cases.seal.state import Silent
-from softehl.cases.seal.stroke_start import StrokeStart
-from softehl.cases.seal.system import DISPLACEMENT
-from softehl.cases.seal.thinning import (
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.equations.system import DISPLACEMENT
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve import film_path, method
+from softehl.cases.seal.solve.contact import approach_stage
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.film import METHOD, FastFilm, shear_stage
+from softehl.cases.seal.solve.film_path import FilmPath
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.solve.nearing import NearRod, neared, nearing_stage, without_rounding
+from softehl.cases.seal.solve.path import Followed, PathDriver, PathSettings, Stage, StageFailed
+from softehl.cases.seal.solve.stroke_start import StrokeStart
+from softehl.cases.seal.solve.thinning import (
     gap_masses,
     pressed_film,
     sooner,
     thinned_film,
     thinning_stage,
 )
+from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.propped import Propped
 from softehl.runtime.fem.relaxed import Relaxed

@@ -6,7 +6,7 @@ import pytest
 
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.shipped import SHIPPED
 
 GLAND = ("rod=36", "squeeze=15", "groove_width=5.4")

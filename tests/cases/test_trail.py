@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softehl.cases.seal.contact import contact_problem
-from softehl.cases.seal.contact_route import ContactRoute
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.state import Silent
-from softehl.cases.seal.trail import Trail
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.trail import Trail
+from softehl.cases.seal.states.state import Silent
 from softehl.runtime.solve.solution import Point, Solution, Status
 
 LOADED = ORing(sealed_pressure=10.0, density=1)

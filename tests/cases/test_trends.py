@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.surfaces import FULL
 from softehl.cases.seal.report.stribeck import crossing
-from softehl.cases.seal.state import FilmState, Silent
-from softehl.cases.seal.surfaces import FULL
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import FilmState, Silent
 
 SPEEDS = (800.0, 400.0, 200.0, 100.0)
 MIXED = (2000.0, 1000.0, 500.0, 200.0, 100.0, 50.0, 20.0)

@@ -3,7 +3,7 @@
 import pytest
 
 from softehl.cases.harness.units import is_quantity, read_quantity
-from softehl.cases.seal.parameters import ORing
+from softehl.cases.seal.gland.parameters import ORing
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from softehl.cases.seal.equations import build_system
-from softehl.cases.seal.loads import FilmLoads
-from softehl.cases.seal.method import run
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.state import Outcome
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.fem.problem import Problem
 from tests.cases.oring_cases import oring
 from tests.cases.test_method import Recorder

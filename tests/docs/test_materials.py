@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from softehl.cases.seal.materials import MATERIALS, shear_modulus
-from softehl.cases.seal.method import run
-from softehl.cases.seal.oils import GRADES
-from softehl.cases.seal.parameters import ORing
-from softehl.cases.seal.rubber import shore_band, youngs_modulus
-from softehl.cases.seal.rubber_data import fit, read_data
-from softehl.cases.seal.state import Silent
+from softehl.cases.seal.gland.oils import GRADES
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.rubbers.materials import MATERIALS, shear_modulus
+from softehl.cases.seal.gland.rubbers.rubber import shore_band, youngs_modulus
+from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
+from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.states.state import Silent
 
 DOCS = Path(__file__).parents[2] / "docs"
 

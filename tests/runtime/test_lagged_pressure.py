@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softehl.cases.seal.contact import contact_problem
-from softehl.cases.seal.equations import SealSystem, build_system
-from softehl.cases.seal.path import PathSettings
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.solve.contact import contact_problem
+from softehl.cases.seal.solve.path import PathSettings
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.fem.problem import Problem

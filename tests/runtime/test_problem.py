@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations import build_system
+from softehl.cases.seal.equations.equations import build_system
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.checks import ProblemError

@@ -9,7 +9,7 @@ import numpy as np
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.report import style
-from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 _ABOVE, _BESIDE, _ROOM = 1.2, 1.2, 1.7
 _BESIDE_MARK = {"out": (-5, 4), "in": (5, -9)}

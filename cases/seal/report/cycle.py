@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Polygon
     from PIL.Image import Image
 
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 Table = Mapping[str, Array]
 

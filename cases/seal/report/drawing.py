@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from softehl.cases.seal.contact_results import fit_percent
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
-from softehl.cases.seal.uniform_layout import uniform_layout
+from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.states.contact_results import fit_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 
 def gland_figure(p: ORing) -> Figure:

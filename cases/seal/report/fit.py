@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softehl.cases.seal.materials import MATERIALS, SECOND, nominal_stress, strains
+from softehl.cases.seal.gland.rubbers.materials import MATERIALS, SECOND, nominal_stress, strains
+from softehl.cases.seal.gland.rubbers.rubber_data import COLUMNS, Fit, fit, read_data
 from softehl.cases.seal.report import style
-from softehl.cases.seal.rubber_data import COLUMNS, Fit, fit, read_data
 from softehl.runtime.io import write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 _COLOURS = dict(zip(SECOND, ("#1b6ca8", "#c8553d", "#4f8a52"), strict=True))
 _LINES = ("-", "--", ":", "-.")

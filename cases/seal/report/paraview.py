@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softehl.cases.harness.files import Cells, write_content
-from softehl.cases.seal.state import FilmRow
+from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import write_pvd
 
 if TYPE_CHECKING:
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 FILES = ("gland.vtu", "section_out.pvd", "section_in.pvd")
 

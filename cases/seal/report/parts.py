@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
-from softehl.cases.seal import catalogue
-from softehl.cases.seal.leakage import LeakageRow, net_leakage
-from softehl.cases.seal.oils import is_grade
+from softehl.cases.seal.gland import catalogue
+from softehl.cases.seal.gland.oils import is_grade
+from softehl.cases.seal.gland.rubbers.rubber import shore_band
+from softehl.cases.seal.gland.tolerances import ToleranceRow
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure
 from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
@@ -19,9 +20,8 @@ from softehl.cases.seal.report.fit import fit_figure, fit_of
 from softehl.cases.seal.report.interactive import curve_plot, film_plot, friction_plot
 from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.report.stribeck import stribeck_figure
-from softehl.cases.seal.rubber import shore_band
-from softehl.cases.seal.telling import read_profile, read_section
-from softehl.cases.seal.tolerances import ToleranceRow
+from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
+from softehl.cases.seal.states.telling import read_profile, read_section
 from softehl.runtime.io import read_csv
 
 if TYPE_CHECKING:

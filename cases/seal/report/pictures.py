@@ -13,11 +13,11 @@ from softehl.cases.seal.report.fit import fit_figure, fit_of, write_residuals
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.report.stribeck import stribeck_figure
-from softehl.cases.seal.state import FilmRow
-from softehl.cases.seal.telling import read_profile, read_section
+from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.seal.states.telling import read_profile, read_section
 
 if TYPE_CHECKING:
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 PICTURES = ("curve", "profiles", "section")
 """Names of the files, each .png or .svg or both, of every run."""

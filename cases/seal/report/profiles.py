@@ -10,13 +10,13 @@ import numpy as np
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import plain_ticks
-from softehl.cases.seal.state import FilmRow, Profile
+from softehl.cases.seal.states.state import FilmRow, Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 Results = Sequence[tuple[FilmRow, Profile]]
 Colour = tuple[float, float, float, float]

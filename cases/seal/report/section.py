@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softehl.cases.seal.report import style
-from softehl.cases.seal.state import FilmRow, Profile, Section
+from softehl.cases.seal.states.state import FilmRow, Profile, Section
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.postprocess import von_mises
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.tri import TriContourSet
 
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 
 _METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"

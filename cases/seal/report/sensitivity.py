@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softehl.cases.harness.pictures import save
+from softehl.cases.seal.gland.tolerances import band, read_tolerances
 from softehl.cases.seal.report import style
-from softehl.cases.seal.sensitivity_table import SensitivityRow
-from softehl.cases.seal.state import FilmRow
-from softehl.cases.seal.tolerances import band, read_tolerances
+from softehl.cases.seal.states.sensitivity_table import SensitivityRow
+from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import read_csv, write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 PANELS = {"h_star": "film thickness $h^*$", "friction": "friction", "leakage": "leakage"}
 """Quantities of the picture, and what they are called in it."""

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softehl.cases.seal.gland.surfaces import FULL, MIXED
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import tick_plainly
-from softehl.cases.seal.state import FilmRow
-from softehl.cases.seal.surfaces import FULL, MIXED
+from softehl.cases.seal.states.state import FilmRow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing
 
 _HERSEY = "$\\eta_0 |U| / p_{\\mathrm{dry}}$ [µm]   ($p_{\\mathrm{dry}}$ largest dry pressure)"
 _REGIMES = {MIXED: "boundary | mixed", FULL: "mixed | full"}

@@ -1,0 +1,170 @@
+"""From contact to a film that moves, then cycle by cycle."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.seal.cycle.motion import Motion
+from softehl.cases.seal.cycle.restart import (
+    drafted,
+    leave_films,
+    packed,
+    readings,
+    taken_up,
+    unpacked,
+)
+from softehl.cases.seal.cycle.transient import Instant, March, Reading, StuckError, TimeSteps
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.failure import explained
+from softehl.cases.seal.solve.film import FastFilm
+from softehl.cases.seal.solve.film_path import BuiltFilm, FilmPath
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.stroke_start import StrokeStart
+from softehl.cases.seal.states.telling import Teller
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.schur import StaleTangent
+from softehl.runtime.solve.solution import Point, Status
+
+OUTLINES = 48
+"""Outlines of the section that are kept of a cycle, at most."""
+
+BETWEEN_DRAFTS = 2.0
+"""Seconds of work that are lost at most where a run is killed within a cycle."""
+
+
+@dataclass
+class Films:
+    """Readings of the cycle that is computed, what its film was, and where the next one starts.
+
+    films: a table for every reading. outlines: the deformed outline, `OUTLINES` times or fewer.
+    """
+
+    readings: list[Reading] = field(default_factory=list)
+    films: list[dict[str, Array]] = field(default_factory=list)
+    outlines: list[dict[str, Array]] = field(default_factory=list)
+    end: dict[str, Array] = field(default_factory=dict)
+
+
+Log = Callable[[int, Films, Reading, Any], Any]
+"""A row of the number of a cycle, what happened in it, the reading before it, the last row."""
+
+
+def steady_start(path: FilmPath, x: Array, speed: float) -> BuiltFilm | None:
+    """The steady film of the outstroke at a speed, from the contact state x."""
+    found: list[BuiltFilm] = []
+
+    def keep(film: FilmLoads, point: Point) -> None:
+        if film.speed == speed:
+            found[:] = [(film, point.solution.x)]
+
+    settled = path.settled(x)
+    if not isinstance(settled, StageFailed):
+        StrokeStart(path, "out", settled).films(keep)
+    return found[0] if found else None
+
+
+def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) -> Outcome:
+    """All cycles of a case; log: makes a row of each.  Failure is in the outcome's status."""
+    speed = motion.speed.at(0.0)
+    changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}
+    p: ORing = parameters.model_copy(update={**changes, "sealed_pressure": motion.pressure.at(0.0)})
+    newton = Newton(max_iterations=10, linear=choose(p.linear))
+    driver, settings = PathDriver(Teller(observer), newton), PathSettings()
+    contact = ContactRoute(settings, driver.follow, driver.newton).contact(p)
+    if isinstance(contact, StageFailed):
+        return _outcome(p, *explained(contact, "contact", p))
+    path = FilmPath(contact[0], settings, driver)
+    begun = steady_start(path, contact[1], speed)
+    if begun is None or not isinstance(newton.linear, Condenser):
+        words = f"no steady film at U = {speed:g} mm/s to begin with; use a finer mesh (density)"
+        return _outcome(p, Status.MAX_ITERATIONS, words)
+    corrector = FastFilm.of(path.system, newton.linear, contact[1]).eager
+    steps = TimeSteps(tolerance=parameters.time_tolerance, order=parameters.time_order)
+    returned = parameters.supply == "returned"
+    march = March(path.system, motion, begun[0], corrector, steps, returned)
+    try:
+        _cycles(march, begun[1], parameters.cycles, observer, log)
+    except StuckError as error:
+        return _outcome(p, Status.MAX_ITERATIONS, str(error))
+    return _outcome(p, Status.CONVERGED, "all cycles")
+
+
+def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> None:
+    period = march.motion.period
+    apart = period / OUTLINES
+    before, done, last = march.begin(x), 0, None
+    while (kept := observer.kept(float(done + 1))) is not None:
+        last, (loop, _, state, _) = kept
+        past = readings(loop)
+        leave_films(march, past)
+        unpacked(march, state)
+        before, done = past[-1], done + 1
+    for number in range(done + 1, count + 1):
+        films = Films()
+        name = f"cycle {number}"
+        # its condensations are its own, so that a run that goes on from here does the same
+        march.corrector = replace(march.corrector, tangent=StaleTangent())
+        observer.stage(name, title=name, where={})
+        draft = observer.drafted(float(number))
+        if draft is not None:
+            films.readings, tables = taken_up(march, draft)
+            films.films, films.outlines = [tables["film"]], [tables["outline"]]
+        saved = [time.monotonic()]
+
+        def told(
+            instant: Instant,
+            reading: Reading,
+            number: int = number,
+            films: Films = films,
+            saved: list[float] = saved,
+        ) -> None:
+            films.readings.append(reading)
+            films.films.append(_film(march, instant))
+            if not films.outlines or reading.t_s - films.outlines[-1]["t_s"][-1] >= apart:
+                films.outlines.append(_outline(march, instant))
+            if time.monotonic() - saved[0] > BETWEEN_DRAFTS:
+                tables = {"film": films.films, "outline": films.outlines}
+                observer.draft(float(number), drafted(march, films.readings, tables))
+                saved[0] = time.monotonic()
+            observer.step(
+                label="t",
+                parameter=reading.t_s,
+                iterations=reading.iterations,
+                residuals=(),
+                fraction=(reading.t_s / period) % 1.0,
+            )
+
+        march.until(number * period, told)
+        films.end = packed(march)
+        last = log(number, films, before, last)
+        before = films.readings[-1]
+
+
+def _film(march: March, instant: Instant) -> dict[str, Array]:
+    z, h = march.system.arc_film(instant.x)
+    p = march.system.pressures(instant.x)[:: march.system.parameters.pressure_order]
+    t = np.full(len(z), instant.t)
+    return {"t_s": t, "x_mm": z, "h_um": 1e3 * h, "p_MPa": p}
+
+
+def _outline(march: March, instant: Instant) -> dict[str, Array]:
+    z, r = march.system.deformed(instant.x)[march.system.mesh.boundary].T
+    return {"t_s": np.full(len(z), instant.t), "z_mm": z.copy(), "r_mm": r.copy()}
+
+
+def _outcome(p: ORing, status: Status, message: str) -> Outcome:
+    system = build_system(p)
+    kernels = {b.kernel.name: b.kernel.signature for b in system.problem.assembler.blocks}
+    return Outcome((), status, message, system.counts, kernels)

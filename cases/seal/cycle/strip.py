@@ -1,0 +1,190 @@
+"""A film that conserves mass between given surfaces, per mm of width: no section deforms it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from softehl.cases.seal.equations import scales
+from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, PRESSURE, SQUEEZE, VOID
+from softehl.cases.seal.gland.surfaces import PRESSURE_SCALE, VOID_SCALE, Surfaces, void_values
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem import dofs, rules
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.kernels import load_kernel
+
+CAVITATION = "cavitation"
+"""Block of the condition of cavitation."""
+
+
+_EVEN = 1e-9  # relative rise of the void fraction that counts as none
+
+
+@dataclass(frozen=True)
+class Oil:
+    """Viscosity (MPa s) at zero pressure, Barus' coefficient (1/MPa), pressure of cavitation.
+
+    suffix, thinning: how it thins under shear, see `ThinningKeys`.
+    """
+
+    viscosity: float
+    alpha: float = 0.0
+    cavitation_pressure: float = 0.0
+    suffix: str = ""
+    thinning: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """Segments of a film with pressures and void fractions at the nodes of their subcells.
+
+    x, h: (n, 2) places and thicknesses of the ends of the segments, mm; h may jump between them.
+    order: subcells of a segment.
+    """
+
+    x: Array
+    h: Array
+    order: int
+    oil: Oil
+    surfaces: Surfaces = field(default_factory=Surfaces)
+
+    @property
+    def unknowns(self) -> int:
+        """Pressures, and as many void fractions."""
+        return self.order * len(self.x) + 1
+
+    @property
+    def places(self) -> Array:
+        """Where pressures and void fractions stand, (unknowns,), mm."""
+        share = 0.5 * (1.0 + rules.pressure_nodes(self.order)[:-1])
+        inner = self.x[:, :1] + share * np.diff(self.x, axis=1)
+        return np.append(inner.ravel(), self.x[-1, 1])
+
+    def problem(self, speed: float) -> Problem:
+        """The film between surfaces at rest, one of which slides at a speed (mm/s).
+
+        Everything is free but the place of the surfaces; `between` prescribes the ends.
+        """
+        n, m = len(self.x), self.unknowns
+        nodes = np.stack([self.x, self.h], axis=2).reshape(n, 4)
+        moved = np.arange(4 * n).reshape(n, 4)
+        pressures = dofs.chain_dofs(n, self.order, 4 * n)
+        film = dofs.gather_rows(moved, pressures, pressures + m)
+        voids = dofs.gather_rows(4 * n + np.arange(m), 4 * n + m + np.arange(m))
+        rough = bool(self.surfaces.sigma)
+        flow = load_kernel("film_rough" if rough else f"film_conserving{self.oil.suffix}")
+        content = load_kernel("film_squeeze_rough" if rough else "film_squeeze")
+        history = np.zeros((n, self.order + 1, 1))
+        blocks = [
+            ElementBlock(
+                *(FILM, flow, nodes, film, np.zeros((n, 2))),
+                rule=rules.rupture_rule(self.order, polynomial=False),
+            ),
+            ElementBlock(CAVITATION, load_kernel("film_void"), np.empty((m, 0)), voids),
+            ElementBlock(
+                *(SQUEEZE, content, nodes, film),
+                rule=rules.content_rule(self.order),
+                point_data=history,
+            ),
+        ]
+        layout = dofs.DofLayout.of(**{DISPLACEMENT: 4 * n, PRESSURE: m, VOID: m})
+        values = {
+            **{"rod_radius": 0.0, "rod_speed": speed, "viscosity": self.oil.viscosity},
+            **{"pressure_viscosity": self.oil.alpha, "force_weight": 0.0, "shear_weight": 0.0},
+            **{"rate": 0.0, **self.oil.thinning, **self.surfaces.values()},
+        }
+        chosen = {name: values[name] for name in flow.parameters}
+        return Problem(
+            Assembler.build(layout.total, blocks),
+            layout,
+            {FILM: chosen, CAVITATION: void_values(self.oil.cavitation_pressure)},
+            {DISPLACEMENT: 1.0, PRESSURE: self._fluxes(speed, pressures - 4 * n), VOID: 1.0},
+            absolute=True,
+        )
+
+    def _fluxes(self, speed: float, rows: Integers) -> Array:
+        """Sizes (unknowns,) of the fluxes, mm^2/s; rows: unknowns of the segments, from 0."""
+        h, dx = self.h.max(axis=1), np.diff(self.x, axis=1)[:, 0]
+        driven = scales.pressure_flux(h, dx, self.order, self.oil.viscosity)
+        largest = np.zeros(self.unknowns)
+        np.maximum.at(largest, rows, driven[:, None])
+        return 0.5 * abs(speed) * float(self.h.min()) + largest
+
+    def between(self, problem: Problem, ends: Array, inflow: Array) -> Problem:
+        """The problem with pressures (MPa) and void fractions (2,) prescribed at both ends."""
+        layout = problem.layout
+        outer = (layout.dofs(name)[[0, -1]] for name in (PRESSURE, VOID))
+        return problem.with_fixed([layout.dofs(DISPLACEMENT), *outer], [0.0, ends, inflow])
+
+    def starved(self, speed: float, supply: float | None) -> Array:
+        """Void fractions (2,) of the ends where the plane brings in a film of this thickness, mm.
+
+        The film fills what the first subcell lets through as far as it goes; None: all of it.
+        """
+        void = np.zeros(2)
+        if supply is None:
+            return void
+        h, end = (self.h[0], 0) if speed > 0.0 else (self.h[-1, ::-1], 1)
+        void[end] = missing(supply, h[0], h[1], self.order)
+        return void
+
+    def moving(self, problem: Problem, rate: float, before: Array) -> Problem:
+        """The problem with its squeeze: d/dt of a content is rate times it and `before` (n, m)."""
+        given = {"rod_radius": 0.0, "rate": rate, **self.surfaces.values()}
+        names = problem.assembler.block(SQUEEZE).kernel.parameters
+        assembler = problem.assembler.with_data(SQUEEZE, point_data=before[:, :, None])
+        changed = replace(problem, assembler=assembler)
+        return changed.with_parameters(**{SQUEEZE: {name: given[name] for name in names}})
+
+
+def missing(supply: float, outer: float, inner: float, order: int) -> float:
+    """Void fraction of an end of the film to which the rod brings a film of this thickness (mm).
+
+    outer, inner: h at this end and at the other of its segment, mm, which has `order` subcells.
+    Of the outmost one the rod carries h_1 h_2 over their mean (`codegen/models/mixed_film.py`).
+    """
+    share = 0.5 * (1.0 + rules.pressure_nodes(order)[1])
+    next_to = outer + share * (inner - outer)
+    return float(max(0.0, 1.0 - supply * 0.5 * (outer + next_to) / (outer * next_to)))
+
+
+def fronts(x: Array, p: Array, v: Array, p_c: float) -> tuple[float, float]:
+    """Where a film first ruptures and where it first forms again, along its flow; nan if nowhere.
+
+    x, p, v: (n,) at the nodes of subcells, downstream. Behind its rupture v grows from zero, before
+    its end p grows from p_c: both are drawn on to zero, linearly, within a subcell or two.
+    """
+    v = np.append(v[:-1], v[-2])  # nothing flows out of the last node
+    torn = v / VOID_SCALE > (p - p_c) / PRESSURE_SCALE
+    starts = np.flatnonzero(~torn[:-1] & torn[1:]) + 1
+    ends = np.flatnonzero(torn[:-1] & ~torn[1:]) + 1
+    return (
+        _rupture(x, v, int(starts[0])) if len(starts) else np.nan,
+        _reformation(x, p - p_c, int(ends[0])) if len(ends) else np.nan,
+    )
+
+
+def _rupture(x: Array, v: Array, i: int) -> float:
+    """Void fractions belong to the middle of the subcell behind their node."""
+    if i + 2 >= len(x) or not v[i + 1] > v[i] * (1.0 + _EVEN):
+        return float(x[i])
+    middle, behind = 0.5 * (x[i] + x[i + 1]), 0.5 * (x[i + 1] + x[i + 2])
+    found = middle - v[i] * (behind - middle) / (v[i + 1] - v[i])
+    return float(found) if found > x[max(i - 2, 0)] else float(x[i])
+
+
+def _reformation(x: Array, p: Array, j: int) -> float:
+    if j + 1 >= len(x) or not p[j + 1] > p[j]:
+        return float(x[j])
+    return float(max(x[j] - p[j] * (x[j + 1] - x[j]) / (p[j + 1] - p[j]), x[j - 1]))
+
+
+def beyond_front(x: Array, p: Array, front: float) -> float:
+    """What linear pressures p (n,) at x (n,), over p_c, have too much before a reformation."""
+    if not np.isfinite(front):
+        return 0.0
+    j = int(np.searchsorted(x, front, side="left"))
+    return float(0.5 * p[j] * (front - x[j - 1])) if j < len(x) else 0.0

@@ -1,0 +1,1 @@
+"""The coupled system: its fields, blocks, loads, scales and unknowns."""

@@ -1,0 +1,62 @@
+"""Layers of the modified Newton iteration: the film, and the contact of the arc."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.system import (
+    AIR_WALL,
+    DISPLACEMENT,
+    ROD,
+    ROTATION,
+    SEALED_WALL,
+    WALLS,
+)
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.layered import Layer
+
+_AT_WALL = 0.02  # of the section: as near to a wall it may come to touch it
+
+
+def film_layer(system: SealSystem, x: Array) -> Layer:
+    """The film as the layer of the modified Newton iteration, near the state x.
+
+    Displacements of the arc and the moment are shared with the section; the pressures but
+    those at the ends are the film's own, whatever else its blocks know is prescribed. Where
+    the arc is at a wall, its multipliers are shared too: without the displacements of these
+    nodes nothing would determine them.
+    """
+    start, nodes = system.layout.part(DISPLACEMENT).start, system.mesh.arc_nodes
+    moment = system.layout.dofs(ROTATION)
+    shared = np.concatenate(
+        [start + 2 * nodes, start + 2 * nodes + 1, moment, _walls_of_arc(system, x)]
+    )
+    own = [system.layout.dofs(field.name) for field in system.film_fields()]
+    inner = np.concatenate(own)
+    if system.parameters.conserving:  # side by side along the film: their matrix is a band
+        inner = np.stack([pressures[1:-1] for pressures in own], axis=1).ravel()
+    inner = inner[~np.isin(inner, system.film_ends)]
+    names = [block.name for block in system.blocks if block.layer]
+    return Layer.of(system.problem.assembler, names, shared, inner)
+
+
+def contact_layer(system: SealSystem, x: Array) -> Layer:
+    """The contact with the rod as the layer, near the state x: see `film_layer`."""
+    start, nodes = system.layout.part(DISPLACEMENT).start, system.mesh.arc_nodes
+    others = system.layout.dofs(ROTATION), system.layout.dofs(ROD), _walls_of_arc(system, x)
+    shared = np.concatenate([start + 2 * nodes, start + 2 * nodes + 1, *others])
+    loads = [block.name for block in system.blocks if block.group == "load" and block.layer]
+    return Layer.of(system.problem.assembler, [ROD, *loads], shared, np.empty(0, np.int64))
+
+
+def _walls_of_arc(system: SealSystem, x: Array) -> Integers:
+    """Multipliers (n,) of the walls at those nodes of the arc that touch them or are near."""
+    found = []
+    for name in (SEALED_WALL, AIR_WALL):
+        nodes = system.section.chains[WALLS[name]][0]
+        gap = system.obstacles[name].gap(system.deformed(x)[nodes])
+        near = np.isin(nodes, system.mesh.arc_nodes)
+        near &= gap < _AT_WALL * system.parameters.section_diameter
+        found.append(system.layout.dofs(name)[near])
+    return np.concatenate(found)

@@ -1,0 +1,74 @@
+"""What acts on a seal: the loads of the contact problem and those of the film problem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from softehl.cases.seal.gland.surfaces import SLIP
+from softehl.runtime.arrays import Array
+
+Stroke = Literal["out", "in"]
+
+
+@dataclass(frozen=True)
+class ContactLoads:
+    """Loads of frictionless contact.
+
+    sealed_pressure: p_s, MPa. offsets: obstacle -> distance (mm) that it keeps from the section,
+    0 where none is given. place: mean axial displacement at which the section is held, mm, None
+    where it is free; then axial_force pushes it to the air side, N. moment: that turns it where
+    its mean rotation is not held, N mm, None where it is.
+    """
+
+    sealed_pressure: float = 0.0
+    offsets: Mapping[str, float] = field(default_factory=dict)
+    place: float | None = None
+    axial_force: float = 0.0
+    moment: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FilmLoads:
+    """Loads of a film.
+
+    sealed_pressure: p_s, MPa. speed: |U|, mm/s. weight: of the film forces, 1 - weight of the
+    contact forces. shear: weight of the shear stress. multipliers, gap: (arc nodes,) rod
+    multipliers, MPa, and distance of the rod, mm, of the contact state; rod_offset: the offset of
+    the rod in it, mm. moment: moment on the section (N mm) if it is free to roll, None if its
+    rotation is held. place: as of the contact state. rate: coefficient of time derivatives, 1/s, 0
+    where nothing changes. inflow: void fractions at the sealed and the air end, where oil comes in.
+    entrance: pressure that oil has built up before the arc, MPa. slip: speed at which the friction
+    of asperities has 0.7 of its value, mm/s. least_speed: that the sizes of fluxes are taken at,
+    mm/s.
+    """
+
+    sealed_pressure: float
+    stroke: Stroke
+    speed: float
+    multipliers: Array
+    gap: Array
+    weight: float = 1.0
+    shear: float = 1.0
+    moment: float | None = None
+    rod_offset: float = 0.0
+    place: float | None = None
+    rate: float = 0.0
+    inflow: tuple[float, float] = (0.0, 0.0)
+    entrance: float = 0.0
+    slip: float = SLIP
+    least_speed: float = 0.0
+
+    @property
+    def ends(self) -> Array:
+        """Pressures (2,) at the sealed and the air end of the film, MPa, (15)."""
+        out, here = self.stroke == "out", self.entrance
+        return np.array([self.sealed_pressure + here, 0.0] if out else [self.sealed_pressure, here])
+
+    @property
+    def rod_speed(self) -> float:
+        """U, positive for outstroke, mm/s."""
+        return self.speed if self.stroke == "out" else -self.speed

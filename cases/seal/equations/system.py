@@ -1,0 +1,256 @@
+"""The coupled system of a seal, declared once: fields, element blocks, obstacles, parameters.
+
+Another field, obstacle or term of the film is one line of `FIELDS` or `BLOCKS`; a kernel is given
+those of the values below that it names. `cases.seal.equations.equations` makes equations of it on a
+section, and nobody else knows how fields are called and where their unknowns stand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from math import copysign
+from typing import TypeAlias
+
+from softehl.cases.seal.equations import scales
+from softehl.cases.seal.equations.declared import Block, Field, Place
+from softehl.cases.seal.equations.loads import ContactLoads, FilmLoads
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.surfaces import void_values
+from softehl.cases.seal.section.section import BODY, SealSection
+from softehl.runtime.fem.contact import Obstacle, inner_cylinder, outer_cylinder, plane
+from softehl.runtime.fem.rules import (
+    content_rule,
+    facet_rule,
+    film_rule,
+    rupture_rule,
+)
+from softehl.runtime.kernels import Rule
+
+Values: TypeAlias = Mapping[str, float]
+"""Parameters of a kernel by their names."""
+
+
+def _segment_rule(p: ORing, order: int) -> Rule:
+    return film_rule(order, p.quadrature, p.quadrature_points)
+
+
+DISPLACEMENT, PRESSURE, ROD = "displacement", "pressure", "rod"
+"""Displacements; film pressures; contact multipliers of the rod."""
+
+VOID = "void"
+"""Void fractions of the film, where its pressures stand."""
+
+ROTATION, AXIAL = "rotation", "axial"
+"""Moment that holds the mean rotation of the section; force that holds its mean axial place."""
+
+SOLID, FILM, FACET, SQUEEZE = "solid", "film", "facet", "squeeze"
+"""Blocks whose fields are results: the section, segments of the film, what lies between them, and
+what the film holds where it changes with time."""
+
+BORE, SEALED_WALL, AIR_WALL = "housing", "sealed_wall", "air_wall"
+WALLS: dict[str, Place] = {BORE: "outer_nodes", SEALED_WALL: "wall_nodes", AIR_WALL: "wall_nodes"}
+"""The other obstacles, and what may touch them; each has a field of multipliers of its own."""
+
+GROOVE = "sealed_groove"
+"""What the sealed pressure does to the groove between two lobes, where there is one."""
+
+FRICTION, CORNER = "contact_friction", "contact_corner"
+SHEAR = {name: f"{name}_shear" for name in WALLS}
+"""Tangential stresses of the obstacles that have friction."""
+
+
+def _rubs(p: ORing) -> bool:
+    return p.rubs
+
+
+_RUPTURING: tuple[tuple[str, Callable[[ORing], bool]], ...] = (
+    ("conserving{oil}", lambda p: p.conserving and not p.rough),
+    ("rough", lambda p: p.rough),
+)
+
+
+def _walls() -> Iterator[Block]:
+    """Contact with each wall: plain, or with friction, or with the edge of an open gap."""
+    for name, on in WALLS.items():
+        cornered, fields = name == AIR_WALL, (DISPLACEMENT, name)
+
+        def plain(p: ORing, cornered: bool = cornered) -> bool:
+            return not p.rubs and not (cornered and p.opens)
+
+        yield Block(name, "contact", on, fields, "contact", needed=plain)
+        yield Block(name, FRICTION, on, (*fields, SHEAR[name]), "contact", needed=_rubs)
+        if cornered:
+            yield Block(name, CORNER, on, fields, "contact", needed=lambda p: p.opens)
+
+
+FIELDS = (
+    Field(DISPLACEMENT, "nodes", scales.force),
+    Field(PRESSURE, "film", scales.largest_flux),
+    Field(VOID, "film", scales.void, needed=lambda p: p.conserving),
+    Field(ROD, "arc_nodes", scales.gap),
+    *(Field(name, nodes, scales.gap) for name, nodes in WALLS.items()),
+    *(Field(SHEAR[name], nodes, scales.gap, needed=_rubs) for name, nodes in WALLS.items()),
+    Field(ROTATION, "section", scales.rotation),
+    Field(AXIAL, "section", scales.place),
+)
+
+BLOCKS = (
+    Block(SOLID, "{solid}", BODY, (DISPLACEMENT,), "solid"),
+    Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
+    Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
+    Block(
+        *(GROOVE, "follower_pressure", GROOVE, (DISPLACEMENT,), "load"),
+        layer=True,
+        needed=lambda p: p.lobes > 1,
+    ),
+    Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
+    *_walls(),
+    Block(
+        *(FILM, "film{oil}", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        layer=True,
+        needed=lambda p: not p.conserving,
+        rule=_segment_rule,
+    ),
+    *(
+        Block(
+            *(FILM, f"film_{kind}", "arc", (DISPLACEMENT, PRESSURE, VOID), "film"),
+            layer=True,
+            needed=needed,
+            rule=lambda _, order: rupture_rule(order),
+        )
+        for kind, needed in _RUPTURING
+    ),
+    Block(
+        *("cavitation", "film_void", "film_nodes", (PRESSURE, VOID), "film"),
+        layer=True,
+        needed=lambda p: p.conserving,
+    ),
+    *(
+        Block(
+            *(SQUEEZE, f"film_squeeze{kind}", "arc", (DISPLACEMENT, PRESSURE, VOID), "squeeze"),
+            layer=True,
+            needed=needed,
+            rule=lambda _, order: content_rule(order),
+        )
+        for kind, needed in zip(("", "_rough"), (n for _, n in _RUPTURING), strict=True)
+    ),
+    Block(
+        *("upwind", "film_upwind", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        layer=True,
+        needed=lambda p: p.upwinding != 0.0 and not p.rough,
+        rule=_segment_rule,
+    ),
+    Block(
+        *("upwind", "film_upwind_rough", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        layer=True,
+        needed=lambda p: p.upwinding != 0.0 and p.rough,
+        rule=_segment_rule,
+    ),
+    Block(
+        *(FACET, "film_facet", "facets", (DISPLACEMENT, PRESSURE), "film"),
+        layer=True,
+        needed=lambda p: p.reynolds == "dg",
+        rule=lambda _, order: facet_rule(order),
+    ),
+    Block("rotation", "mean_rotation", "cells", (DISPLACEMENT, ROTATION), "support", constant=True),
+    Block("hold", "mean_axial", "cells", (DISPLACEMENT, AXIAL), "support", constant=True),
+)
+
+
+def blocks_of(p: ORing) -> tuple[Block, ...]:
+    """The blocks of a case, first the solids of its section in the order of their elements."""
+    solid, *others = BLOCKS
+    own = [replace(solid, name=f"{SOLID} {r}", elements=r, region=r) for r in p.materials]
+    body = (solid,) if p.has_body else ()
+    return (*own, *body, *(block for block in others if block.needed(p)))
+
+
+def obstacles_of(p: ORing) -> dict[str, Obstacle]:
+    """The obstacles by the names of their blocks."""
+    half = 0.5 * p.groove_width
+    obstacles = (
+        inner_cylinder(ROD, 0.5 * p.rod_diameter),
+        outer_cylinder(BORE, 0.5 * p.housing_diameter),
+        plane(SEALED_WALL, p.groove_centre - half, faces=1),
+        plane(AIR_WALL, p.groove_centre + half, faces=-1),
+    )
+    return {obstacle.name: obstacle for obstacle in obstacles}
+
+
+def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | None:
+    """What a block of the unloaded contact problem may ask for; None where it is switched off."""
+    if block.group == "solid":
+        return p.rubber(block.region).rubber_values
+    if block.group == "load":
+        return {"pressure": 0.0}
+    if block.group == "contact":
+        wall = {"wall": p.air_wall, "fillet": p.corner_fillet}
+        edge = {**wall, "lip": 0.5 * p.rod_diameter + p.extrusion_gap}
+        return {"offset": 0.0, "force_weight": 1.0, "friction": p.housing_friction, **edge}
+    area, (z, r), polar_moment = section.moments
+    if block.name == "rotation":
+        centre = {"centre_z": float(z), "centre_r": float(r)}
+        return {**centre, "polar_moment": polar_moment, "angle": 0.0}
+    if block.name == "hold":
+        return {"area": area, "place": 0.0}
+    return None
+
+
+def contact_values(loads: ContactLoads, groove: float) -> dict[str, Values | None]:
+    """What the loads of contact change, by block.
+
+    The sealed pressure also acts on the arc up to its lowest node, as the film will carry it there;
+    the rod multipliers of that part are the contact pressure in excess of it. groove: share of it
+    between two lobes.
+    """
+    pressure = {"pressure": loads.sealed_pressure}
+    return {
+        "sealed_side": pressure,
+        "sealed_arc": pressure,
+        GROOVE: {"pressure": groove * loads.sealed_pressure},
+        **{name: {"offset": offset} for name, offset in loads.offsets.items()},
+        "hold": {"place": loads.place or 0.0},
+    }
+
+
+def faded_values(film: FilmLoads, groove: float) -> dict[str, Values | None]:
+    """What is left of the contact forces on the arc once a film has its weight, by block.
+
+    groove: as of `contact_values`.
+    """
+    left = 1.0 - film.weight
+    return {
+        ROD: {"force_weight": left} if left > 0.0 else None,
+        "sealed_arc": {"pressure": film.sealed_pressure * left},
+        GROOVE: {"pressure": film.sealed_pressure * left * groove},
+    }
+
+
+def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
+    """What a term of the film may ask for that has this share of the forces."""
+    return {
+        "rod_radius": 0.5 * p.rod_diameter,
+        "rod_speed": film.rod_speed,
+        "viscosity": p.viscosity,
+        "pressure_viscosity": p.pressure_viscosity,
+        "cavitation_penalty": p.cavitation_penalty,
+        "force_weight": film.weight * share,
+        "shear_weight": film.shear,
+        "shear_modulus": p.surface_modulus,
+        "upwinding": p.upwinding * copysign(1.0, film.rod_speed),
+        "rate": film.rate,
+        **p.thinning_values(p.viscosity),
+        **p.surfaces.values(),
+        "boundary_speed": film.slip,
+        **void_values(p.cavitation_pressure),
+    }
+
+
+_FILM = ("film", "squeeze")
+
+
+def contact_kernels(p: ORing) -> tuple[str, ...]:
+    """Names of the kernels that the contact problem of a case depends on, each once."""
+    kernels = [b.kernel_of(p) for b in blocks_of(p) if b.group not in _FILM]
+    return tuple(dict.fromkeys(kernels))

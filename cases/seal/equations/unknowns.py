@@ -1,0 +1,142 @@
+"""What a vector of unknowns of a seal holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softehl.cases.seal.equations.declared import Field, Numbering
+from softehl.cases.seal.equations.system import (
+    AXIAL,
+    BORE,
+    DISPLACEMENT,
+    PRESSURE,
+    ROD,
+    ROTATION,
+    SHEAR,
+    WALLS,
+)
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.section.section import SealSection
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.contact import tributary_areas
+from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.mesh.sections import SectionMesh
+
+
+@dataclass(frozen=True, eq=False)
+class SealUnknowns:
+    """A section and its unknowns: what stands where in a vector of them, and what it means."""
+
+    parameters: ORing
+    section: SealSection
+    numbering: Numbering
+
+    @property
+    def mesh(self) -> SectionMesh:
+        """The undeformed mesh."""
+        return self.section.mesh
+
+    @property
+    def rod_radius(self) -> float:
+        """Radius of the rod, mm."""
+        return 0.5 * self.parameters.rod_diameter
+
+    @property
+    def rod_areas(self) -> Array:
+        """Tributary areas (arc nodes,) of the rod multipliers, mm^2."""
+        return tributary_areas(self.mesh.points, self.mesh.arc_segments, self.mesh.arc_nodes)
+
+    @property
+    def layout(self) -> DofLayout:
+        """The vector of unknowns, one for all stages."""
+        return self.numbering.layout
+
+    def at_rest(self) -> Array:
+        """Unknowns of the undeformed section: all zero."""
+        return np.zeros(self.layout.total)
+
+    def displacements(self, x: Array) -> Array:
+        """Displacements (V, 2) in (z, r), mm."""
+        return x[self.layout.part(DISPLACEMENT)].reshape(-1, 2)
+
+    def deformed(self, x: Array) -> Array:
+        """Deformed nodes (V, 2) in (z, r), mm."""
+        return np.asarray(self.mesh.points + self.displacements(x))
+
+    def arc_film(self, x: Array) -> tuple[Array, Array]:
+        """Positions z and distances h from the rod of the deformed arc nodes, (arc nodes,), mm."""
+        z, r = self.deformed(x)[self.mesh.arc_nodes].T
+        return z, r - self.rod_radius
+
+    def rod_multipliers(self, x: Array) -> Array:
+        """Contact multipliers (arc nodes,) of the rod, MPa; negative where it presses."""
+        return x[self.layout.part(ROD)]
+
+    def moment(self, x: Array) -> float:
+        """Moment that holds the mean rotation of the section, N mm."""
+        return float(x[self.layout.part(ROTATION)][0])
+
+    def pressure_dofs(self, field: str = PRESSURE) -> Integers:
+        """Numbers (segments, m_p + 1) of the pressure unknowns of each segment of the film."""
+        return self.numbering.rows(field, "arc")
+
+    def pressures(self, x: Array, field: str = PRESSURE) -> Array:
+        """All pressure unknowns, MPa."""
+        return x[self.layout.part(field)]
+
+    @property
+    def pressure_count(self) -> int:
+        """Number of pressure unknowns."""
+        return self.layout.count(PRESSURE)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of unknowns, as a run records them."""
+        return {"total": self.layout.total, PRESSURE: self.pressure_count}
+
+    def wall_forces(self, x: Array) -> Array:
+        """Normal forces (nodes,) of the housing and its walls on the nodes, N."""
+        total = np.zeros(len(self.mesh.points))
+        for name, on in WALLS.items():
+            nodes, segments = self.section.chains[on]
+            areas = tributary_areas(self.mesh.points, segments, nodes)
+            total[nodes] += self.pressing(name, x) * areas
+        return total
+
+    def pressing(self, name: str, x: Array) -> Array:
+        """Nominal pressures (n,) of an obstacle on the nodes that may touch it, MPa, >= 0."""
+        return np.maximum(-x[self.layout.part(name)], 0.0)
+
+    def housing_friction(self, x: Array) -> float:
+        """Axial force of friction of the housing on the section, to the air side, N."""
+        if not self.parameters.rubs:
+            return 0.0
+        nodes, segments = self.section.chains[WALLS[BORE]]
+        areas = tributary_areas(self.mesh.points, segments, nodes)
+        return float(x[self.layout.part(SHEAR[BORE])] @ areas)
+
+    def axial_force(self, x: Array) -> float:
+        """Force that the hold exerts on the section, to the air side, N."""
+        return 0.0 - float(x[self.layout.part(AXIAL)][0])
+
+    @property
+    def film_ends(self) -> Integers:
+        """Pressure unknowns at the sealed and the air end of the film, (15), for "fe" and "dg"."""
+        return self._ends(PRESSURE)
+
+    def contact_fields(self) -> tuple[Field, ...]:
+        """The fields that contact knows: film pressures are all zero in it."""
+        return tuple(field for field in self._fields if field.on != "film")
+
+    def film_fields(self) -> tuple[Field, ...]:
+        """The fields that the film alone has."""
+        return tuple(field for field in self._fields if field.on == "film")
+
+    @property
+    def _fields(self) -> tuple[Field, ...]:
+        return tuple(unknowns.field for unknowns in self.numbering.unknowns.values())
+
+    def _ends(self, field: str) -> Integers:
+        return self.layout.dofs(field)[[0, -1]]

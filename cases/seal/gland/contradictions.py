@@ -1,0 +1,206 @@
+"""What parameters of a seal contradict each other, in the words of their keys."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softehl.cases.seal.gland.sections.keys import is_mesh
+from softehl.cases.seal.gland.tolerances import read_tolerances
+
+if TYPE_CHECKING:
+    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
+
+_LOWEST_ESTIMATED = 3
+"""Least pressure order whose error is well below what the meshes differ by."""
+
+
+def require_consistent(p: ORing) -> None:
+    """ValueError for the first contradiction: what was given, what is allowed, what to do."""
+    for check in _CHECKS:
+        check(p)
+
+
+def _mesh_is_there(p: ORing) -> None:
+    if p.mesh != "file":
+        return
+    if not is_mesh(p.outline):
+        raise ValueError(
+            'mesh = "file" takes the mesh of a file: give outline = "seal.msh" too, or leave '
+            "mesh out"
+        )
+    if p.cap_thickness is not None:
+        raise ValueError("cap_thickness: the mesh of a file has its own regions; leave it out")
+    regions = p.file_mesh.regions
+    cells = [n for name in p.materials for n in regions.get(name, np.empty(0)).tolist()]
+    if len(cells) > len(set(cells)):
+        names = " and ".join(p.materials)
+        raise ValueError(f"materials: {names} have elements in common; an element has one")
+
+
+def _rubber_has_an_element(p: ORing) -> None:
+    rubbers: tuple[RubberKeys, ...] = (p, *p.materials.values())
+    for rubber in rubbers:
+        if p.solid != "taylor_mean" and rubber.energy != "mooney_rivlin":
+            raise ValueError(
+                f'material = "{rubber.material}" and solid = "{p.solid}": other elements '
+                'than "taylor_mean" have "mooney-rivlin" and "neo-hooke" alone; leave solid out'
+            )
+
+
+def _sensitivity_has_a_meaning(p: ORing) -> None:
+    read_tolerances(p.tolerances, dict(p), p.ring)
+    if p.tolerances and not p.sensitivity:
+        raise ValueError(
+            "tolerances need the sensitivities of the run; set sensitivity = true (--sensitivity)"
+        )
+    if p.sensitivity and p.rubs:
+        raise ValueError(
+            f"sensitivity = true with housing_friction = {p.housing_friction:g}: with "
+            "friction a state depends on how it was reached, and has no derivative by its "
+            "parameters alone; set housing_friction = 0"
+        )
+
+
+def _rule_is_rich_enough(p: ORing) -> None:
+    points, order = p.quadrature_points, p.pressure_order
+    if points is not None and points < order:
+        raise ValueError(
+            f"quadrature_points = {points} cannot hold {order + 1} pressures of a segment "
+            f"(pressure_order = {order}); give at least {order}, or leave it out"
+        )
+
+
+def _film_has_its_model(p: ORing) -> None:
+    for name, given in (
+        ("roughness", p.rough),
+        ("cavitation_pressure", p.cavitation_pressure < 0.0),
+    ):
+        if given and not p.conserving:
+            raise ValueError(
+                f'cavitation = "penalty" does not work with {name}; leave cavitation out'
+            )
+    if p.conserving and p.reynolds == "dg":
+        raise ValueError('reynolds = "dg" works with cavitation = "penalty" only; use "fe"')
+    p.require_smooth_film(dg=p.reynolds == "dg", rough=p.rough)
+
+
+def _tolerance_has_an_estimate(p: ORing) -> None:
+    if p.tolerance is not None and not (p.error_estimate and p.mesh == "graded"):
+        raise ValueError(
+            f"tolerance = {p.tolerance:g} needs an estimate of the error; "
+            'set error_estimate = true and mesh = "graded"'
+        )
+    if p.tolerance is not None and p.pressure_order < _LOWEST_ESTIMATED:
+        raise ValueError(
+            f"tolerance = {p.tolerance:g}: meshes do not show the error of pressure_order = "
+            f"{p.pressure_order}; use an order of at least {_LOWEST_ESTIMATED}"
+        )
+
+
+def _air_side_is_closed_or_open(p: ORing) -> None:
+    gap, depth = p.extrusion_gap, 0.5 * (p.housing_diameter - p.rod_diameter)
+    if p.backup and gap:
+        raise ValueError(
+            f"backup = true and extrusion_gap = {gap:g} contradict each other: a back-up ring "
+            "closes the gap; leave one of them out"
+        )
+    if p.backup is False and not gap:
+        raise ValueError(
+            "backup = false leaves a gap whose width is not given: add extrusion_gap, 0.02 to "
+            "0.1 mm is usual, or leave backup out"
+        )
+    if gap and gap + p.corner_fillet > 0.5 * depth:
+        raise ValueError(
+            f"extrusion_gap = {gap:g} and corner_fillet = {p.corner_fillet:g} mm leave too "
+            f"little of a wall that is {depth:g} mm high; both together at most half of it"
+        )
+    if gap and p.rubs:
+        raise ValueError(
+            f"extrusion_gap = {gap:g} and housing_friction = {p.housing_friction:g}: the "
+            "edge of the gap has no friction; give one of them"
+        )
+
+
+def _arc_has_two_ends(p: ORing) -> None:
+    if (p.arc_start is None) != (p.arc_end is None):
+        raise ValueError("arc_start and arc_end: give both, or none to have them found")
+
+
+def _section_is_one(p: ORing) -> None:
+    p.sized(p.section_diameter)
+    if p.round:
+        if p.materials:
+            raise ValueError(
+                'materials and cap_thickness: not for section = "round"; leave them out'
+            )
+        return
+    _ = p.free_section
+    has = ", ".join(p.regions) or "no regions; cap_thickness makes one"
+    for name in p.materials:
+        if name not in p.regions:
+            raise ValueError(f"materials.{name}: the section has {has}")
+    for name, given in (
+        ("arc_start and arc_end", p.arc_start is not None),
+        ("extrusion_gap", p.opens),
+    ):
+        if given:
+            raise ValueError(f'{name}: for section = "round" only; leave it out')
+    if p.sensitivity and (p.outline is not None or p.cap_thickness is not None):
+        raise ValueError(
+            "sensitivity = true: not of an outline of a file, which has no dimensions, and not "
+            "of a section with a cap; leave it out"
+        )
+
+
+def _seal_is_squeezed(p: ORing) -> None:
+    gap = 0.5 * (p.housing_diameter - p.rod_diameter)
+    if not 0.5 * p.section_diameter < gap < p.section_diameter:
+        raise ValueError(
+            f"the gap between rod and housing is {gap:g} mm (rod_diameter, housing_diameter); "
+            f"to squeeze the seal it must be between a half and one section_diameter, "
+            f"{0.5 * p.section_diameter:g} to {p.section_diameter:g} mm"
+        )
+
+
+def _ring_fits_the_rod(p: ORing) -> None:
+    stretch = p.rod_diameter / p.inner_diameter - 1.0
+    if not -0.1 <= stretch <= 0.2:
+        raise ValueError(
+            f"rod_diameter = {p.rod_diameter:g} mm stretches inner_diameter = "
+            f"{p.inner_diameter:g} mm by {100 * stretch:.3g} %; allowed are -10 to 20 %"
+        )
+
+
+def _section_is_between_the_walls(p: ORing) -> None:
+    if p.groove_width < p.axial_width:
+        what = "section_diameter" if p.round else "the width of the section"
+        raise ValueError(
+            f"groove_width = {p.groove_width:g} mm; it must be at least "
+            f"{what}, {p.axial_width:g} mm"
+        )
+    limit = 0.5 * (p.groove_width - p.axial_width)
+    if abs(p.groove_centre) > limit + 1e-9 * p.groove_width:
+        what = "round section" if p.round else "section"
+        raise ValueError(
+            f"groove_centre = {p.groove_centre:g} mm; the {what} must lie between "
+            f"the walls, {-limit:g} to {limit:g} mm"
+        )
+
+
+_CHECKS = (
+    _mesh_is_there,
+    _rubber_has_an_element,
+    _sensitivity_has_a_meaning,
+    _rule_is_rich_enough,
+    _film_has_its_model,
+    _tolerance_has_an_estimate,
+    _air_side_is_closed_or_open,
+    _arc_has_two_ends,
+    _section_is_one,
+    _seal_is_squeezed,
+    _ring_fits_the_rod,
+    _section_is_between_the_walls,
+)

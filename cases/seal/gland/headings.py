@@ -1,0 +1,54 @@
+"""In which order, and under which headings, the keys of a seal are listed."""
+
+from __future__ import annotations
+
+from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
+from softehl.cases.seal.gland.sections.keys import SectionKeys
+from softehl.cases.seal.gland.shear_thinning import ThinningKeys
+
+_SURFACES = ("roughness", "asperity_stiffness", "boundary_friction")
+_CAVITATION = ("cavitation", "cavitation_pressure", "cavitation_penalty")
+
+SEAL = {
+    "ring": ("ring", "inner_diameter", "section_diameter", *SectionKeys.model_fields),
+    "gland": (
+        *("rod", "rod_diameter", "gland", "squeeze", "housing_diameter", "groove_width"),
+        *("groove_centre", "backup", "extrusion_gap", "corner_fillet", "housing_friction"),
+    ),
+    "rubber": ("shore_A", *(k for k in RubberKeys.model_fields if k != "shore_A"), "materials"),
+    "oil": (
+        *("oil", "temperature", "viscosity", "pressure_viscosity", "roelands", "oil_density"),
+        *ThinningKeys.model_fields,
+    ),
+    "motion": ("sealed_pressure", "speeds", "stroke"),
+    "film": (*_SURFACES, *_CAVITATION, "shear_traction", "arc_start", "arc_end"),
+    "mesh": ("density", "tolerance", "error_estimate", "mesh"),
+    "numerics": (
+        *("sensitivity", "tolerances", "pressure_order", "reynolds", "quadrature"),
+        *("quadrature_points", "upwinding", "solid", "rotation", "solver", "linear"),
+    ),
+}
+"""Heading -> keys."""
+
+CYCLE = {
+    **SEAL,
+    "motion": (
+        *("sealed_pressure", "pressures", "travel", "frequency", "shape", "ramp", "motion"),
+        *("cycles", "supply", "speeds", "stroke"),
+    ),
+    "numerics": (*SEAL["numerics"], "time_order", "time_tolerance", "animation"),
+}
+"""The same of a cycle."""
+
+SLIDER = {
+    "gap": (
+        *("profile", "h0", "radius", "amplitude", "ratio", "pocket_start", "pocket_end"),
+        *("start", "end"),
+    ),
+    "oil": ("viscosity", "pressure_viscosity", *ThinningKeys.model_fields),
+    "motion": ("speeds", "start_pressure", "end_pressure"),
+    "film": (*_SURFACES, *_CAVITATION, "supply"),
+    "mesh": ("segments",),
+    "numerics": ("pressure_order", "reynolds"),
+}
+"""Those of the slider."""

@@ -1,0 +1,52 @@
+"""Up to which sealed pressure films are known to be found, told before a run.
+
+What counts is the sealed pressure over the shear modulus. The numbers are those of docs/limits.md,
+of a random sample of 300 glands of O-rings and one of other sections.
+"""
+
+from __future__ import annotations
+
+from softehl.cases.seal.gland.parameters import ORing
+
+_SURE, _TRIED = 3.0, 5.4
+"""p_s / mu up to which every film of an O-ring was right, and the largest that was tried."""
+
+_OTHER = 2.0
+"""The largest that other sections were tried at."""
+
+_ROUND_WORDS = (
+    f"every film of a sample of O-rings was right up to {_SURE:g}, 98 % up to 4, 89 % from 4 to 5, "
+    f"above that states are uncertain, and nothing was tried above {_TRIED:g} (docs/limits.md)"
+)
+_OTHER_WORDS = f"sections other than round were tried up to {_OTHER:g}, not above (docs/limits.md)"
+_DO = "the run may take minutes and end without a film; a harder rubber or a lower pressure helps"
+
+
+def ratio(p: ORing, pressure: float) -> float:
+    """Sealed pressure (MPa) over the shear modulus of the softest part of the section."""
+    parts = [*([""] if p.has_body else []), *p.materials]
+    return pressure / min(p.rubber(part).shear_modulus for part in parts)
+
+
+def reach(p: ORing, pressure: float) -> list[str]:
+    """What the ratio is and what it means, in a line; nothing without a pressure."""
+    found = ratio(p, pressure)
+    if not found or _beyond(p, found):
+        return []
+    return [f"{_named(found)}: {_ROUND_WORDS if p.round else _OTHER_WORDS}"]
+
+
+def beyond_reach(p: ORing, pressure: float) -> list[str]:
+    """The same with what to do, where the ratio is above what is known to run."""
+    found = ratio(p, pressure)
+    if not _beyond(p, found):
+        return []
+    return [f"{_named(found)}: {_ROUND_WORDS if p.round else _OTHER_WORDS}; {_DO}"]
+
+
+def _beyond(p: ORing, found: float) -> bool:
+    return found > (_SURE if p.round else _OTHER)
+
+
+def _named(found: float) -> str:
+    return f"sealed pressure / shear modulus = {found:.2g}"

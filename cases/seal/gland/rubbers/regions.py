@@ -1,0 +1,70 @@
+"""Regions of a section that have a material of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from softehl.cases.seal.gland.given import number
+from softehl.cases.seal.gland.rubbers.rubber import with_rubber
+from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
+from softehl.runtime.mesh.parted_mesh import CAP
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "ptfe": {"material": "neo-hooke", "mu": 171.0, "bulk_modulus": 2080.0},
+}
+"""Materials by name. PTFE as an elastic solid, E = 500 MPa and nu = 0.46 at room temperature; it
+neither yields nor creeps here."""
+
+MATERIALS = (
+    'a table of regions: cap = "ptfe", or cap = { material = "neo-hooke", mu = 171, bulk_modulus = '
+    "2080 } with the keys of a rubber; a cap is of PTFE where nothing is given"
+)
+
+
+class Region(RubberKeys):
+    """What a region of a section is made of.  Raises pydantic.ValidationError, ValueError."""
+
+    @classmethod
+    def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """The keys of its material filled in."""
+        name = given.get("material")
+        preset = PRESETS.get(name, {}) if isinstance(name, str) else {}
+        return with_rubber(
+            {**given, **preset, **{k: v for k, v in given.items() if k != "material"}}
+        )
+
+
+def with_regions(values: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a case with its regions as such.  ValueError, one line, for what is none."""
+    given = values.get("materials", {})
+    if not isinstance(given, Mapping):
+        return values
+    tables = dict(given)
+    if number(values.get("cap_thickness")):
+        tables.setdefault(CAP, "ptfe")
+    return {**values, "materials": {name: _region(name, table) for name, table in tables.items()}}
+
+
+def _region(name: str, table: object) -> Region:
+    if isinstance(table, Region):
+        return table
+    if isinstance(table, str):
+        table = {"material": table}
+    if not isinstance(table, Mapping) or not table:
+        raise ValueError(f"materials.{name} = {table}: allowed is {MATERIALS}")
+    for key in ("fit", "ogden_terms"):
+        if table.get(key) not in (None, 3):
+            raise ValueError(f"materials.{name}: {key} is for the whole section; give moduli")
+    if name == CAP and set(table) <= set(PRESETS["ptfe"]) - {"material"}:
+        table = {"material": "ptfe", **table}
+    try:
+        return Region(**table)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        words = first["msg"].removeprefix("Value error, ")
+        at = ".".join(["materials", name, *map(str, first["loc"])])
+        also = f"; or {', '.join(PRESETS)}" if first["loc"] == ("material",) else ""
+        raise ValueError(f"{at}: {words[0].lower()}{words[1:]}{also}") from None

@@ -1,0 +1,197 @@
+"""From what a user knows of a rubber to the keys of its material: a hardness, tests, or numbers.
+
+Whatever is given twice must agree; what belongs to another material is an error that names both
+keys.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from softehl.cases.seal.gland.given import number, put, shown
+from softehl.cases.seal.gland.rubbers.materials import (
+    KEYS,
+    MATERIALS,
+    Material,
+    shear_modulus,
+    unstable_at,
+)
+from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
+from softehl.cases.seal.gland.trade import hardness
+
+if TYPE_CHECKING:
+    from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
+
+SHORE = (20.0, 90.0)
+"""Hardness Shore A between which Gent's rule is taken."""
+
+_PAPER = {"mu_1": 3.04, "mu_2": 0.62}
+
+
+def youngs_modulus(shore_A: float) -> float:
+    """Young's modulus by Gent's rule from a hardness Shore A, MPa.
+
+    A. N. Gent, Rubber Chem. Technol. 31 (1958) 896: the durometer's pin as a punch on a half-space
+    of linear elasticity, E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)).
+    """
+    return 0.0981 * (56.0 + 7.62336 * shore_A) / (0.137505 * (254.0 - 2.54 * shore_A))
+
+
+def shore_band(shore_A: float, tolerance: float = 5.0) -> tuple[float, float]:
+    """How far the modulus is off at most, in per cent, below and above, by +- 5 Shore A.
+
+    That is how rubbers are sold; the rule itself is no better.
+    """
+    low, middle, high = (youngs_modulus(shore_A + d) for d in (-tolerance, 0.0, tolerance))
+    return 100.0 * (low / middle - 1.0), 100.0 * (high / middle - 1.0)
+
+
+def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a case with those of its material filled in.
+
+    Raises ValueError where something is missing or contradicts; values of wrong types pass, to be
+    refused with their keys.
+    """
+    values = dict(given)
+    _with_hardness(values)
+    shore, table = values.get("shore_A"), values.get("fit")
+    if shore is not None and table is not None:
+        raise ValueError(f"shore_A = {shore} and fit = {table!r} contradict: leave one of them out")
+    if values.get("material") is None:
+        values["material"] = "mooney-rivlin" if shore is None else "neo-hooke"
+    material = MATERIALS.get(values["material"]) if isinstance(values["material"], str) else None
+    if material is None:
+        return values
+    source = _source(values, material)
+    _require_own(values, material, source)
+    if number(shore):
+        _with_shore(values, material)
+    if isinstance(table, str):
+        _with_fit(values, material, Path(table))
+    if values["material"] == "mooney-rivlin":
+        values.update({k: v for k, v in _PAPER.items() if values.get(k) is None})
+    _require_complete(values, material)
+    return values
+
+
+def _with_hardness(values: dict[str, Any]) -> None:
+    """The hardness of a rubber that is given by its name, "NBR 70", and whether it can be used."""
+    text, shore = values.get("material"), values.get("shore_A")
+    if isinstance(shore, str):
+        values["shore_A"] = hardness(shore)
+        if values["shore_A"] is None:
+            raise ValueError(
+                f'shore_A = "{shore}" is not understood; write shore_A = 70 or "NBR 70"'
+            )
+    if isinstance(text, str) and (found := hardness(text)) is not None:
+        del values["material"]
+        put(values, "shore_A", found, f'material = "{text}"')
+    shore = values.get("shore_A")
+    if number(shore) and not SHORE[0] <= shore <= SHORE[1]:
+        raise ValueError(
+            f"shore_A = {shore:g}: a hardness gives a modulus from {SHORE[0]:g} to {SHORE[1]:g} "
+            "Shore A (Gent's rule); give the modulus of another rubber itself, as in material = "
+            '"neo-hooke" and mu = "15 MPa", a third of Young\'s modulus'
+        )
+
+
+def _source(values: Mapping[str, Any], material: Material) -> str:
+    """What says which material it is."""
+    if values.get("shore_A") is not None:
+        if not material.shore:
+            names = ", ".join(f'"{n}"' for n, m in MATERIALS.items() if m.shore)
+            raise ValueError(
+                f'shore_A = {values["shore_A"]} and material = "{values["material"]}" contradict: '
+                f"a hardness gives one modulus; allowed are {names}"
+            )
+        return f'shore_A = {values["shore_A"]} (material = "{values["material"]}")'
+    return f'material = "{values["material"]}"'
+
+
+def _require_own(values: dict[str, Any], material: Material, source: str) -> None:
+    """No key of another material; those that have a default elsewhere are emptied."""
+    for key in KEYS:
+        if key in material.keys:
+            continue
+        if values.get(key) is not None:
+            own = " and ".join(material.keys)
+            raise ValueError(
+                f"{key} = {shown(values[key])} and {source} contradict: it has {own}; "
+                "leave one of them out"
+            )
+        values[key] = None
+
+
+def _with_shore(values: dict[str, Any], material: Material) -> None:
+    mu = youngs_modulus(float(values["shore_A"])) / 3.0
+    others = [key for key in material.keys if key != "mu"]
+    if any(not number(values.get(key)) for key in others):
+        return
+    unit = shear_modulus(material, {**values, "mu": 1.0})
+    put(values, "mu", mu / unit, f"shore_A = {values['shore_A']:g}")
+
+
+def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
+    name, terms, heat = values["material"], values.get("ogden_terms"), values.get("temperature")
+    terms = terms if isinstance(terms, int) and 1 <= terms <= 3 else 3
+    found = fit(name, read_data(path), terms, float(heat) if number(heat) else None)
+    if found.unstable:
+        test, stretch = found.unstable
+        raise ValueError(
+            f'fit = "{path}": material = "{name}" fitted to these tests is not stable in {test} '
+            f"tension at a stretch of {stretch:.3g}; take another material or more tests"
+        )
+    for key, value in found.values.items():
+        put(values, key, value, f'fit = "{path}"')
+
+
+def _require_complete(values: dict[str, Any], material: Material) -> None:
+    missing = [key for key in material.keys if values.get(key) is None]
+    if missing:
+        other = ", or shore_A" if material.shore and missing == ["mu"] else ""
+        raise ValueError(
+            f'material = "{values["material"]}" needs {" and ".join(missing)}{other}, '
+            'or fit = "tests.csv"'
+        )
+
+
+def require_stable(name: str, given: Mapping[str, Any]) -> None:
+    """Raise ValueError where a rubber with these keys is not stable where a seal needs it."""
+    material = MATERIALS[name]
+    if material.energy == "mooney_rivlin":
+        return  # with moduli that are not negative it always is
+    if name == "ogden":
+        _require_pairs(given["ogden_mu"], given["ogden_alpha"])
+    keys = ", ".join(f"{key} = {shown(given[key])}" for key in material.keys)
+    found = unstable_at(material, material.kernel_values(given))
+    if found:
+        raise ValueError(
+            f'material = "{name}" ({keys}) is not stable in {found[0]} tension at a stretch of '
+            f"{found[1]:.3g} (its stress falls there, or it locks); a seal needs 0.6 to 1.6"
+        )
+
+
+def _require_pairs(mu: tuple[float, ...], alpha: tuple[float, ...]) -> None:
+    if len(mu) != len(alpha):
+        raise ValueError(
+            f"ogden_mu has {len(mu)} and ogden_alpha {len(alpha)} values: a term is a pair of them"
+        )
+    if 0.0 in alpha:
+        raise ValueError("ogden_alpha has a 0: an exponent of 0 is no term; leave it out")
+
+
+_LEAST_BULK = 20.0
+"""Bulk over shear modulus of a rubber at least; Poisson's ratio is 0.475 there."""
+
+
+def soft(p: RubberKeys) -> list[str]:
+    """What is unusual about a rubber, in words."""
+    ratio = p.bulk_modulus / p.shear_modulus
+    if ratio >= _LEAST_BULK:
+        return []
+    return [
+        f"bulk_modulus = {p.bulk_modulus:g} MPa is {ratio:.3g} shear moduli: "
+        "rubbers have hundreds to thousands"
+    ]

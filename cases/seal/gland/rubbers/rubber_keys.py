@@ -1,0 +1,90 @@
+"""The keys of a rubber, and what its elements take from them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.gland.rubbers import materials
+from softehl.cases.seal.gland.rubbers.rubber import require_stable
+
+Terms = Annotated[
+    tuple[Annotated[float, Field(strict=True, allow_inf_nan=False)], ...],
+    Field(min_length=1, max_length=3, strict=False),
+]
+
+
+class RubberKeys(Parameters):
+    """What a seal, or a region of it, is made of."""
+
+    material: materials.Name = key("mooney-rivlin", "rubber")
+    mu_1: float | None = key(
+        3.04,
+        "Mooney-Rivlin modulus mu_1; mu_1 + mu_2 is the shear modulus",
+        unit="MPa",
+        gt=0,
+        le=1000,
+    )
+    mu_2: float | None = key(0.62, "Mooney-Rivlin modulus mu_2", unit="MPa", ge=0, le=1000)
+    mu: float | None = key(
+        None, "modulus mu of neo-hooke, arruda-boyce and gent", unit="MPa", gt=0, le=1000
+    )
+    c_10: float | None = key(None, "Yeoh coefficient of I1bar - 3", unit="MPa", gt=0, le=1000)
+    c_20: float | None = key(None, "Yeoh coefficient of (I1bar - 3)^2", unit="MPa", ge=-1e3, le=1e3)
+    c_30: float | None = key(None, "Yeoh coefficient of (I1bar - 3)^3", unit="MPa", ge=-1e3, le=1e3)
+    ogden_mu: Terms | None = key(
+        None, "Ogden moduli mu_p", unit="MPa", bounds="a number or a list of up to 3"
+    )
+    ogden_alpha: Terms | None = key(
+        None, "Ogden exponents alpha_p", bounds="a number or a list of up to 3, none 0"
+    )
+    lambda_m: float | None = key(
+        None, "Arruda-Boyce stretch at which the chains lock", gt=1, le=1000
+    )
+    J_m: float | None = key(None, "Gent limit of I1bar - 3", gt=0, le=1e6)
+    shore_A: float | None = key(
+        None,
+        "hardness Shore A, for mu by Gent's rule; 5 Shore are 20 to 28 % of it at 70, more above",
+        bounds='20 to 90, or "NBR 70"',
+        ge=20,
+        le=90,
+    )
+    fit: str | None = key(
+        None,
+        "tests of the rubber, for the parameters of its material",
+        bounds="a CSV file with the columns test, stretch, stress_MPa",
+        file=True,
+    )
+    ogden_terms: int = key(3, "terms of an Ogden fit", bounds="1, 2 or 3", ge=1, le=3)
+    bulk_modulus: float = key(500.0, "bulk modulus kappa", unit="MPa", gt=0, le=1e5)
+
+    @property
+    def energy(self) -> str:
+        """Name of its energy among the kernels."""
+        return materials.MATERIALS[self.material].energy
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus in the initial configuration, mu of (3) [MPa]."""
+        return materials.shear_modulus(materials.MATERIALS[self.material], self._rubber)
+
+    @property
+    def rubber_values(self) -> dict[str, float]:
+        """Parameters of the solid's kernel."""
+        own = materials.MATERIALS[self.material].kernel_values(self._rubber)
+        return {**own, "kappa": self.bulk_modulus}
+
+    def solid_kernel(self, element: str) -> str:
+        """Name of the kernel of a solid element: with the energy where it is not the paper's."""
+        return f"solid_{element}" + ("" if self.energy == "mooney_rivlin" else f"_{self.energy}")
+
+    @property
+    def _rubber(self) -> dict[str, Any]:
+        return {key: getattr(self, key) for key in materials.KEYS}
+
+    @model_validator(mode="after")
+    def _rubber_is_stable(self) -> Self:
+        require_stable(self.material, self._rubber)
+        return self

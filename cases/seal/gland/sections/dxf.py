@@ -1,0 +1,158 @@
+"""Outlines from DXF drawings: lines, arcs, circles and polylines with bulges, converted exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, dist, radians, sin
+from pathlib import Path
+from typing import Any
+
+from softehl.cases.seal.gland.sections.seated import require_film_below, runs, seated
+from softehl.runtime.mesh.outline import Arc, Line, Outline, OutlineError, Piece, Point, Shape
+from softehl.runtime.mesh.outline_checks import CLOSED
+from softehl.runtime.mesh.pieces import bulge_arc
+
+_UNITS = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 1e-3}
+_WORDS = ("DIMENSION", "HATCH", "LEADER", "MTEXT", "MULTILEADER", "POINT", "TEXT", "VIEWPORT")
+Named = tuple[Piece, str]
+
+
+def read_dxf(path: Path, inner_diameter: float | None = None) -> Shape:
+    """The section of a drawing, x to the air side and y away from the rod, in its units.
+
+    One closed contour; the layers FILM and PRESSURE name its lubricated and its sealed part. A
+    drawing whose sealed side is on the right is mirrored. Raises OutlineError, one line.
+    """
+    named = _chained(_pieces(path), path.name)
+    pieces = [piece for piece, _ in named]
+    try:
+        outline = Outline(pieces)
+        if outline.pieces[0] != pieces[0]:  # it was clockwise
+            named = [(piece.reversed(), layer) for piece, layer in reversed(named)]
+        found = runs([layer for _, layer in named], path.name)
+        if found.mirrored:
+            named = [(_mirrored(piece).reversed(), layer) for piece, layer in reversed(named)]
+            outline = Outline([piece for piece, _ in named])
+            found = runs([layer for _, layer in named], path.name)
+    except OutlineError as error:
+        words = str(error)
+        raise OutlineError(
+            words if words.startswith(path.name) else f"{path.name}: {words}"
+        ) from None
+    outline = seated(outline, inner_diameter)
+    ends = [
+        (float(outline.starts[first]), float(outline.starts[(first + count) % len(named)]))
+        for first, count in (found.film, found.pressure)
+    ]
+    return require_film_below(Shape(outline, ends[0], ends[1], path.stem), path.name)
+
+
+def _pieces(path: Path) -> list[Named]:
+    """Pieces of the contour in mm with their layers, in the order of the file."""
+    try:
+        from ezdxf.filemanagement import readfile
+        from ezdxf.lldxf.const import DXFError
+    except ImportError:
+        raise OutlineError(
+            f"{path.name}: DXF files are read by ezdxf; pip install 'softehl[cad]'"
+        ) from None
+    if not path.is_file():
+        raise OutlineError(f"no drawing {str(path)!r}")
+    try:
+        document = readfile(path)
+    except (OSError, DXFError, UnicodeError) as error:
+        words = " ".join(str(error).split()) or "not a DXF file"
+        raise OutlineError(f"{path.name}: {words}") from None
+    unit = int(document.header.get("$INSUNITS", 0))
+    if unit not in _UNITS:
+        raise OutlineError(f"{path.name}: $INSUNITS = {unit} is no metric unit or inch; use mm")
+    found: list[Named] = []
+    for entity in document.modelspace():
+        layer = str(entity.dxf.layer)
+        found += [(p.moved(_UNITS[unit], (0.0, 0.0)), layer) for p in _converted(entity, path.name)]
+    if not found:
+        raise OutlineError(f"{path.name}: there is no contour of lines and arcs")
+    return found
+
+
+def _converted(entity: Any, file: str) -> Iterator[Piece]:
+    """The pieces of one entity; text and dimensions have none."""
+    kind = entity.dxftype()
+    if kind in _WORDS:
+        return
+    if kind == "LINE":
+        yield Line(_flat(entity.dxf.start), _flat(entity.dxf.end))
+        return
+    if kind == "ARC":
+        found: list[Piece] = [_arc(entity, entity.dxf.start_angle, entity.dxf.end_angle)]
+    elif kind == "CIRCLE":
+        found = [_arc(entity, 0.0, 180.0), _arc(entity, 180.0, 360.0)]
+    elif kind == "LWPOLYLINE":
+        found = _polyline([(p[0], p[1], p[2]) for p in entity.get_points("xyb")], entity.closed)
+    elif kind == "POLYLINE" and entity.is_2d_polyline:
+        corners = [(*_flat(v.dxf.location), v.dxf.bulge) for v in entity.vertices]
+        found = _polyline(corners, entity.is_closed)
+    else:
+        raise OutlineError(
+            f"{file}: {kind} on layer {entity.dxf.layer!r} is no line, arc, circle or flat "
+            "polyline; explode it or draw it as arcs"
+        )
+    behind = entity.dxf.hasattr("extrusion") and entity.dxf.extrusion.z < 0.0
+    yield from (map(_mirrored, found) if behind else found)
+
+
+def _flat(point: Any) -> Point:
+    return float(point[0]), float(point[1])
+
+
+def _arc(entity: Any, start: float, end: float) -> Arc:
+    """Counterclockwise between angles in degrees."""
+    z, r = _flat(entity.dxf.center)
+    R = float(entity.dxf.radius)
+    a, b = ((z + R * cos(radians(t)), r + R * sin(radians(t))) for t in (start, end))
+    return Arc(a, b, (z, r))
+
+
+def _polyline(corners: list[tuple[float, float, float]], closed: bool) -> list[Piece]:
+    """A last corner upon the first closes a polyline as well."""
+    points = [(float(z), float(r)) for z, r, _ in corners]
+    ends = [*points[1:], points[0]] if closed else points[1:]
+    pairs = zip(points, ends, (bulge for _, _, bulge in corners), strict=False)
+    return [bulge_arc(a, b, float(bulge)) for a, b, bulge in pairs if a != b]
+
+
+def _mirrored(piece: Piece) -> Piece:
+    """The piece with -z for z."""
+    (a, b), (c, d) = piece.start, piece.end
+    if isinstance(piece, Line):
+        return Line((-a, b), (-c, d))
+    return Arc((-a, b), (-c, d), (-piece.centre[0], piece.centre[1]), not piece.ccw)
+
+
+def _chained(named: list[Named], file: str) -> list[Named]:
+    """The pieces, turned and in order, so that each begins where the one before ends."""
+    left, chain = list(named[1:]), [named[0]]
+    boxes = [piece.box for piece, _ in named]
+    size = dist((min(b[0] for b in boxes), min(b[1] for b in boxes)),
+                (max(b[2] for b in boxes), max(b[3] for b in boxes)))  # fmt: skip
+    while dist(chain[-1][0].end, chain[0][0].start) > CLOSED * size:
+        end = chain[-1][0].end
+        gaps = [min(dist(end, p.start), dist(end, p.end)) for p, _ in left]
+        gaps.append(dist(end, chain[0][0].start))
+        gap = min(gaps)
+        k = gaps.index(gap)
+        if gap > CLOSED * size or k == len(left):
+            raise OutlineError(
+                f"{file}: the contour is open: a gap of {gap:.4g} mm at ({end[0]:.6g}, "
+                f"{end[1]:.6g}); close it"
+            )
+        piece, layer = left.pop(k)
+        forward = dist(end, piece.start) <= dist(end, piece.end)
+        chain.append((piece if forward else piece.reversed(), layer))
+    if left:
+        z, r = left[0][0].start
+        raise OutlineError(
+            f"{file}: there is more than one contour, such as at ({z:.6g}, {r:.6g}); holes and "
+            "second parts are not allowed"
+        )
+    return chain

@@ -1,0 +1,213 @@
+"""Sections from files: drawings (.dxf), points (.csv), and the boundary of a mesh (.msh, ...)."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from softehl.cases.seal.gland.sections.dxf import read_dxf
+from softehl.cases.seal.gland.sections.seated import (
+    FILM,
+    PRESSURE,
+    require_film_below,
+    runs,
+    seated,
+)
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.mesh.mesh import Mesh, MeshError
+from softehl.runtime.mesh.outline import Outline, OutlineError, Point, Shape
+from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
+from softehl.runtime.mesh.subdivide import subdivided
+
+COLUMNS = ("z_mm", "r_mm", "part")
+"""Of a CSV file: points in order; part, of the side from a point to the next, may be left out."""
+
+_LEAST = 0.02  # share of its element that a corner of a mesh from a file must have
+
+
+def read_outline(path: Path, inner_diameter: float | None = None) -> Shape:
+    """The section of a drawing (.dxf) or of points (.csv).
+
+    inner_diameter: twice the radius of its lowest point, mm; None leaves it where it was drawn.
+    Raises OutlineError, one line.
+    """
+    readers = {".dxf": read_dxf, ".csv": read_points}
+    if path.suffix.lower() not in readers:
+        raise OutlineError(f"{path.name}: an outline is a .dxf or a .csv file")
+    return readers[path.suffix.lower()](path, inner_diameter)
+
+
+def read_points(path: Path, inner_diameter: float | None = None) -> Shape:
+    """The section of a CSV file with the columns of COLUMNS.  Raises OutlineError, one line."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        points = [(float(row["z_mm"]), float(row["r_mm"])) for row in rows]
+    except OSError:
+        raise OutlineError(f"no file {str(path)!r}") from None
+    except (KeyError, TypeError, ValueError, UnicodeDecodeError):
+        raise OutlineError(
+            f"{path.name}: a file of points has the columns {', '.join(COLUMNS)} (the last may be "
+            "left out), numbers in the first two"
+        ) from None
+    parts = [(row.get("part") or "").strip() for row in rows]
+    try:
+        return outline_of(points, inner_diameter, parts if any(parts) else None, path.stem)
+    except OutlineError as error:
+        raise OutlineError(f"{path.name}: {error}") from None
+
+
+def outline_of(
+    points: Sequence[Point],
+    inner_diameter: float | None = None,
+    parts: Sequence[str] | None = None,
+    name: str = "outline",
+) -> Shape:
+    """The section of a polygon, (z, r) in mm.
+
+    parts: FILM, PRESSURE or else of the side behind each point. Without: film where the polygon
+    faces the rod, sealed pressure from its highest point on. Raises OutlineError.
+    """
+    if parts is None:
+        outline = seated(Outline.polygon(points), inner_diameter)
+        z, r = np.array([piece.start for piece in outline.pieces]).T
+        highest = np.flatnonzero(r >= r.max() - 1e-6 * outline.size)
+        crown = highest[int(np.argmin(z[highest]))]
+        shape = Shape.facing(outline, (float(z[crown]), float(r[crown])), name)
+        return require_film_below(shape, name)
+    drawn, names = list(points), list(parts)
+    if drawn[0] == drawn[-1]:
+        drawn, names = drawn[:-1], names[:-1]
+    if Outline.polygon(drawn).pieces[0].end != drawn[1]:  # it was clockwise
+        drawn, names = drawn[::-1], [*names[-2::-1], names[-1]]
+    found = runs(names, name)
+    if found.mirrored:
+        drawn, names = [(-z, r) for z, r in drawn[::-1]], [*names[-2::-1], names[-1]]
+        found = runs(names, name)
+    outline = seated(Outline.polygon(drawn), inner_diameter)
+    ends = [
+        (float(outline.starts[first]), float(outline.starts[(first + count) % len(drawn)]))
+        for first, count in (found.film, found.pressure)
+    ]
+    return require_film_below(Shape(outline, ends[0], ends[1], name), name)
+
+
+def read_mesh(path: Path, inner_diameter: float | None = None) -> tuple[Shape, SectionMesh]:
+    """The section of a mesh file, and its mesh: quadrilaterals, sides FILM and PRESSURE.
+
+    Groups of cells become regions. Raises OutlineError or MeshError, one line.
+    """
+    mesh, file = Mesh.read(path), path.name
+    if set(mesh.cells) != {"quad4"}:
+        raise MeshError(
+            f"{file}: it has cells of the kinds {', '.join(mesh.cells)}; a section is meshed by "
+            "quadrilaterals of four nodes alone (Gmsh: Mesh.RecombineAll = 1)"
+        )
+    quads = _counterclockwise(mesh.points, mesh.cells["quad4"])
+    loop = _loop(mesh.boundary["line2"], mesh.points, file)
+    names = _names(mesh, loop)
+    points, found = mesh.points, runs(names, file)
+    if found.mirrored:
+        points, quads = points * [-1.0, 1.0], quads[:, ::-1]
+        loop, names = loop[::-1], [*names[-2::-1], names[-1]]
+        found = runs(names, file)
+    first, arc = found.film
+    loop = np.roll(loop, -first)
+    drawn = Outline.polygon([(float(z), float(r)) for z, r in points[loop]])
+    outline = seated(drawn, inner_diameter)
+    points = points + np.subtract(outline.pieces[0].start, drawn.pieces[0].start)
+    places = outline.starts
+    begin, count = (found.pressure[0] - first) % len(loop), found.pressure[1]
+    pressure = float(places[begin]), float(places[(begin + count) % len(loop)])
+    shape = Shape(outline, (0.0, float(places[arc])), pressure, path.stem)
+    regions = {name: group["quad4"] for name, group in mesh.groups.items() if "quad4" in group}
+    found_mesh = SectionMesh(points, quads, loop, arc, places[:-1], outline.length, regions)
+    _require_sound(found_mesh, file)
+    return require_film_below(shape, file), found_mesh
+
+
+def _counterclockwise(points: Array, quads: Integers) -> Integers:
+    x = points[quads]
+    a, b = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
+    clockwise = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] < 0.0
+    return np.where(clockwise[:, None], quads[:, ::-1], quads)
+
+
+def _loop(edges: Integers, points: Array, file: str) -> Integers:
+    """Nodes (B,) of the boundary, counterclockwise.  Raises MeshError where it is not one loop."""
+    neighbours: dict[int, list[int]] = {}
+    for a, b in edges.tolist():
+        neighbours.setdefault(a, []).append(b)
+        neighbours.setdefault(b, []).append(a)
+    for node, others in neighbours.items():
+        if len(others) != 2:
+            z, r = points[node]
+            raise MeshError(f"{file}: the boundary meets itself at ({z:.6g}, {r:.6g}); part it")
+    start = int(edges[0, 0])
+    loop, before = [start], -1
+    while True:
+        here = loop[-1]
+        after = next((n for n in neighbours[here] if n != before), before)
+        if after == start:
+            break
+        before = here
+        loop.append(after)
+    if len(loop) < len(neighbours):
+        raise MeshError(
+            f"{file}: the boundary is more than one loop: {len(loop)} of {len(neighbours)} nodes "
+            "are on one; a section has no holes and is one part"
+        )
+    nodes = np.array(loop, dtype=np.int64)
+    z, r = (points[nodes] - points[nodes].mean(axis=0)).T
+    area = float((z * np.roll(r, -1) - r * np.roll(z, -1)).sum())
+    return nodes if area > 0.0 else nodes[::-1]
+
+
+def _names(mesh: Mesh, loop: Integers) -> list[str]:
+    """FILM, PRESSURE or nothing, of the segment behind each node of the loop."""
+    known = {
+        frozenset(segment): name.upper()
+        for name, faces in mesh.sides.items()
+        if name.upper() in (FILM, PRESSURE) and "line2" in faces
+        for segment in faces["line2"].tolist()
+    }
+    pairs = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+    return [known.get(frozenset(pair), "") for pair in pairs]
+
+
+def _require_sound(mesh: SectionMesh, file: str) -> None:
+    shares = corner_jacobians(mesh).min(axis=1)
+    worst = int(shares.argmin())
+    if shares[worst] < _LEAST:
+        z, r = mesh.points[mesh.quads[worst]].mean(axis=0)
+        raise MeshError(
+            f"{file}: an element at ({z:.6g}, {r:.6g}) is folded or nearly so, a corner of it has "
+            f"{shares[worst]:.3g} of its share; mend the mesh there"
+        )
+
+
+def finer(mesh: SectionMesh, k: int) -> SectionMesh:
+    """The mesh with every element divided k by k; its boundary stays the same polygon."""
+    x = mesh.points[mesh.boundary]
+    t = (np.arange(k) / k)[None, :, None]
+    curve = ((1 - t) * x[:, None] + t * np.roll(x, -1, axis=0)[:, None]).reshape(-1, 2)
+    points, quads, border = subdivided(mesh.points, mesh.quads, mesh.boundary, curve, k)
+    ends = np.append(mesh.places, mesh.places[0] + mesh.length)
+    places = (ends[:-1, None] + np.diff(ends)[:, None] * t[0, :, 0]).ravel()
+    regions = {
+        name: (cells[:, None] * k**2 + np.arange(k**2)).ravel()
+        for name, cells in mesh.regions.items()
+    }
+    return replace(
+        mesh,
+        points=points,
+        quads=quads,
+        boundary=border,
+        arc=mesh.arc * k,
+        places=places,
+        regions=regions,
+    )

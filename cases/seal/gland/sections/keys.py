@@ -1,0 +1,259 @@
+"""The keys of a case that say which section its seal has, and the shape that they give.
+
+`section` names a page of this folder; its dimensions are keys by their own names, but for the
+height, which is `section_diameter`, and the width, `section_width`. They are read off the pages, so
+that another section is its page and a line of the registry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from pydantic import ValidationError, create_model
+
+from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.gland.given import number, put
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.files import read_mesh, read_outline
+from softehl.runtime.mesh.outline import Shape
+from softehl.runtime.mesh.sections import SectionMesh
+
+Name = Literal["round", "rectangular", "x_ring", "d_ring", "trapezoid", "u_cup"]
+
+ROUND: Name = "round"
+"""The section that needs no outline: its mesh is the O-grid of the paper."""
+
+NAMES = {
+    ROUND: "O-ring",
+    "rectangular": "square ring",
+    "x_ring": "X-ring",
+    "d_ring": "D-ring",
+    "trapezoid": "trapezoidal ring",
+    "u_cup": "U-cup",
+}
+"""What seals of these sections are called."""
+
+_RENAMED = {"width": "section_width"}  # what a page calls a dimension -> its key
+_STATIONS = 2000
+_STEEP = 0.5  # sine of the angle between the sides and the edge of a cap, at least
+_BETWEEN = 0.01  # of the height: two lobes have a groove at least so deep between them
+
+
+def dimensions(section: str) -> dict[str, str]:
+    """Keys of the dimensions of a section, and what its page calls them."""
+    names = [name for name in SECTIONS[section].model_fields if name != "height"]
+    return {_RENAMED.get(name, name): name for name in names}
+
+
+def _declared() -> dict[str, Any]:
+    """Which section, and every dimension of every section once, with what it means in each."""
+    found: dict[str, list[tuple[str, str, float]]] = {}
+    for section in SECTIONS:
+        for name, own in dimensions(section).items():
+            extra = SECTIONS[section].model_fields[own].json_schema_extra
+            assert isinstance(extra, dict)
+            use = section, str(extra["meaning"]), float(str(extra["part"]))
+            found.setdefault(name, []).append(use)
+    keys = {name: (float | None, _key(uses)) for name, uses in found.items()}
+    section = key(ROUND, "section of the seal (docs/sections.md)")
+    outline = key(
+        None,
+        "instead of `section`: one that is drawn, given by points, or bounds a mesh",
+        bounds="a .dxf, .csv or mesh file (.msh, .vtu, ...), see docs/sections.md",
+        file=True,
+    )
+    cap = key(
+        None,
+        "thickness of a cap of its own material (materials.cap, PTFE) on the side of the rod",
+        unit="mm",
+        bounds="left out = none; it holds the whole film",
+        gt=0,
+    )
+    return {
+        "section": (Name, section),
+        "outline": (str | None, outline),
+        "cap_thickness": (float | None, cap),
+        **keys,
+    }
+
+
+def _key(uses: list[tuple[str, str, float]]) -> Any:
+    """A key of the sections that have this dimension."""
+    meaning = f"{', '.join(section for section, _, _ in uses)}: {uses[0][1]}"
+    shares = " or ".join(dict.fromkeys(f"{share:g}" for _, _, share in uses))
+    bounds = f"left out = {shares} of section_diameter"
+    return key(None, meaning, unit="mm", bounds=bounds, ge=0)
+
+
+if TYPE_CHECKING:
+
+    class _Keys(Parameters):
+        section: Name = ROUND
+        outline: str | None = None
+        cap_thickness: float | None = None
+
+else:
+    _Keys = create_model("_Keys", __base__=Parameters, **_declared())
+
+
+class SectionKeys(_Keys):
+    """Which section a seal has, and the dimensions of it."""
+
+    @property
+    def round(self) -> bool:
+        """Whether the section is a disc, which the O-grid of the paper is laid into."""
+        return self.section == ROUND and self.outline is None
+
+    @property
+    def named(self) -> str:
+        """What the seal is called."""
+        return NAMES[self.section] if self.outline is None else f"ring of {Path(self.outline).name}"
+
+    def free(self, height: float, inner_diameter: float) -> Shape:
+        """The free section where it is, mm.  ValueError where there is none."""
+        shape = self._whole(height, inner_diameter)
+        return shape if self.cap_thickness is None else capped(shape, self.cap_thickness)
+
+    def _whole(self, height: float, inner_diameter: float) -> Shape:
+        sizes = self.sized(height)
+        if self.outline is None:
+            return shape_of(self.section, sizes, inner_diameter)
+        if self.section != ROUND or len(sizes) > 1:
+            others = [name for name in sizes if name != "height"] or ["section"]
+            raise ValueError(f"outline and {', '.join(others)}: give one of them")
+        return shape_of_file(Path(self.outline), inner_diameter)
+
+    def measured(self, height: float) -> dict[str, float]:
+        """Key of each dimension but the height -> what it is, given or left out, mm."""
+        if self.round or self.outline is not None:
+            return {}
+        page = SECTIONS[self.section](**self.sized(height))
+        return {name: getattr(page, own) for name, own in dimensions(self.section).items()}
+
+    def sized(self, height: float) -> dict[str, float]:
+        """The dimensions that are given, as their page calls them.  ValueError for others'."""
+        known = dimensions(self.section)
+        given = {
+            name: value
+            for section in SECTIONS
+            for name in dimensions(section)
+            if (value := getattr(self, name)) is not None
+        }
+        for name in given:
+            if name not in known:
+                has = ", ".join(known) or "section_diameter alone"
+                raise ValueError(f'{name} is no dimension of section = "{self.section}": {has}')
+        return {"height": height, **{known[name]: value for name, value in given.items()}}
+
+
+def shape_of(section: str, sizes: Mapping[str, float], inner_diameter: float) -> Shape:
+    """The shape of a section of these dimensions.  ValueError where they bound none."""
+    return _shape(section, tuple(sorted(sizes.items())), inner_diameter)
+
+
+def shape_of_file(path: Path, inner_diameter: float | None = None) -> Shape:
+    """The shape of a file; where it was drawn without an inner_diameter.  ValueError, one line."""
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError:
+        raise ValueError(f'outline = "{path}": there is no such file') from None
+    return _shape_of_file(path, changed, inner_diameter)
+
+
+@lru_cache(maxsize=32)
+def _shape_of_file(path: Path, changed: int, inner_diameter: float | None) -> Shape:
+    if not is_mesh(str(path)):
+        return read_outline(path, inner_diameter)
+    return _mesh_of_file(path, changed, inner_diameter)[0]
+
+
+@lru_cache(maxsize=32)
+def _mesh_of_file(
+    path: Path, _changed: int, inner_diameter: float | None
+) -> tuple[Shape, SectionMesh]:
+    return read_mesh(path, inner_diameter)
+
+
+def is_mesh(outline: str | None) -> bool:
+    """Whether an outline is that of a mesh file."""
+    return outline is not None and Path(outline).suffix.lower() not in (".dxf", ".csv")
+
+
+def mesh_of_file(path: Path, inner_diameter: float) -> SectionMesh:
+    """The mesh of a file, its lowest point at half the diameter.  ValueError, one line."""
+    return _mesh_of_file(path, path.stat().st_mtime_ns, inner_diameter)[1]
+
+
+def surface_of(path: Path) -> str:
+    """The region of a mesh file that the lowest point of its film is on, "" if of none."""
+    mesh = _mesh_of_file(path, path.stat().st_mtime_ns, None)[1]
+    nodes = mesh.arc_nodes
+    lowest = nodes[int(np.argmin(mesh.points[nodes, 1]))]
+    found = [name for name, cells in mesh.regions.items() if (mesh.quads[cells] == lowest).any()]
+    return found[0] if found else ""
+
+
+def with_outline(values: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a case with the height of an outline that is given.  ValueError."""
+    if isinstance(values.get("outline"), str):
+        inner = values.get("inner_diameter", 50.39)
+        inner = float(inner) if number(inner) and inner > 0.0 else 50.39  # refused with its key
+        _, low, _, high = shape_of_file(Path(values["outline"]), inner).outline.box
+        put(values, "section_diameter", high - low, f"outline = {values['outline']}")
+    return values
+
+
+@lru_cache(maxsize=32)
+def _shape(section: str, sizes: tuple[tuple[str, float], ...], inner_diameter: float) -> Shape:
+    try:
+        return SECTIONS[section](**dict(sizes)).shape(inner_diameter)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        name = ".".join(str(part) for part in first["loc"])
+        words = first["msg"].removeprefix("Value error, ")
+        raise ValueError(f'section = "{section}": {name} {words}'.replace("  ", " ")) from None
+
+
+def capped(shape: Shape, thickness: float) -> Shape:
+    """The shape with a cut at this height above its lowest point.  ValueError where none can be."""
+    outline, given = shape.outline, f"cap_thickness = {thickness:g} mm"
+    _, low, _, high = outline.box
+    if thickness >= high - low:
+        raise ValueError(f"{given}: it must be less than the height, {high - low:g} mm")
+    at = outline.level(low + thickness)
+    if len(at) != 2:
+        raise ValueError(
+            f"{given}: the section is in {len(at) // 2} parts there; a cap is cut off straight"
+        )
+    begin, end = float(at[0]), float(at[1])
+    inside = (np.array(shape.film) - begin) % outline.length
+    if not inside[0] < inside[1] < (end - begin) % outline.length:
+        least = float(outline.at(np.array(shape.film))[:, 1].max()) - low
+        raise ValueError(f"{given}: it must hold the film, which needs more than {least:.4g} mm")
+    turn = np.abs(np.sin(outline.heading(at)))
+    if turn.min() < _STEEP:
+        raise ValueError(f"{given}: the sides are too flat there; make it thicker or thinner")
+    return replace(shape, chord=(begin, end))
+
+
+def lobes(shape: Shape) -> int:
+    """How many separate parts of its film a section rests on: minima of r with a groove between."""
+    first, last = shape.film
+    r = shape.outline.at(np.linspace(first, last, _STATIONS))[:, 1]
+    deep, found, lowest, highest = _BETWEEN * float(np.ptp(r)), 1, r[0], r[0]
+    rising = False
+    for value in r:
+        if rising:
+            highest = max(highest, value)
+            if value < highest - deep:
+                found, rising, lowest = found + 1, False, value
+        else:
+            lowest = min(lowest, value)
+            if value > lowest + deep:
+                rising, highest = True, value
+    return found

@@ -1,0 +1,29 @@
+"""The square ring: a rectangle with round corners."""
+
+from __future__ import annotations
+
+from softehl.cases.seal.gland.sections.base import Section, part, require
+from softehl.runtime.mesh.outline import Outline, Point, rounded
+
+
+class Rectangular(Section):
+    """A rectangle, its four corners rounded alike."""
+
+    width: float = part(1.0, "axial width")
+    corner_radius: float = part(
+        0.12, "radius of the four corners", bounds="0 to half the smaller side", ge=0
+    )
+
+    def drawn(self) -> Outline:
+        """About the origin."""
+        require(
+            self.corner_radius <= 0.5 * min(self.width, self.height),
+            f"corner_radius = {self.corner_radius:g} mm; at most half of the smaller side, "
+            f"{0.5 * min(self.width, self.height):g} mm",
+        )
+        z, r = 0.5 * self.width, 0.5 * self.height
+        return Outline(rounded([(-z, -r), (z, -r), (z, r), (-z, r)], self.corner_radius))
+
+    def crown(self) -> Point:
+        """The middle of the upper side."""
+        return 0.0, 0.5 * self.height

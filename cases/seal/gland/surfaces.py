@@ -1,0 +1,104 @@
+"""What the surfaces are like: roughness, asperities, cavitation, for films of every case.
+
+Roughnesses are rms heights in micrometres where a user gives them, in mm in kernels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import hypot
+from typing import Annotated
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from softehl.cases.seal.gland.trade import no_height
+
+MICROMETRE = 1e-3  # mm
+
+PRESSURE_SCALE, VOID_SCALE = 1.0, 1e-3
+"""Pressure (MPa) and void fraction that count the same in the condition of cavitation."""
+
+MIXED, FULL = 1.0, 3.0
+"""Lambda ratios (least h_T over sigma) below which a film is one of boundary, of mixed friction."""
+
+
+def _pair(given: object) -> object:
+    """A single number is that of the surface that rests, over a smooth one that moves."""
+    for item in given if isinstance(given, (list, tuple)) else [given]:
+        if isinstance(item, str):
+            raise ValueError(no_height(item))
+    single = isinstance(given, (int, float)) and not isinstance(given, bool)
+    return (0.0, float(given)) if single else given  # type: ignore[arg-type]
+
+
+def _some(rms: float) -> float:
+    """Less than a nanometre is a slip of the unit; no film was found above such asperities."""
+    if 0.0 < rms < LEAST:
+        raise ValueError(f"a roughness is 0 or at least {LEAST:g} um")
+    return rms
+
+
+LEAST = 1e-3
+"""Least rms height of a surface that is not smooth, um."""
+
+Rms = Annotated[float, Field(ge=0, le=20), AfterValidator(_some)]
+Roughness = Annotated[tuple[Rms, Rms], Field(strict=False), BeforeValidator(_pair)]
+"""Rms heights of the moving surface and of the one that rests, um."""
+
+SLIP = 1e-3
+"""Speed at which the friction of asperities has 0.7 of its value where nothing moves, mm/s."""
+
+ROUGHNESS = "[moving, resting] or one number for the resting one alone; each 0 or 0.001 to 20"
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Two rough surfaces.
+
+    moving, resting: rms heights, mm. stiffness: K of the asperities, MPa. friction: their
+    coefficient. slip: speed (mm/s) at which it has 0.7 of its value.
+    """
+
+    moving: float = 0.0
+    resting: float = 0.0
+    stiffness: float = 0.0
+    friction: float = 0.0
+    slip: float = SLIP
+
+    @classmethod
+    def of(cls, roughness: tuple[float, float], stiffness: float, friction: float) -> Surfaces:
+        """From rms heights in um."""
+        moving, resting = (MICROMETRE * rms for rms in roughness)
+        return cls(moving, resting, stiffness, friction)
+
+    @property
+    def sigma(self) -> float:
+        """Rms height of both together, mm."""
+        return hypot(self.moving, self.resting)
+
+    def values(self) -> Mapping[str, float]:
+        """What the kernels of rough films ask for."""
+        if not self.sigma:
+            return {}
+        return {
+            "roughness": self.sigma,
+            "roughness_difference": (self.moving**2 - self.resting**2) / self.sigma**2,
+            "asperity_stiffness": self.stiffness,
+            "boundary_friction": self.friction,
+            "boundary_speed": self.slip,
+        }
+
+
+def void_values(cavitation_pressure: float) -> Mapping[str, float]:
+    """What the condition of cavitation asks for."""
+    return {
+        "cavitation_pressure": cavitation_pressure,
+        "pressure_scale": PRESSURE_SCALE,
+        "void_scale": VOID_SCALE,
+    }
+
+
+def regime(ratio: float) -> str:
+    """ "boundary", "mixed" or "full", of a lambda ratio."""
+    return "boundary" if ratio < MIXED else "mixed" if ratio < FULL else "full"

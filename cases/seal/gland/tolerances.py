@@ -1,0 +1,116 @@
+"""What tolerances of ring, gland, rubber and oil do to a film, by its sensitivities.
+
+Linear: a parameter that is off by t % moves a quantity by S t %, S its log derivative. Tolerances
+add up in the worst case, and in quadrature where they are independent.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from softehl.cases.harness.row import Record, column
+from softehl.cases.seal.gland.catalogue import UnknownRingError, ring
+from softehl.cases.seal.gland.varied import LENGTHS, MEASURES, NUMBERS, PRESSURE_KEY
+
+_ALIASES = {"modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"), "rod": ("rod_diameter",)}
+"""Names for other keys: all that a rubber has are off by the same share."""
+
+_IN_MM = frozenset((*LENGTHS, *MEASURES))
+_VARIED = _IN_MM.union(NUMBERS, [PRESSURE_KEY])
+
+_ITEM = re.compile(
+    r"(?P<name>\w+)\s+(?:\+-\s*)?(?P<size>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(?P<unit>%|mm|)"
+)
+
+
+@dataclass(frozen=True)
+class ToleranceRow(Record):
+    """One row of `tolerances.csv`."""
+
+    sealed_pressure_MPa: float = column("MPa", "sealed pressure p_s")
+    rod_speed_mm_s: float = column("mm/s", "rod speed U, + = outstroke (to the air side)")
+    quantity: str = column("", "as in `sensitivity.csv`")
+    worst_percent: float = column("%", "largest change: all tolerances at their unluckiest ends")
+    likely_percent: float = column("%", "the same of independent tolerances, added in quadrature")
+    largest: str = column("", "the tolerance that has the largest part in it")
+    largest_percent: float = column("%", "its part")
+
+
+Shares = Mapping[str, tuple[float, tuple[str, ...]]]
+"""Name of a tolerance -> its relative size, and the parameters that it moves."""
+
+
+def read_tolerances(
+    given: Sequence[str], values: Mapping[str, object], ring_name: str | None
+) -> Shares:
+    """The tolerances of a case: those of its ring in the catalogue, and those given.
+
+    given: texts such as "viscosity 10 %" or "rod_diameter 0.05 mm". values: those of the case's
+    keys. Raises ValueError.
+    """
+    typed = [_share(text, values) for text in given]
+    twice = [name for name, times in Counter(name for name, _ in typed).items() if times > 1]
+    if twice:
+        raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
+    return dict([*(_share(text, values) for text in _of_ring(ring_name)), *typed])
+
+
+def _share(text: str, values: Mapping[str, object]) -> tuple[str, tuple[float, tuple[str, ...]]]:
+    """The name of a tolerance, its relative size and the parameters that it moves.  ValueError."""
+    found = _ITEM.fullmatch(text.strip())
+    names = _moved(found["name"], values) if found else ()
+    known = [value for value in map(values.get, names) if isinstance(value, float)]
+    metric = found is None or found["unit"] != "mm" or _IN_MM.issuperset(names)
+    if not found or not known or len(known) < len(names) or not metric:
+        raise ValueError(
+            f'tolerances: "{text}" is not understood; allowed: a key of the case that is a '
+            "number other than 0 and has a sensitivity, or modulus, and +- its tolerance, as "
+            'in "viscosity 10 %" or "rod_diameter 0.05 mm"'
+        )
+    size = float(found["size"])
+    return found["name"], (0.01 * size if found["unit"] == "%" else size / abs(known[0]), names)
+
+
+def _moved(name: str, values: Mapping[str, object]) -> tuple[str, ...]:
+    """The keys that a tolerance moves: those of its name that have a value and a sensitivity."""
+    names = _ALIASES.get(name, (name,))
+    return tuple(key for key in names if key in _VARIED and values.get(key))
+
+
+def _of_ring(name: str | None) -> list[str]:
+    """Tolerances of a ring of the catalogue, +- mm."""
+    if name is None:
+        return []
+    try:
+        known = ring(name)
+    except UnknownRingError:
+        return []
+    sizes = {
+        "section_diameter": known.section_tolerance,
+        "inner_diameter": known.inner_tolerance,
+    }
+    return [f"{key} {size!r} mm" for key, size in sizes.items() if size]
+
+
+def band(
+    place: tuple[float, float], quantity: str, slopes: Mapping[str, float], shares: Shares
+) -> ToleranceRow:
+    """What tolerances do to one quantity; place: p_s and U; slopes: its log derivatives."""
+    parts = {
+        name: 100.0 * abs(sum(slopes.get(key, 0.0) for key in keys)) * share
+        for name, (share, keys) in shares.items()
+    }
+    largest = max(parts, key=lambda name: parts[name])
+    return ToleranceRow(
+        sealed_pressure_MPa=place[0],
+        rod_speed_mm_s=place[1],
+        quantity=quantity,
+        worst_percent=sum(parts.values()),
+        likely_percent=math.hypot(*parts.values()),
+        largest=largest,
+        largest_percent=parts[largest],
+    )

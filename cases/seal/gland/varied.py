@@ -1,0 +1,27 @@
+"""Keys that results have sensitivities by."""
+
+from __future__ import annotations
+
+from softehl.cases.seal.gland import shear_thinning
+from softehl.cases.seal.gland.rubbers import materials
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.keys import dimensions
+
+PRESSURE_KEY = "sealed_pressure"
+"""The sealed pressure, which belongs to a film and not to the case alone."""
+
+LENGTHS = (
+    *("section_diameter", "inner_diameter", "rod_diameter", "housing_diameter"),
+    *("groove_width", "groove_centre"),
+)
+"""Keys of a case that are lengths."""
+
+NUMBERS = (
+    *LENGTHS,
+    *(*materials.KEYS, "bulk_modulus"),
+    *("viscosity", "pressure_viscosity", "cavitation_penalty", *shear_thinning.NUMBERS),
+)
+"""Physical and geometric keys of a case; the terms of an Ogden rubber count as one."""
+
+MEASURES = tuple(dict.fromkeys(key for section in SECTIONS for key in dimensions(section)))
+"""Dimensions of sections that are not round, which are lengths too."""

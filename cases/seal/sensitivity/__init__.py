@@ -1,0 +1,1 @@
+"""Derivatives of a film by the parameters, and design by them."""

@@ -1,0 +1,150 @@
+"""One target by one parameter: what value of a key gives a quantity of a film its wanted change.
+
+Log-linear steps by exact sensitivities, each followed by a nonlinear solve on a mesh of its own;
+near the target the mesh is held, so that the steps settle.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.sensitivity.quantities import QUANTITIES
+from softehl.cases.seal.states.sensitivity_table import resolved
+from softehl.cases.seal.states.state import FilmState
+from softehl.runtime.names import meant
+
+TOLERANCE = 0.01
+"""Of the quantity, relative: about what two meshes of neighbouring values differ by."""
+
+SETTLED = 1e-4
+"""Of the quantity, relative, on one mesh."""
+
+Change = Callable[[float], float | None]
+"""Factor of a key -> that of the quantity on the held mesh, None where there is no film."""
+
+STEPS = 6
+"""Nonlinear solves after the first."""
+
+_TARGET = re.compile(r"(?P<name>\w+)\s*=?\s*(?P<change>[-+]\d+(\.\d*)?)\s*%")
+
+
+class NoDesignError(ValueError):
+    """A target that cannot be reached; the text says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A quantity and the factor that it is to change by."""
+
+    quantity: str
+    factor: float
+
+    @classmethod
+    def of(cls, text: str) -> Target:
+        """From "friction -10 %".  Raises NoDesignError."""
+        found = _TARGET.fullmatch(text.strip().replace("h*", "h_star"))
+        if not found or found["name"] not in QUANTITIES or float(found["change"]) <= -100.0:
+            hint = meant(found["name"], QUANTITIES) if found else ""
+            raise NoDesignError(
+                f'the target "{text}" is not understood{hint}; allowed: a change in per cent of '
+                f'{", ".join(QUANTITIES)}, as in "friction -10%"'
+            )
+        return cls(found["name"], 1.0 + 0.01 * float(found["change"]))
+
+
+@dataclass(frozen=True)
+class Step:
+    """A value of the key, the quantity there by a nonlinear solve, and what was predicted."""
+
+    value: float
+    quantity: float
+    predicted: float
+
+
+def value_of(state: FilmState, quantity: str) -> float:
+    """A quantity of a film, in the units of `curve.csv`; leakage and friction without sign."""
+    found = {
+        "h_star": state.h_star_um,
+        "friction": state.rod_friction_N,
+        "leakage": state.leak_rate_mm3_s,
+        "p_max": state.p_max_MPa,
+        "contact_width": state.contact_end_mm - state.contact_start_mm,
+    }
+    return abs(found[quantity])
+
+
+def designed(
+    p: ORing,
+    target: Target,
+    key: str,
+    solve: Callable[[ORing], FilmState | None],
+    hold: Callable[[ORing], Change | None],
+) -> list[Step]:
+    """Steps to the value of a key of p that meets the target; the last one does.
+
+    solve: the one film of a case with its sensitivities, None where there is none. hold: how its
+    quantity changes with the key on its mesh. Raises NoDesignError, and
+    pydantic.ValidationError for a value that a case cannot have.
+    """
+    state, value = _film(p, key, solve), float(getattr(p, key))
+    wanted = target.factor * value_of(state, target.quantity)
+    steps = [Step(value, value_of(state, target.quantity), math.nan)]
+    for _ in range(STEPS):
+        assert state.sensitivity is not None
+        slope = state.sensitivity[target.quantity].get(key, 0.0)
+        way = math.log(wanted / steps[-1].quantity)
+        if abs(way) > 0.5 * abs(slope):  # the key would change by more than half
+            raise NoDesignError(
+                f"{target.quantity} follows {key} by {slope:.2g} % for 1 %: that is too little for "
+                "this target; choose another key (sensitivity.csv shows which have an influence)"
+            )
+        value *= math.exp(way / slope)
+        state = _film(ORing(**{**p.settled(), key: value}), key, solve)
+        steps.append(Step(value, value_of(state, target.quantity), wanted))
+        if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:
+            change = hold(ORing(**{**p.settled(), key: value}))
+            return [*steps, *settled(steps[-1], wanted, slope, change)]
+    raise NoDesignError(
+        f"after {STEPS} solves {target.quantity} is still {steps[-1].quantity:.4g}, wanted was "
+        f"{wanted:.4g}: ask for a smaller change"
+    )
+
+
+def settled(near: Step, wanted: float, slope: float, change: Change | None) -> list[Step]:
+    """Steps on the mesh of `near`, until the quantity is what was wanted, to `SETTLED`.
+
+    slope: d log quantity / d log key. Raises NoDesignError.
+    """
+    steps = [near]
+    while change and abs(steps[-1].quantity / wanted - 1.0) > SETTLED and len(steps) <= STEPS:
+        value = steps[-1].value * (wanted / steps[-1].quantity) ** (1.0 / slope)
+        found = change(value / near.value)
+        if found is None:
+            break
+        step = Step(value, near.quantity * found, wanted)
+        rise = math.log(step.quantity / steps[-1].quantity) / math.log(value / steps[-1].value)
+        steps.append(step)
+        if rise * slope <= 0.0:
+            break
+        slope = rise
+    if abs(steps[-1].quantity / wanted - 1.0) > SETTLED:
+        raise NoDesignError(
+            f"near {near.value:.6g} no value gives {wanted:.5g} on one mesh: the film is at a kink "
+            "or an end; use a larger density, or ask for another change"
+        )
+    return steps[1:]
+
+
+def _film(p: ORing, key: str, solve: Callable[[ORing], FilmState | None]) -> FilmState:
+    state = solve(p)
+    if state is None or not resolved(state) or state.sensitivity is None:
+        verdict = "did not converge" if state is None else f"has the verdict {state.verdict}"
+        raise NoDesignError(
+            f"with {key} = {getattr(p, key):g} the film {verdict}: no sensitivities of it; use a "
+            "larger density, or ask for a smaller change"
+        )
+    return state

@@ -1,0 +1,149 @@
+"""The reported quantities of a film and how they follow from its fields: values and gradients.
+
+Each is what `cases.seal.states.results` reports. Where that chooses a point or a segment (the
+largest pressure, the segment of the flux, where the film is 20 um thick) the choice is held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from math import pi
+
+import numpy as np
+
+from softehl.cases.seal.equations.system import DISPLACEMENT, FACET, FILM
+from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
+from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film
+from softehl.cases.seal.states.results import film_parts, metering
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.design import FieldRates, Inputs, weighted
+from softehl.runtime.fem.problem import Problem
+
+QUANTITIES = ("h_star", "friction", "leakage", "p_max", "contact_width")
+"""Names of the quantities."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A quantity and the derivatives of its logarithm.
+
+    value: in mm, N, mm^3/s, MPa, mm. fields: block -> field -> weights (elements, points) of its
+    values. z, h: (arc nodes,) weights of the places and film thicknesses of the arc nodes. rod,
+    speed: derivatives by the logarithms of rod diameter and |U| that come on top.
+    """
+
+    value: float
+    fields: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
+    z: Array | None = None
+    h: Array | None = None
+    rod: float = 0.0
+    speed: float = 0.0
+
+
+def quantities(case: FilmCase, problem: Problem, x: Array) -> dict[str, Quantity]:
+    """All quantities of a converged film x (n,)."""
+    at = problem.fields(FILM, x)
+    flux, by_flux = _flux(case, problem, at, x)
+    ring = 2.0 * pi * case.system.rod_radius
+    friction = float((at["tau_rod"] * at["dx"]).sum())
+    shear = {"tau_rod": at["dx"] / friction, "dx": at["tau_rod"] / friction}
+    top = np.unravel_index(int(at["p"].argmax()), at["p"].shape)
+    p_max, highest = float(at["p"][top]), np.zeros_like(at["p"])
+    highest[top] = 1.0 / p_max
+    return {
+        "h_star": Quantity(flux / (0.5 * case.film.rod_speed), by_flux, speed=-1.0),
+        "friction": Quantity(ring * friction, {FILM: shear}, rod=1.0),
+        "leakage": Quantity(ring * flux, by_flux, rod=1.0),
+        "p_max": Quantity(p_max, {FILM: {"p": highest}}),
+        "contact_width": _width(case, x),
+    }
+
+
+def _flux(
+    case: FilmCase, problem: Problem, at: Mapping[str, Array], x: Array
+) -> tuple[float, dict[str, dict[str, Array]]]:
+    """The flux at the largest pressure and the weights of its logarithm; see `film_numbers`."""
+    h = case.system.arc_film(x)[1]
+    parts = film_parts(h, contact_film(h, case.system.parameters.lobes))
+    first = metering(at, parts, case.film.stroke)
+    top = int(first.start + np.argmax(at["p"][first].max(axis=1)))
+    if case.system.parameters.reynolds == "dg":
+        flux = problem.fields(FACET, x)["flux"]
+        chosen = slice(max(top - 1, 0), top + 1)
+        q, weights = float(flux[chosen].mean()), np.zeros_like(flux)
+        weights[chosen] = 1.0 / flux[chosen].size / q
+        return q, {FACET: {"flux": weights}}
+    dx, flux = at["dx"][top], at["flux"][top]
+    q = float((flux * dx).sum() / dx.sum())
+    by_flux, by_dx = np.zeros_like(at["dx"]), np.zeros_like(at["dx"])
+    by_flux[top], by_dx[top] = dx / dx.sum() / q, (flux - q) / dx.sum() / q
+    return q, {FILM: {"flux": by_flux, "dx": by_dx}}
+
+
+def _width(case: FilmCase, x: Array) -> Quantity:
+    """Length over which the film is thinner than 20 um, piecewise linear between nodes."""
+    z, h = case.system.arc_film(x)
+    by_z, by_h = np.zeros(len(z)), np.zeros(len(z))
+    inside, ends = np.flatnonzero(h < CONTACT_FILM), []
+    for at, outside, sign in ((inside[0], -1, -1.0), (inside[-1], 1, 1.0)):
+        other = at + outside
+        if not 0 <= other < len(z):
+            by_z[at] += sign
+            ends.append(z[at])
+            continue
+        rise = h[other] - h[at]
+        t = (CONTACT_FILM - h[at]) / rise
+        slope = (z[other] - z[at]) / rise
+        by_z[at] += sign * (1.0 - t)
+        by_z[other] += sign * t
+        by_h[at] -= sign * slope * (1.0 - t)
+        by_h[other] -= sign * slope * t
+        ends.append(z[at] + t * (z[other] - z[at]))
+    width = float(ends[1] - ends[0])
+    return Quantity(width, z=by_z / width, h=by_h / width)
+
+
+def by_unknowns(case: FilmCase, problem: Problem, x: Array, q: Quantity) -> Array:
+    """Derivative (n,) of the logarithm of a quantity by the unknowns x (n,)."""
+    gradient = np.zeros(len(x))
+    for name, weights in q.fields.items():
+        gradient += FieldRates(problem, name, x).by_unknowns(weights)
+    start, nodes = case.system.layout.part(DISPLACEMENT).start, case.system.mesh.arc_nodes
+    for component, nodal in enumerate((q.z, q.h)):
+        if nodal is not None:
+            gradient[start + 2 * nodes + component] += nodal
+    return gradient
+
+
+Moved = Mapping[str, Mapping[str, Array]]
+"""Block -> field -> (elements, points), how fast its values change; blocks at rest are left out."""
+
+
+def fields_along(
+    problem: Problem, x: Array, rate: Inputs, of: Iterable[Quantity]
+) -> dict[str, dict[str, Array]]:
+    """How fields that these quantities are made of change with a parameter, the unknowns held.
+
+    rate: that of the inputs, see `FilmCase.rate`.
+    """
+    blocks = {block for q in of for block in q.fields if rate.blocks[block].any()}
+    return {b: FieldRates(problem, b, x).along(rate.blocks[b]) for b in blocks}
+
+
+def along(problem: Problem, q: Quantity, name: str, rate: Inputs, moved: Moved) -> float:
+    """Derivative of the logarithm of a quantity by that of a parameter, the unknowns held.
+
+    rate, moved: of the inputs and of the fields that follow from these alone, see `fields_along`.
+    """
+    total = q.speed * (name == SPEED) + q.rod * (name == "rod_diameter")
+    for block, weights in q.fields.items():
+        if block in moved:
+            total += float(weighted(moved[block], weights).sum())
+    if q.z is not None and q.h is not None:
+        ends = rate.blocks[FILM][:, :4].reshape(-1, 2, 2)  # (segments, both nodes, (z, r))
+        nodes = np.concatenate([ends[:, 0], ends[-1:, 1]])
+        names = problem.assembler.block(FILM).kernel.parameters
+        rod = rate.blocks[FILM][0, names.index("rod_radius") - len(names)]
+        total += float(q.z @ nodes[:, 0] + q.h @ (nodes[:, 1] - rod))
+    return float(total)

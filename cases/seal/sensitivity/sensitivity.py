@@ -1,0 +1,73 @@
+"""Exact sensitivities of a film: what a change of any parameter by one per cent does, in per cent.
+
+All derivatives are those of the discrete equations at the converged state, d log q / d log s, with
+the mesh frozen (`cases.seal.sensitivity.variation`). The film does not depend on the contact it
+began from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.sensitivity.quantities import (
+    QUANTITIES,
+    along,
+    by_unknowns,
+    fields_along,
+    quantities,
+)
+from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.design import Inputs, Tangent
+from softehl.runtime.solve.linear import LinearSolver
+from softehl.runtime.solve.sensitivity import adjoints, direct
+
+
+def rates_of(
+    system: SealSystem, film: FilmLoads, known: Mapping[str, Inputs] = MappingProxyType({})
+) -> dict[str, Inputs]:
+    """Parameter -> rate of the inputs of a film by its logarithm.
+
+    known: the rates of another film of the system; of these only that of the speed is another.
+    """
+    case = FilmCase(system, film)
+    kept = {name: rate for name, rate in known.items() if name != SPEED}
+    return {name: kept.get(name) or case.rate(name) for name in case.parameters}
+
+
+def sensitivities(
+    system: SealSystem,
+    film: FilmLoads,
+    x: Array,
+    linear: LinearSolver,
+    rates: Mapping[str, Inputs],
+    *,
+    method: str = "adjoint",
+    wanted: Sequence[str] = QUANTITIES,
+) -> dict[str, dict[str, float]]:
+    """Quantity -> parameter -> d log quantity / d log parameter at a converged film x (n,).
+
+    rates: of the parameters, by `rates_of` at this film. method: "adjoint", a solve for each
+    quantity, or "direct", one for each parameter. wanted: names of quantities. Raises
+    SingularMatrix.
+    """
+    case, problem = FilmCase(system, film), system.film_problem(film)
+    values, tangent = quantities(case, problem, x), Tangent.at(problem, x)
+    found = {name: values[name] for name in wanted}
+    gradients = np.stack([by_unknowns(case, problem, x, q) for q in found.values()], axis=1)
+    loads = np.stack([tangent.load(rate) for rate in rates.values()], axis=1)
+    if method == "adjoint":
+        through = -adjoints(linear, tangent.reduced, gradients).T @ loads
+    else:
+        through = gradients.T @ direct(linear, tangent.reduced, loads)
+    slopes: dict[str, dict[str, float]] = {name: {} for name in found}
+    for j, (key, rate) in enumerate(rates.items()):
+        moved = fields_along(problem, x, rate, found.values())
+        for i, (name, q) in enumerate(found.items()):
+            slopes[name][key] = float(through[i, j]) + along(problem, q, key, rate, moved)
+    return slopes

@@ -1,0 +1,119 @@
+"""A case whose parameters vary while its mesh is frozen: the map from its measures to the nodes.
+
+A mesh is laid out by angles and shares (where the arc begins and ends, how its segments are
+spaced); these are frozen, so that every node is centre + radius times a constant, or, of a section
+with an outline, keeps its part of a line or an arc. A remeshed run differs from that by the error
+of its mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.gland.given import number, times
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.varied import LENGTHS, NUMBERS, PRESSURE_KEY
+from softehl.cases.seal.section.outline_layout import OutlineLayout
+from softehl.cases.seal.section.round_layout import RoundLayout
+from softehl.cases.seal.section.section import SealSection
+from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.runtime.fem.design import Inputs, rate_of
+from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
+
+SPEED = "U"
+"""The rod speed as it is named in tables: a parameter of a film that is no key of a case."""
+
+_WIDE = 0.01  # relative step: what follows from a key is a polynomial of low degree
+
+
+@dataclass(frozen=True, eq=False)
+class FilmCase:
+    """A film of a system: what its equations depend on besides the unknowns."""
+
+    system: SealSystem
+    film: FilmLoads
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that are not zero."""
+        p = self.system.parameters
+        values = {name: getattr(p, name) for name in (*NUMBERS, PRESSURE_KEY)} | p.measures
+        return (*(name for name, v in values.items() if _varies(v)), SPEED)
+
+    def scaled(self, name: str, by: float) -> FilmCase:
+        """The film with a parameter (1 + by) times as large, on the frozen mesh."""
+        film, p = self.film, self.system.parameters
+        if name == SPEED:
+            return replace(self, film=replace(film, speed=(1.0 + by) * film.speed))
+        if name == PRESSURE_KEY:
+            film = replace(film, sealed_pressure=(1.0 + by) * film.sealed_pressure)
+        value = times(p.measures.get(name, getattr(p, name)), 1.0 + by)
+        held = p.measures if name == "section_diameter" else {}
+        return FilmCase(frozen(self.system, p.model_copy(update={**held, name: value})), film)
+
+    def inputs(self) -> Inputs:
+        """What its equations are given."""
+        return Inputs.of(self.system.film_problem(self.film))
+
+    def rate(self, name: str) -> Inputs:
+        """The rate of its inputs by the logarithm of a parameter.
+
+        All of them are polynomials of the keys, of degree 4 at most (polar moment of the section)
+        of lengths and linear in the others, but for the augmentation of contacts, on which no
+        converged state depends, and for arcs, which are smooth: there the step leaves 1e-7.
+        """
+        lengths = *LENGTHS, *self.system.parameters.measures
+        degree = 4 if name in lengths else 2
+        return rate_of(lambda by: self.scaled(name, by).inputs(), _WIDE, degree)
+
+
+def _varies(value: Any) -> bool:
+    """Whether a value is a number, or numbers, other than zero."""
+    numbers = value if isinstance(value, tuple) else (value,)
+    return any(number(v) and v for v in numbers)
+
+
+def frozen(system: SealSystem, p: ORing) -> SealSystem:
+    """The system of other parameters on the same mesh, moved with the measures of its section."""
+    old, new = system.section.layout, uniform_layout(p)
+    if isinstance(old, OutlineLayout):
+        assert isinstance(new, OutlineLayout)
+        return _carried(system, p, old, new)
+    assert isinstance(old, RoundLayout)
+    assert isinstance(new, RoundLayout)
+    measures = ("centre_z", "centre_r", "radius")
+    moved = {name: getattr(new.disc, name) for name in measures}
+    if all(getattr(old.disc, name) == value for name, value in moved.items()):
+        return system.moved(p, system.section)
+    disc = replace(old.disc, **moved)
+    mesh = system.mesh
+    unit = (mesh.points - old.disc.centre) / old.disc.radius
+    points = disc.centre + disc.radius * unit
+    scale = disc.radius / old.disc.radius
+    places, length = scale * mesh.places, scale * mesh.length
+    placed = replace(mesh, points=points, places=places, length=length)
+    return system.moved(p, SealSection(RoundLayout(disc), placed, system.section.placed))
+
+
+def _carried(system: SealSystem, p: ORing, old: OutlineLayout, new: OutlineLayout) -> SealSystem:
+    """On an outline; the sealed pressure ends at the nodes at which it ended."""
+    before, after = old.shape.outline, new.shape.outline
+    section = system.section
+    if before.pieces == after.pieces:
+        return system.moved(p, section)
+    mesh = carried_mesh(section.mesh, before, after)
+    film = carried_places(np.array(old.film), before, after)
+    ends = mesh.places[section.lowest] - mesh.places[0] + film[0], mesh.places[section.crown]
+    layout = replace(
+        new,
+        film=(float(film[0]), float(film[1])),
+        spacing=old.spacing,
+        long=old.long,
+        dams=(float(ends[0]), float(ends[1])),
+    )
+    return system.moved(p, replace(section, layout=layout, mesh=mesh))

@@ -1,0 +1,1 @@
+"""The way to a state: dry contact, film, falling speed, and the mesh that suits them."""

@@ -1,0 +1,104 @@
+"""Contact states that runs leave for each other: the contact stage knows neither speed nor film.
+
+A state is a file, named by all that it depends on. It is never trusted: it is where Newton's
+method starts on the section's own equations, which a state that belongs to them fulfils already.
+A wrong or damaged file costs a few iterations and cannot change a result. Files are written
+atomically; processes that need the same state at the same time each find it for themselves.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.system import contact_kernels
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact import contact_problem, contact_stage
+from softehl.cases.seal.solve.path import PathSettings, Stage
+from softehl.runtime.arrays import Array
+from softehl.runtime.io import read_arrays, write_arrays
+from softehl.runtime.kernels import load_kernel
+from softehl.runtime.solve.newton import Newton
+
+WITHOUT_INFLUENCE = (
+    *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
+    *("viscosity", "pressure_viscosity", "shear_traction", "cavitation_penalty"),
+    *("cavitation", "cavitation_pressure", "roughness", "asperity_stiffness", "boundary_friction"),
+    *("ring", "rod", "squeeze", "gland", "backup"),  # diameters follow from them
+    *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
+    *("shear_thinning", "eyring_stress", "carreau_stress", "carreau_rate", "carreau_exponent"),
+    *("carreau_plateau", "rotation", "solver", "linear", "upwinding", "error_estimate"),
+    *("tolerance", "sensitivity", "tolerances"),
+)
+"""Parameters that the contact stage does not know."""
+
+_ITERATIONS = 10  # a state that needs more belongs to another section
+
+
+def contact_key(parameters: ORing) -> str:
+    """Name of a contact state: all parameters but those without influence, and the kernels."""
+    kernels = contact_kernels(parameters)
+    given = parameters.model_dump(exclude=set(WITHOUT_INFLUENCE))
+    if parameters.outline is not None:
+        given["outline"] = hashlib.sha256(Path(parameters.outline).read_bytes()).hexdigest()
+    given["kernels"] = {name: load_kernel(name).signature for name in kernels}
+    return hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()[:32]
+
+
+@dataclass(frozen=True)
+class ContactStore:
+    """Contact states in a folder; without a folder there are none."""
+
+    folder: Path | None = None
+
+    def densities(self, parameters: ORing, among: Sequence[int]) -> list[int]:
+        """Those of some densities of which there is a state, good or not; finest first."""
+        if self.folder is None:
+            return []
+        sections = [parameters.model_copy(update={"density": d}) for d in among]
+        return sorted((p.density for p in sections if self._path(p).exists()), reverse=True)
+
+    def read(self, system: SealSystem) -> Array:
+        """Unknowns to start from; nan, which Newton's method rejects, where no file fits."""
+        stored = read_arrays(self._path(system.parameters)) or {}
+        x, layout = system.at_rest(), system.layout
+        for name in _fields(system):
+            part = stored.get(name)
+            fits = part is not None and part.shape == (layout.count(name),)
+            x[layout.part(name)] = part if fits else np.nan
+        return x
+
+    def keep(self, system: SealSystem, x: Array) -> None:
+        """Leave the contact state x for others; a folder that cannot be written to is no error."""
+        if self.folder is None:
+            return
+        parts = {name: x[system.layout.part(name)] for name in _fields(system)}
+        with suppress(OSError):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_arrays(self._path(system.parameters), parts)
+
+    def _path(self, parameters: ORing) -> Path:
+        assert self.folder is not None
+        return self.folder / f"{contact_key(parameters)}.npz"
+
+
+def _fields(system: SealSystem) -> tuple[str, ...]:
+    """Fields of a contact state: film pressures, whose number depends on m_p, are all zero."""
+    return tuple(field.name for field in system.contact_fields())
+
+
+def stored_contact(system: SealSystem, settings: PathSettings, newton: Newton) -> Stage:
+    """A stage of one step that verifies a stored state, or corrects it in a few iterations."""
+    return contact_stage(
+        system,
+        contact_problem(system, settings, system.parameters.sealed_pressure),
+        method="newton, from a stored contact state",
+        corrector=replace(newton, max_iterations=_ITERATIONS),
+    )

@@ -1,0 +1,235 @@
+"""Following a solution path stage by stage (section 4 of the paper): contact, film, falling speed.
+
+A stage is a family of problems in one parameter. A stage that does not reach its end is a value,
+`StageFailed`, that says how far it came and what may help.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+from softehl.cases.seal.states.state import Observer, StageRecord, place
+from softehl.cases.seal.states.verdict import FilmNumbers
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.continuation import Continuation
+from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
+from softehl.runtime.solve.predictor import Guess, Predictor
+from softehl.runtime.solve.solution import Branch, Point
+from softehl.runtime.solve.steps import StepRule
+
+FOLD = (
+    "the path ends or turns back there, as it does when the film collapses on a mesh that is too "
+    "coarse: use a finer mesh (larger density)"
+)
+
+CLOSED = 0.05
+"""Least film thickness, in h*, below which a path ends because the film closes."""
+
+CLOSING = (
+    "the film closes: at a node it is only {:.2g} um thick there, and would be negative beyond; "
+    "use a finer mesh (larger density) or a higher pressure_order"
+)
+
+
+@dataclass(frozen=True)
+class PathSettings:
+    """Numbers that steer the path; none of them changes a result.
+
+    offset: distance of the rod in the contact stage, mm. first_contact: where the squeeze begins
+    at density 1, 0 = just touching and 1 = all the way; it falls with density^2, so that the first
+    contact is as many nodes wide. first_way: the same in section diameters of way. lean: how far
+    the section is pushed against its wall before the pressure does it, in section diameters.
+    start_speed: least |U| at which the film is built up, mm/s. placed_start_speed: the same on an
+    arc that the contact has placed, where the rod is put as far off as that film will be thick.
+    load_steps, reload_steps: in shear moduli, from rest and from a loaded state that was carried to
+    another mesh. The rest: step rules.
+    """
+
+    offset: float = 0.01
+    first_contact: float = 0.2
+    first_way: float = 0.004
+    lean: float = 0.01
+    start_speed: float = 6400.0
+    placed_start_speed: float = 1600.0
+    longest_squeeze: float = 0.3
+    load_steps: StepRule = field(default_factory=lambda: StepRule(0.055, 3e-4, 0.3))
+    reload_steps: StepRule = field(default_factory=lambda: StepRule(0.15, 3e-4, 0.3))
+    weight_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-5))
+    shear_steps: StepRule = field(default_factory=lambda: StepRule(1.0, 1e-3))
+    order_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-4))
+    release_steps: StepRule = field(default_factory=lambda: StepRule(0.1, 1e-3))
+    speed_steps: StepRule = field(
+        default_factory=lambda: StepRule(math.log(2.0), 4e-3, math.log(2.0) + 1e-9)
+    )
+
+
+def _nothing(point: Point) -> None:
+    """Default of Stage.on_point."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A family of problems in one parameter, to be followed from `start` to `stop`.
+
+    name, sealed_pressure, stroke: what observers and records call it. waypoints: parameters
+    hit exactly. shown: the parameter as it is reported (mm/s for a path in log |U|). method: how
+    it is solved, for the record. corrector: what solves it, None for the path driver's Newton.
+    predictor: how it is guessed.
+    """
+
+    name: str
+    problem_at: Callable[[float], NonlinearProblem]
+    start: float
+    stop: float
+    steps: StepRule
+    sealed_pressure: float
+    stroke: str
+    waypoints: tuple[float, ...] = ()
+    method: str = "newton"
+    corrector: Corrector | None = None
+    predictor: Predictor | Guess = "secant"
+    on_point: Callable[[Point], None] = _nothing
+    shown: Callable[[float], float] = float
+
+    def fraction(self, parameter: float) -> float:
+        """Share of the way, 0 to 1."""
+        way = self.stop - self.start
+        return (parameter - self.start) / way if way else 1.0
+
+
+def laborious(stage: Stage, corrector: Corrector | None) -> Stage:
+    """A stage by a corrector of its own, each state from the one before it.
+
+    Where thin elements turn with an edge of the contact a secant turns them too far.
+    """
+    return replace(stage, corrector=corrector, predictor="previous", method="newton")
+
+
+@dataclass(frozen=True, eq=False)
+class StageFailed:
+    """A stage that did not reach its end. last: the last film that was solved, if there was one."""
+
+    stage: Stage
+    branch: Branch
+    last: FilmNumbers | None = None
+
+    @property
+    def message(self) -> str:
+        """How far the stage came, in its own units."""
+        stage, branch = self.stage, self.branch
+        goal = f"{stage.name} {stage.shown(stage.stop):.5g}"
+        if not branch.points:
+            return f"{goal} was not reached, not even its start"
+        return f"{goal} was not reached, only {stage.shown(self.reached):.5g}"
+
+    @property
+    def reached(self) -> float:
+        """Parameter of the last state; of the beginning, if there is none."""
+        points = self.branch.points
+        return points[-1].parameter if points else self.stage.start
+
+    @property
+    def advice(self) -> str:
+        """Why a path ends on the way, and what may help."""
+        if self.last is not None and self.last.h_min < CLOSED * self.last.h_star:
+            return CLOSING.format(1e3 * self.last.h_min)
+        return FOLD
+
+
+Followed: TypeAlias = Array | StageFailed
+"""Unknowns at the end of a stage, or why it was not reached."""
+
+
+@dataclass
+class PathDriver:
+    """Follows stages, reports every step and keeps a record of each stage.
+
+    newton: corrector of every step. start_iterations: iterations allowed at the start of a stage,
+    which has no predictor; a step that needs as many is better cut. prefix: of the names of its
+    stages. Only `records` changes, by one with each stage.
+    """
+
+    observer: Observer
+    newton: Newton = field(default_factory=lambda: Newton(max_iterations=10))
+    start_iterations: int = 40
+    prefix: str = ""
+    records: list[StageRecord] = field(default_factory=list)
+
+    def named(self, prefix: str) -> PathDriver:
+        """One that keeps its records with ours, under a prefix."""
+        return replace(self, prefix=prefix)
+
+    def follow(self, stage: Stage, x0: Array) -> Followed:
+        """Solve at the start of a stage from x0 (n,), then follow it to its end.
+
+        What slips on a wall slips from where it was after the step before, first of all in x0.
+        """
+        stage = replace(stage, name=self.prefix + stage.name)
+        begin = time.perf_counter()
+        self.observer.stage(
+            stage.name, sealed_pressure=stage.sealed_pressure, stroke=stage.stroke, steps=None
+        )
+        points, before = list[Point](), [x0]
+
+        def problem_at(parameter: float) -> NonlinearProblem:
+            problem = stage.problem_at(parameter)
+            return problem.since(before[0]) if isinstance(problem, Problem) else problem
+
+        def report(point: Point) -> None:
+            points.append(replace(point, solution=point.solution.forget()))
+            self.observer.step(
+                label=stage.name,
+                parameter=stage.shown(point.parameter),
+                iterations=point.solution.iterations,
+                residuals=point.solution.residual_norms,
+                fraction=stage.fraction(point.parameter),
+            )
+            before[0] = point.solution.x
+            stage.on_point(point)
+
+        branch = self._continuation(stage).follow(
+            problem_at,
+            stage.start,
+            stage.stop,
+            x0,
+            waypoints=stage.waypoints,
+            on_point=report,
+        )
+        self.records.append(_record(stage, branch, points, time.perf_counter() - begin))
+        return branch.last.x if branch.converged else StageFailed(stage, branch)
+
+    def follow_all(self, stages: Iterable[Stage], x: Array) -> Followed:
+        """Follow stages one after the other, each from the end of the one before."""
+        for stage in stages:
+            end = self.follow(stage, x)
+            if isinstance(end, StageFailed):
+                return end
+            x = end
+        return x
+
+    def _continuation(self, stage: Stage) -> Continuation:
+        return Continuation(
+            stage.corrector or self.newton,
+            stage.steps,
+            stage.predictor,
+            name=stage.name,
+            starter=stage.corrector or replace(self.newton, max_iterations=self.start_iterations),
+        )
+
+
+def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -> StageRecord:
+    return StageRecord(
+        name=stage.name,
+        seconds=seconds,
+        factorisations=branch.factorisations,
+        iterations=branch.iterations,
+        residual_histories=tuple(p.solution.residual_norms for p in points),
+        parameters=tuple(stage.shown(p.parameter) for p in points),
+        where=place(stage.sealed_pressure, stage.stroke),
+        method=stage.method if branch.converged else f"{stage.method}; ended: {branch.message}",
+    )

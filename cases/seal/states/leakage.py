@@ -1,0 +1,65 @@
+"""Net leakage of a cycle: what the outstroke carries out minus what the instroke takes back."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from softehl.cases.harness.row import OK, Record, column
+from softehl.cases.seal.states.state import (
+    CLIPPED,
+    COLLAPSED,
+    OSCILLATING,
+    UNCERTAIN,
+    UNDER_RESOLVED,
+    FilmRow,
+)
+
+_WORST_LAST = (OK, OSCILLATING, UNCERTAIN, CLIPPED, UNDER_RESOLVED, COLLAPSED)
+
+
+@dataclass(frozen=True)
+class LeakageRow(Record):
+    """One row of `leakage.csv`: both strokes at one sealed pressure and one speed |U|."""
+
+    sealed_pressure_MPa: float = column("MPa", "sealed pressure p_s")
+    speed_mm_s: float = column("mm/s", "rod speed |U|")
+    leak_out_mm3_s: float = column(
+        "mm3/s", "leak rate 2 pi R q of the outstroke, + = to the air side"
+    )
+    leak_in_mm3_s: float = column("mm3/s", "the same of the instroke")
+    net_mm3_per_mm: float = column(
+        "mm3/mm",
+        "net volume that leaves in a cycle for each mm of stroke, pi R (h*_out - h*_in); "
+        "negative where the instroke could take back more than there is: dry on balance",
+    )
+    net_film_um: float = column("um", "h*_out - h*_in")
+    verdict: str = column("", "the worse one of the two states")
+
+
+def net_leakage(rows: Sequence[FilmRow]) -> list[LeakageRow]:
+    """A row for each sealed pressure and speed that has both strokes, fast ones first."""
+    found = {(row.sealed_pressure_MPa, row.rod_speed_mm_s): row for row in rows}
+    pairs = [
+        (row, found[p, -speed])
+        for (p, speed), row in found.items()
+        if speed > 0.0 and (p, -speed) in found
+    ]
+    pairs.sort(key=lambda pair: pair[0].order)
+    return [_cycle(out, back) for out, back in pairs]
+
+
+def _cycle(out: FilmRow, back: FilmRow) -> LeakageRow:
+    return LeakageRow(
+        sealed_pressure_MPa=out.sealed_pressure_MPa,
+        speed_mm_s=out.rod_speed_mm_s,
+        leak_out_mm3_s=out.leak_rate_mm3_s,
+        leak_in_mm3_s=back.leak_rate_mm3_s,
+        net_mm3_per_mm=(
+            out.leak_rate_mm3_s / out.rod_speed_mm_s - back.leak_rate_mm3_s / back.rod_speed_mm_s
+        ),
+        net_film_um=out.h_star_um - back.h_star_um,
+        verdict=max(out.verdict, back.verdict, key=_severity),
+    )
+
+
+def _severity(verdict: str) -> int:
+    return _WORST_LAST.index(verdict) if verdict in _WORST_LAST else len(_WORST_LAST)

@@ -1,0 +1,93 @@
+"""What a run of a seal consists of: its strokes and speeds, finer meshes, what is missing."""
+
+from collections.abc import Mapping, Sequence
+
+from softehl.cases.seal.gland.parameters import DENSITIES, ORing
+from softehl.cases.seal.gland.surfaces import FULL
+from softehl.cases.seal.states.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
+from softehl.cases.seal.states.verdict import DOUBTFUL
+
+SIGNS = {"out": 1.0, "in": -1.0}
+"""Stroke -> sign of its rod speed U."""
+
+USUAL = 0.2
+"""Rms roughness of usual surfaces, rod and rubber together, um."""
+
+THIN = FULL * USUAL
+"""Film thickness below which these would touch, um."""
+
+FINER = "use a finer mesh (larger density)"
+
+DOUBTS = {
+    UNDER_RESOLVED: f"the inlet is too short for this mesh, h* may be far off; {FINER}",
+    CLIPPED: "the arc ends within the film, h* may be far off",
+    UNCERTAIN: DOUBTFUL,
+    OSCILLATING: f"the film zigzags from node to node; h* is right, the profile is not; {FINER}",
+}
+"""Verdict of a state that is kept but is not ok -> what is to be known of it."""
+
+
+def doubts(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, list[FilmRow]]:
+    """What is wrong with states that are not ok -> these states, worst first.
+
+    advice: what states came with, by U: why one is clipped or uncertain, other than by its error.
+    """
+    found: dict[str, list[FilmRow]] = {}
+    for word in DOUBTS:
+        for row in rows:
+            if row.verdict == word:
+                own = advice.get(row.key) if word in (CLIPPED, UNCERTAIN) else None
+                found.setdefault(f"{word}: {own or DOUBTS[word]}", []).append(row)
+    return found
+
+
+def strokes_of(parameters: ORing) -> tuple[str, ...]:
+    """The strokes that are asked for, one by one."""
+    return tuple(SIGNS) if parameters.stroke == "both" else (parameters.stroke,)
+
+
+def rod_speeds(parameters: ORing) -> list[float]:
+    """The signed rod speeds U that are asked for."""
+    signs = [SIGNS[stroke] for stroke in strokes_of(parameters)]
+    return [sign * speed for sign in signs for speed in parameters.speeds]
+
+
+def refinements(parameters: ORing) -> list[ORing]:
+    """The run, and where it has a tolerance the same on every finer mesh there is."""
+    if parameters.tolerance is None:
+        return [parameters]
+    finer = [d for d in DENSITIES if d >= parameters.density]
+    return [parameters.model_copy(update={"density": density}) for density in finer]
+
+
+def pieces(parameters: ORing, rows: Sequence[FilmRow], jobs: int) -> list[ORing]:
+    """The parameter sets still to be run at this density: one for both strokes, or one for each.
+
+    Strokes go separately where they can run side by side or miss different speeds.
+    """
+    missing = {
+        stroke: missing_speeds(parameters, stroke, rows) for stroke in strokes_of(parameters)
+    }
+    missing = {stroke: speeds for stroke, speeds in missing.items() if speeds}
+    if jobs == 1 and len(missing) == 2 and missing["out"] == missing["in"]:
+        missing = {"both": missing["out"]}
+    return [
+        parameters.model_copy(update={"stroke": stroke, "speeds": speeds})
+        for stroke, speeds in missing.items()
+    ]
+
+
+def missing_speeds(parameters: ORing, stroke: str, rows: Sequence[FilmRow]) -> tuple[float, ...]:
+    """The requested speeds |U| of a stroke to be solved.
+
+    Those that are not there, or are there from a coarser mesh outside the tolerance.
+    """
+    outside = {row.key for row in outside_tolerance(parameters, rows)}
+    kept = {r.key for r in rows if not (r.key in outside and r.density < parameters.density)}
+    return tuple(u for u in parameters.speeds if SIGNS[stroke] * u not in kept)
+
+
+def outside_tolerance(parameters: ORing, rows: Sequence[FilmRow]) -> list[FilmRow]:
+    """The rows that do not meet the tolerance, if there is one."""
+    tolerance = parameters.tolerance
+    return [row for row in rows if tolerance is not None and not row.within(tolerance)]

@@ -1,0 +1,298 @@
+"""What a converged film of a seal means: h*, pressure, friction, leakage, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from math import nan, pi
+
+import numpy as np
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.loads import FilmLoads, Stroke
+from softehl.cases.seal.equations.system import (
+    FACET,
+    FILM,
+)
+from softehl.cases.seal.gland.surfaces import regime
+from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, groups
+from softehl.cases.seal.states.entrance import built_up, wedge, wedge_friction
+from softehl.cases.seal.states.film_signs import (
+    INLET,
+    THIN,
+    end_gap,
+    inlet_ratio,
+    inlet_segments,
+    lacking,
+    oscillation,
+)
+from softehl.cases.seal.states.section_view import film_pressure, section_view
+from softehl.cases.seal.states.state import FilmState, Profile
+from softehl.cases.seal.states.verdict import ContactNumbers, FilmNumbers, Verdict
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.postprocess import (
+    element_means,
+    interval_below,
+    relative_spread,
+    run_around,
+)
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.rules import trace_rule
+
+MICROMETRE = 1e-3  # mm
+
+_TORN = 1e-6  # void fraction of a film that has ruptured
+
+
+def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array) -> FilmNumbers:
+    """Scalars of a converged film with the unknowns x.
+
+    The flux is that at the largest pressure, of several contacts in the first on the way of the
+    oil that is not lifted (see `metering`): the mean over the segment for continuous, the mean
+    of (23) at the facets of the segment for discontinuous pressures, which (21) and (22) make
+    constant. Its relative spread is taken over the neighbours on both sides up to where the film
+    cavitates, eqs. (16) and (25).
+    """
+    at = problem.fields(FILM, x)
+    z, h = system.arc_film(x)
+    level = contact_film(h, system.parameters.lobes)
+    parts = film_parts(h, level)
+    first = metering(at, parts, film.stroke)
+    top, inlet = _top(at, first), {name: values[first] for name, values in at.items()}
+    narrows = h[_nodes(first)][:: 1 if film.stroke == "out" else -1]
+    whole = run_around(at["p"].min(axis=1) >= 0.0, top)
+    jump = 0.0
+    if system.parameters.reynolds == "dg":
+        facets = problem.fields(FACET, x)
+        flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
+        around, whole = slice(max(top - 1, 0), top + 1), slice(max(whole.start - 1, 0), whole.stop)
+    else:
+        flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
+    q = float(flux[around].mean())
+    h_star = q / (0.5 * film.rod_speed)
+    within = min(level, THIN * h_star) if h_star > 0.0 else level
+    drag, friction = (
+        float(2.0 * pi * system.rod_radius * (tau * at["dx"]).sum())
+        for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
+    )
+    end = 0 if film.stroke == "out" else -1
+    before, flow = wedge(system, film, x), float(at["eta"].ravel()[end]) * film.speed
+    entrance = built_up(*before, flow, h_star)
+    if film.entrance:
+        sliding, rubbed = wedge_friction(system, *before, flow, h_star)
+        drag += np.copysign(sliding, film.rod_speed)
+        friction += np.copysign(rubbed, film.rod_speed)
+    return FilmNumbers(
+        speed=film.speed,
+        flux=q,
+        h_star=h_star,
+        h_min=float(h.min()),
+        p_max=float(at["p"].max()),
+        friction=friction,
+        flux_variation=relative_spread(flux[whole]),
+        jump=jump,
+        oscillation=max(oscillation(z[_nodes(k)], h[_nodes(k)], within) for k in parts),
+        inlet_segments=inlet_segments(narrows, h_star),
+        inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(inlet, film, h_star),
+        end_gap=end_gap(*((z, h) if film.stroke == "out" else (-z[::-1], h[::-1]))),
+        entrance=entrance,
+        lacking=0.0 if system.parameters.rough else lacking(inlet, film, entrance),
+        **rough_numbers(system, at),
+        contacts=_contacts(at, (z, h), parts, film, level) if len(parts) > 1 else (),
+        drag=drag,
+        beyond=_beyond(system, film, x, flow, h_star) / abs(friction),
+    )
+
+
+def _beyond(system: SealSystem, film: FilmLoads, x: Array, flow: float, h_star: float) -> float:
+    """Friction (N) of the oil beyond the ends of the arc, as far as the section faces the rod.
+
+    flow: eta |U|, N/mm. Before the inlet oil fills the gap; behind the exit its sliding counts.
+    """
+    behind = wedge(system, replace(film, stroke="in" if film.stroke == "out" else "out"), x)
+    friction = abs(wedge_friction(system, *behind, flow, h_star)[0])
+    if not film.entrance:
+        friction += abs(wedge_friction(system, *wedge(system, film, x), flow, h_star)[1])
+    return friction
+
+
+def film_parts(h: Array, level: float = CONTACT_FILM) -> list[slice]:
+    """The segments of each contact, from the sealed side on; together they are the whole film.
+
+    h: (nodes,). level: of `contact_film`. Contacts are parted where the film between them is
+    thickest.
+    """
+    found = groups(h, h < level, level)
+    between = [(a[-1], b[0]) for a, b in pairwise(found)]
+    cuts = [0, *(int(a + np.argmax(h[a : b + 1])) for a, b in between), len(h) - 1]
+    return [slice(a, b) for a, b in pairwise(cuts)]
+
+
+def _nodes(part: slice) -> slice:
+    return slice(part.start, part.stop + 1)
+
+
+def metering(at: Mapping[str, Array], parts: Sequence[slice], stroke: Stroke) -> slice:
+    """The part of the film that meters the flux: of the first contact with a peak of its own.
+
+    at: fields of the film; parts: of `film_parts`. Over a lobe that the oil lifts pressure rises
+    all the way into the groove behind it.
+    """
+    for part in parts if stroke == "out" else reversed(parts):
+        if not _lifted(at, part, stroke):
+            return part
+    return parts[0 if stroke == "out" else -1]
+
+
+def _lifted(at: Mapping[str, Array], part: slice, stroke: Stroke) -> bool:
+    """Whether pressure rises all the way through a part of the film, where the oil goes."""
+    last: int = part.stop - 1 if stroke == "out" else part.start
+    return _top(at, part) == last
+
+
+def _top(at: Mapping[str, Array], part: slice) -> int:
+    """The segment of the largest pressure of a part of the film."""
+    return int(part.start + np.argmax(at["p"][part].max(axis=1)))
+
+
+def _contacts(
+    at: Mapping[str, Array],
+    nodes: tuple[Array, Array],
+    parts: Sequence[slice],
+    film: FilmLoads,
+    level: float,
+) -> tuple[ContactNumbers, ...]:
+    """Each contact of a film that has several; nodes: z and h at them, level: of `contact_film`."""
+    flux, found = element_means(at["flux"], at["dx"]), []
+    for part in parts:
+        z, h = (values[_nodes(part)] for values in nodes)
+        start, end = interval_below(z, h, level)
+        found.append(
+            ContactNumbers(
+                flux=float(flux[_top(at, part)]),
+                p_max=float(at["p"][part].max()),
+                h_min=float(h.min()),
+                start=start,
+                end=end,
+                p_before=float(at["p"][part.start, 0]),
+                inlet_ratio=filled_ratio({name: v[part] for name, v in at.items()}, film),
+            )
+        )
+    return tuple(found)
+
+
+def filled_ratio(at: Mapping[str, Array], film: FilmLoads) -> float:
+    """`inlet_ratio` of a contact by its own flux; nan where the film ruptures within its inlet.
+
+    at: fields of its part of the film, (segments, points) each. nan too where they do not say
+    whether oil is missing, and over a lobe that is lifted.
+    """
+    if _lifted(at, slice(0, len(at["p"])), film.stroke):
+        return nan
+    void = at.get("v_out" if film.stroke == "out" else "v_in")
+    if void is None:
+        return nan
+    top = int(np.argmax(at["p"].max(axis=1)))
+    h_star = float(element_means(at["flux"], at["dx"])[top] / (0.5 * film.rod_speed))
+    before = slice(None, top + 1) if film.stroke == "out" else slice(top, None)
+    torn = at["h"][before][void[before] > _TORN]
+    if len(torn) and float(torn.min()) < INLET[0] * h_star:
+        return nan
+    return inlet_ratio(at, film, h_star)
+
+
+def rough_numbers(system: SealSystem, at: Mapping[str, Array]) -> dict[str, float]:
+    """What asperities carry of load and friction, and how far they are apart: see FilmNumbers.
+
+    at: fields of the film. Nothing is known between smooth surfaces.
+    """
+    sigma = system.parameters.surfaces.sigma
+    if not sigma:
+        return {}
+    dx, gap = at["dx"], float(at["h_T"].min())
+    load, drag = ((at[name] * dx).sum() for name in ("p", "tau_rod"))
+    asperities, boundary = ((at[name] * dx).sum() for name in ("p_a", "tau_a"))
+    return {
+        "mean_gap": gap,
+        "lambda_ratio": gap / sigma,
+        "asperity_load": float(asperities / (load + asperities)),
+        "boundary_friction": float(boundary / drag),
+    }
+
+
+def film_state(
+    system: SealSystem,
+    problem: Problem,
+    film: FilmLoads,
+    x: Array,
+    verdict: Verdict,
+    iterations: int,
+) -> FilmState:
+    """The record of a converged film whose numbers are the last of `verdict`."""
+    numbers = verdict.last or film_numbers(system, problem, film, x)
+    limits = interval_below(*system.arc_film(x), CONTACT_FILM)
+    state = FilmState(
+        sealed_pressure_MPa=film.sealed_pressure,
+        rod_speed_mm_s=film.rod_speed,
+        h_star_um=numbers.h_star / MICROMETRE,
+        density=system.parameters.density,
+        h_min_um=numbers.h_min / MICROMETRE,
+        p_max_MPa=numbers.p_max,
+        pressure_jump_max_MPa=numbers.jump,
+        rod_friction_N=numbers.friction,
+        leak_rate_mm3_s=2.0 * pi * system.rod_radius * numbers.flux,
+        contact_start_mm=limits[0],
+        contact_end_mm=limits[1],
+        newton_iterations=iterations,
+        flux_variation=numbers.flux_variation,
+        moment_N_mm=system.moment(x),
+        contact_p_max_MPa=verdict.reference,
+        oscillation_index=numbers.oscillation,
+        inlet_segments=numbers.inlet_segments,
+        inlet_ratio=numbers.inlet_ratio,
+        mean_gap_um=numbers.mean_gap / MICROMETRE,
+        lambda_ratio=numbers.lambda_ratio,
+        regime=regime(numbers.lambda_ratio) if system.parameters.rough else "",
+        asperity_load_percent=100.0 * numbers.asperity_load,
+        boundary_friction_percent=100.0 * numbers.boundary_friction,
+        verdict=verdict.word,
+        advice=verdict.advice,
+        profile=_profile(system, problem, x),
+        section=section_view(system, problem, x, film_pressure(system, x)),
+    )
+    return _with_groove(state, numbers) if len(numbers.contacts) > 1 else state
+
+
+def _with_groove(state: FilmState, numbers: FilmNumbers) -> FilmState:
+    """The record with what is between two contacts, and how they differ."""
+    sealed, air = numbers.contacts[0], numbers.contacts[-1]
+    return replace(
+        state,
+        groove_start_mm=sealed.end,
+        groove_end_mm=air.start,
+        groove_pressure_MPa=air.p_before,
+        h_min_sealed_um=sealed.h_min / MICROMETRE,
+        h_min_air_um=air.h_min / MICROMETRE,
+        flux_mismatch_percent=numbers.mismatch,
+    )
+
+
+def _profile(system: SealSystem, problem: Problem, x: Array) -> Profile:
+    """Fields at the quadrature points of the film, from the sealed to the air side.
+
+    Discontinuous pressures are also shown at both ends of each segment: a facet has two rows.
+    """
+    block, p = problem.assembler.block(FILM), system.parameters
+    if p.reynolds == "dg":
+        traces = trace_rule(p.pressure_order, p.quadrature, p.quadrature_points)
+        block = replace(block, rule=traces)
+    values = block.fields(x, problem.parameters[FILM])
+    at = {name: value.ravel() for name, value in values.items()}
+    return Profile(
+        x_mm=at["x"],
+        h_um=at["h"] / MICROMETRE,
+        p_MPa=at["p"],
+        tau_MPa=at["tau"],
+        flux_mm2_s=at["flux"],
+    )

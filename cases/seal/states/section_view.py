@@ -1,0 +1,90 @@
+"""The deformed section as it is kept: what moves, stretches and presses, at nodes and in cells.
+
+Units are mm and MPa.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.states.state import Section
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.contact import tributary_areas
+from softehl.runtime.fem.postprocess import nodal_average, von_mises
+from softehl.runtime.fem.problem import Problem
+
+
+def section_view(system: SealSystem, problem: Problem, x: Array, rod_pressure: Array) -> Section:
+    """The deformed section in a state x, with the pressure (arc nodes,) between it and the rod.
+
+    At nodes: displacement, Cauchy stresses, contact_pressure (of the housing and its walls) and
+    rod_pressure; both are zero elsewhere. In cells: von_mises, the mean over its points, and the
+    principal stretches in their middle.
+    """
+    mesh = system.mesh
+    found = [problem.fields(solid, x) for solid in system.solids]
+    fields = {name: np.concatenate([f[name] for f in found]) for name in found[0]}
+    stresses = {name: fields[f"sigma_{name}"] for name in ("zz", "rr", "tt", "zr")}
+    kept = {name: value for name, value in fields.items() if name not in ("z", "r")}
+    on_rod = np.zeros(len(mesh.points))
+    on_rod[mesh.arc_nodes] = rod_pressure
+    deformed = system.deformed(x)
+    return Section(
+        points=deformed,
+        cells=mesh.quads,
+        point_data={
+            "displacement": system.displacements(x).copy(),
+            "contact_pressure": housing_pressure(system, x),
+            "rod_pressure": on_rod,
+            **nodal_average(mesh.quads, kept, len(mesh.points)),
+        },
+        cell_data={
+            "von_mises": von_mises(**stresses).mean(axis=1),
+            **principal_stretches(mesh.points, deformed, mesh.quads),
+        },
+    )
+
+
+def principal_stretches(points: Array, deformed: Array, quads: Integers) -> dict[str, Array]:
+    """Principal stretches (cells,) in the middle of each cell.
+
+    points, deformed: (nodes, 2), as (z, r). stretch_1 >= stretch_2 are those in the plane of the
+    section, stretch_hoop that around the axis.
+    """
+    before, after = points[quads], deformed[quads]
+    slopes = _middle_slopes(before).transpose(0, 2, 1), _middle_slopes(after).transpose(0, 2, 1)
+    a, b, c, d = np.linalg.solve(*slopes).reshape(-1, 4).T  # F^T
+    spin, shear = np.hypot(a + d, b - c), np.hypot(a - d, b + c)
+    first, second = 0.5 * (spin + shear), 0.5 * (spin - shear)  # its singular values
+    hoop = after[:, :, 1].mean(axis=1) / before[:, :, 1].mean(axis=1)
+    return {"stretch_1": first, "stretch_2": second, "stretch_hoop": hoop}
+
+
+def _middle_slopes(corners: Array) -> Array:
+    """Derivatives (cells, 2, 2) of places by the cell's own coordinates, in columns, times 4."""
+    one, two, three, four = corners.transpose(1, 0, 2)
+    return np.stack([two + three - one - four, three + four - one - two], axis=2)
+
+
+def film_pressure(system: SealSystem, x: Array) -> Array:
+    """Pressure (arc nodes,) of the film in a state x, the mean of both sides of a facet, MPa."""
+    ends = x[system.pressure_dofs()[:, [0, -1]]]
+    sides = np.full((len(ends) + 1, 2), np.nan)
+    sides[:-1, 0], sides[1:, 1] = ends.T
+    return np.asarray(np.nanmean(sides, axis=1))
+
+
+def housing_pressure(system: SealSystem, x: Array) -> Array:
+    """True pressure (nodes,) where the housing or a wall is touched, zero elsewhere, MPa.
+
+    The multipliers per current area, and p_s where it acts.
+    """
+    pressure, force = np.zeros(len(system.mesh.points)), system.wall_forces(x)
+    nodes, segments = system.mesh.boundary, system.mesh.segments
+    deformed = system.deformed(x)
+    current = tributary_areas(deformed, segments, nodes)
+    wet = tributary_areas(deformed, system.section.elements["sealed_side"], nodes)
+    fluid = wet * system.parameters.sealed_pressure
+    pressure[nodes] = np.where(force[nodes] > 0.0, (force[nodes] + fluid) / current, 0.0)
+    return pressure

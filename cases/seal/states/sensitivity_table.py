@@ -1,0 +1,41 @@
+"""`sensitivity.csv`: its rows, and which states have any."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from softehl.cases.harness.row import OK, Record, column
+from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.seal.states.verdict import INLET_RATIO
+
+
+@dataclass(frozen=True)
+class SensitivityRow(Record):
+    """One row of `sensitivity.csv`."""
+
+    sealed_pressure_MPa: float = column("MPa", "sealed pressure p_s")
+    rod_speed_mm_s: float = column("mm/s", "rod speed U, + = outstroke (to the air side)")
+    quantity: str = column(
+        "", "`h_star`, `friction`, `leakage`, `p_max` or `contact_width` (where h < 20 um)"
+    )
+    parameter: str = column("", "a key of the case, or `U`")
+    log_derivative: float = column(
+        "", "d log quantity / d log parameter: per cent for one per cent; the mesh is frozen"
+    )
+
+
+def resolved(row: FilmRow) -> bool:
+    """Whether the mesh shows the film well enough to differentiate it.
+
+    Stricter than the verdict: uniform meshes, too, must show the slope of the inlet.
+    """
+    return row.verdict == OK and INLET_RATIO[0] <= row.inlet_ratio <= INLET_RATIO[1]
+
+
+def rows_of(row: FilmRow, found: Mapping[str, Mapping[str, float]]) -> list[SensitivityRow]:
+    """The lines of a state in `sensitivity.csv`."""
+    place = row.sealed_pressure_MPa, row.rod_speed_mm_s
+    return [
+        SensitivityRow(*place, quantity, name, slope)
+        for quantity, slopes in found.items()
+        for name, slope in slopes.items()
+    ]

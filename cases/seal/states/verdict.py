@@ -1,0 +1,300 @@
+"""Whether a film on the path of falling speed can be trusted, from its numbers alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf, isfinite, nan
+
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.gland.surfaces import FULL
+from softehl.cases.seal.states.state import (
+    CLIPPED,
+    COLLAPSED,
+    OSCILLATING,
+    UNCERTAIN,
+    UNDER_RESOLVED,
+)
+from softehl.runtime.fem.postprocess import local_exponent
+
+EXCESS_PRESSURE = 0.1
+"""Largest credible excess of the film's maximum pressure over the contact's, relative."""
+
+LARGEST_EXPONENT = 0.85
+"""Largest credible d log h* / d log U: theory and fine meshes give 0.55 to 0.65."""
+
+FEWEST_INLET_SEGMENTS = 1.5
+"""Segments that the inlet needs: with more, h* was within 4 % of a finer mesh in all cases tried
+(docs/film-resolution.md); with fewer, anything between -94 % and +59 % occurs."""
+
+FEWEST_OF_LOBES = 3.0
+"""The same of a section with two lobes: an X-ring with 1.7 was 4 % off, its `inlet_ratio` 1.002."""
+
+INLET_SEGMENTS_OF_LOW_ORDERS = {("fe", 1): 3.0, ("dg", 1): 5.0, ("dg", 2): 2.0}
+"""The same for low orders m_p, by treatment of the Reynolds equation: they need more."""
+
+INLET_RATIO = (0.98, 1.02)
+"""Credible h* over that of the film's own steepest inlet slope: 0.995 to 1.002 where an inlet is
+resolved, 0.83 to 0.957 where h* was 10 % wrong. Judged on graded meshes."""
+
+NEXT_RATIO = 0.15
+"""Farthest from 1 that of a contact may be which does not meter h*: the pressure of the groove
+before it follows it, and friction. Of an X-ring 0.894 at density 2 left h* right within 0.2 % and
+friction within 1.1 %, 0.736 at density 1 within 1.8 and 9 %. The estimate says more."""
+
+ANY_RATIO = (-inf, inf)
+"""That of meshes where it is not judged."""
+
+EXIT_FILMS, END_GAP = 5.0, 0.1
+"""At its exit the arc is outside the film where the gap is so many h*, or so many mm."""
+
+MOST_LACKING = 0.02
+"""Largest share of its pressure that an inlet may lack because the arc begins within the film: h*
+was too small by 0.22 to 0.25 of it where arcs of a ring were cut, by 0.07 to 0.13 under lips."""
+
+MOST_WEDGE = 0.2
+"""Largest share of the pressure of its inlet that a film may be given where its arc begins: h* that
+was 3.1 % too small without 0.14 of it was 0.8 % too large with it."""
+
+LARGEST_ERROR = 2.0
+"""Largest estimated error of h*, %, of a state that is `ok`."""
+
+STRONG_OSCILLATION = 0.2
+"""Oscillation index from which on a profile is not to be taken at face value: about 5 % of h."""
+
+DOUBTFUL = "the estimated error of h* is large or not known; use a finer mesh (larger density)"
+
+FINER_MESH = "the film collapsed on this mesh; use a finer mesh (larger density)"
+
+
+@dataclass(frozen=True)
+class ContactNumbers:
+    """One contact of a film that has several: mm, MPa, flux per circumference in mm^2/s.
+
+    start, end: where h is 20 um, or less over a shallow groove. p_before: pressure where its part
+    of the film begins, in the groove between it and the one before. inlet_ratio: as of the film,
+    nan where too little oil reaches its inlet to fill it.
+    """
+
+    flux: float
+    p_max: float
+    h_min: float
+    start: float
+    end: float
+    p_before: float
+    inlet_ratio: float = 1.0
+
+
+@dataclass(frozen=True)
+class FilmNumbers:
+    """Scalars of a film: mm, MPa, N, s; flux per circumference in mm^2/s, signed like U.
+
+    flux_variation: relative, outside cavitation. jump: largest of the pressure at a facet, MPa.
+    oscillation: index of `cases.seal.states.film_signs.oscillation`. inlet_segments: number of
+    segments over which the film narrows from ten times to one and a half times h* at its inlet.
+    inlet_ratio: h* over that of the steepest slope of the pressure in the inlet, by (14) at h = 3/2
+    h*. end_gap: the film thickness at the exit end of the arc. entrance: pressure that oil has
+    built up before the arc begins, MPa. lacking: what the film does not have of it, relative to
+    that of the inlet. mean_gap: least h_T, mm. lambda_ratio: that over sigma, nan between smooth
+    surfaces. asperity_load, boundary_friction: shares of asperities. contacts: from the sealed side
+    on, where there are several; h_star is then that of the first one on the way of the oil that has
+    a peak of its own. drag: the part of the friction that is not of the slope of the pressure.
+    beyond: friction of the oil beyond both ends of the arc, which it does not have, relative to it.
+    """
+
+    speed: float
+    flux: float
+    h_star: float
+    h_min: float
+    p_max: float
+    friction: float
+    flux_variation: float
+    jump: float
+    oscillation: float
+    inlet_segments: float
+    inlet_ratio: float = 1.0
+    end_gap: float = inf
+    entrance: float = 0.0
+    lacking: float = 0.0
+    mean_gap: float = nan
+    lambda_ratio: float = nan
+    asperity_load: float = 0.0
+    boundary_friction: float = 0.0
+    contacts: tuple[ContactNumbers, ...] = ()
+    drag: float = nan
+    beyond: float = 0.0
+
+    @property
+    def mismatch(self) -> float:
+        """Largest difference between the flux of a contact and that of h*, %; 0 for one contact."""
+        apart = (abs(contact.flux / self.flux - 1.0) for contact in self.contacts)
+        return 100.0 * max(apart, default=0.0)
+
+    @property
+    def next_ratio(self) -> float:
+        """The inlet ratio farthest from 1 of other contacts whose inlets are filled; 1 if none is.
+
+        The flux of h* passes them too: the pressure of the groove before them makes it so, and is
+        far off, and friction with it, where their own flux is off by a per cent.
+        """
+        others = self.contacts[1:] if self.flux > 0.0 else self.contacts[:-1]
+        ratios = [contact.inlet_ratio for contact in others]
+        found = [ratio for ratio in ratios if isfinite(ratio) and not isfinite(self.lambda_ratio)]
+        return max(found, key=lambda ratio: abs(ratio - 1.0), default=1.0)
+
+    @property
+    def touching(self) -> bool:
+        """Whether asperities decide about the film too: its inlet is not that of (14)."""
+        return self.lambda_ratio < FULL
+
+    @property
+    def enters(self) -> bool:
+        """Whether the film is to begin with the pressure of the wedge before its arc."""
+        return MOST_LACKING < self.lacking <= MOST_WEDGE
+
+    @property
+    def clipped(self) -> bool:
+        """Whether the arc ends within the film."""
+        short = self.end_gap < min(EXIT_FILMS * self.h_star, END_GAP)
+        return short or not self.lacking <= MOST_LACKING
+
+
+def fewest_inlet_segments(reynolds: str, m_p: int, lobes: int = 1) -> float:
+    """Segments that the inlet needs with pressures of order m_p, "fe" or "dg"."""
+    least = FEWEST_OF_LOBES if lobes > 1 else FEWEST_INLET_SEGMENTS
+    return max(INLET_SEGMENTS_OF_LOW_ORDERS.get((reynolds, m_p), least), least)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the films met so far on a path of falling speed can be trusted.
+
+    reference: maximum contact pressure without film, MPa. last: the latest film. collapsed: what
+    gave a spurious collapsed film away, if anything did: a pressure well above the contact's, a
+    drag that rises while the speed falls, or a thickness that falls too fast. A path that
+    has once collapsed does not recover; too few segments in the inlet or an oscillating film
+    are judged for each film alone. fewest: segments that the inlet needs. ratios: credible
+    inlet_ratio. error: estimated error of the last film's h*, %, None where none is wanted. rough:
+    between rough surfaces friction may rise while the speed falls, and h may be negative.
+    unsealed: where the sealed pressure ends although nothing is touched there. references: maximum
+    contact pressures of each contact, from the sealed side on. overlap: what the section runs into:
+    itself, or the rod beyond its film.
+    """
+
+    reference: float
+    last: FilmNumbers | None = None
+    collapsed: str = ""
+    fewest: float = FEWEST_INLET_SEGMENTS
+    ratios: tuple[float, float] = ANY_RATIO
+    error: float | None = None
+    rough: bool = False
+    unsealed: str = ""
+    references: tuple[float, ...] = ()
+    overlap: str = ""
+
+    def after(self, film: FilmNumbers) -> Verdict:
+        """The verdict that includes one more film; `collapsed` says what gave it away."""
+        reason = self.collapsed or self._suspicion(film)
+        return replace(self, last=film, collapsed=reason)
+
+    @property
+    def word(self) -> str:
+        """OK or what is worst: COLLAPSED, UNDER_RESOLVED, CLIPPED, UNCERTAIN, OSCILLATING."""
+        if self.collapsed:
+            return COLLAPSED
+        if self.last is None:
+            return OK
+        if self.last.inlet_segments < self.fewest and not self.last.touching:
+            return UNDER_RESOLVED
+        if self.last.clipped:
+            return CLIPPED
+        if not self.ratios[0] <= self.last.inlet_ratio <= self.ratios[1]:
+            return UNDER_RESOLVED
+        if self.ratios != ANY_RATIO and abs(self.last.next_ratio - 1.0) > NEXT_RATIO:
+            return UNDER_RESOLVED
+        if self.error is not None and not abs(self.error) <= LARGEST_ERROR:
+            return UNCERTAIN
+        if self.unsealed or self.overlap or self.last.mismatch > LARGEST_ERROR:
+            return UNCERTAIN
+        return OSCILLATING if self.last.oscillation > STRONG_OSCILLATION else OK
+
+    @property
+    def advice(self) -> str:
+        """What to do, empty for OK."""
+        word, last = self.word, self.last
+        if word == COLLAPSED:
+            return f"{FINER_MESH}: {self.collapsed}"
+        if last is None or word == OK:
+            return ""
+        if word == CLIPPED:
+            if last.lacking <= MOST_LACKING:
+                where = f"the arc ends where the film is only {1e3 * last.end_gap:.3g} um thick"
+            else:
+                where = f"the arc cuts off {100.0 * last.lacking:.2g} % of the inlet's pressure"
+            return (
+                f"{where}; leave arc_start and arc_end out, or move them outwards; where they are "
+                "left out, the section has no room for so thick a film"
+            )
+        if word == UNCERTAIN and self.unsealed:
+            return (
+                f"the sealed pressure is taken to end {self.unsealed}, where the ring touches "
+                "nothing; try more squeeze or a narrower groove"
+            )
+        if word == UNCERTAIN and self.overlap:
+            return (
+                f"the section runs {self.overlap}, which the model does not hinder; "
+                "try a lower sealed_pressure, a harder rubber or a wider mouth"
+            )
+        if word == UNCERTAIN and last.mismatch > LARGEST_ERROR:
+            return (
+                f"the fluxes of the two contacts differ by {last.mismatch:.2g} %: oil is lost in "
+                'the groove between them; use cavitation = "mass-conserving"'
+            )
+        if word == UNCERTAIN:
+            return DOUBTFUL
+        if word == UNDER_RESOLVED and last.inlet_segments >= self.fewest:
+            seen = self.ratios[0] <= last.inlet_ratio <= self.ratios[1]
+            next_one = "the next contact's", last.next_ratio
+            of, ratio = next_one if seen else ("its", last.inlet_ratio)
+            return (
+                f"h* is {ratio:.3g} of what the steepest slope of {of} inlet gives, it "
+                "must be near 1: the mesh does not show it; use a finer mesh (larger density)"
+            )
+        if word == UNDER_RESOLVED:
+            return (
+                f"the inlet is only {last.inlet_segments:.2g} segments long, it needs "
+                f"{self.fewest:g} with this pressure_order: h* may be wrong by tens of per cent; "
+                "use a finer mesh (larger density)"
+            )
+        return (
+            f"the film oscillates from node to node (index {last.oscillation:.2g}): h* holds to "
+            "a few per cent, the profile does not; use a finer mesh (larger density)"
+        )
+
+    def _suspicion(self, film: FilmNumbers) -> str:
+        if film.h_min <= 0.0 and not self.rough:
+            return f"its least thickness is {1e3 * film.h_min:.2g} um"
+        for peak, reference in self._peaks(film):
+            excess = peak - reference
+            if excess > EXCESS_PRESSURE * reference:
+                return (
+                    f"the maximum pressure is {excess:.2f} MPa above that of frictionless contact"
+                )
+        if self.rough or self.last is None or not film.speed < self.last.speed:
+            return ""
+        if abs(film.drag) > abs(self.last.drag):
+            return "the drag on the rod rises while the speed falls"
+        if film.h_star <= 0.0 or self._exponent(film) > LARGEST_EXPONENT:
+            return "its thickness falls too fast with the speed"
+        return ""
+
+    def _peaks(self, film: FilmNumbers) -> list[tuple[float, float]]:
+        """Maximum pressures, each with that of contact: one by one if there are as many."""
+        if len(film.contacts) > 1 and len(film.contacts) == len(self.references):
+            peaks = [contact.p_max for contact in film.contacts]
+            return list(zip(peaks, self.references, strict=True))
+        return [(film.p_max, self.reference)]
+
+    def _exponent(self, film: FilmNumbers) -> float:
+        if self.last is None or self.last.h_star <= 0.0:
+            return inf
+        return local_exponent(self.last.speed, self.last.h_star, film.speed, film.h_star)
