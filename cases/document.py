@@ -1,13 +1,18 @@
 """Tables of docs/ that follow from declarations: `python -m softehl.cases.document` renews them.
 
-A table stands between the lines `<!-- columns CASE -->`, `<!-- keys CASE -->` or
-`<!-- section NAME -->`, the dimensions of a section of a seal, and `<!-- end -->`.
+A table stands between one of these lines and `<!-- end -->`:
+
+    <!-- columns CASE -->            columns of a row
+    <!-- keys CASE -->               keys
+    <!-- keys CASE beyond OTHER -->  keys that the other case does not have
+    <!-- section NAME -->            dimensions of a section of a seal
 """
 
 import re
 from pathlib import Path
 
 from softehl.cases.harness.case import load_case
+from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.table import column_lines, key_lines
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
@@ -15,7 +20,9 @@ from softehl.cases.shipped import SHIPPED
 from softehl.runtime.io import write_text
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-_TABLE = re.compile(r"<!-- (columns|keys|section) (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+_TABLE = re.compile(
+    r"<!-- (columns|keys|section) (\w+)( beyond (\w+))? -->\n.*?<!-- end -->", re.DOTALL
+)
 
 
 def renewed(text: str) -> str:
@@ -24,13 +31,15 @@ def renewed(text: str) -> str:
 
 
 def _table(found: re.Match[str]) -> str:
-    what, name = found.groups()
+    what, name, beyond, other = found.groups()
     if what == "section":
         lines = section_lines(name)
+    elif what == "keys":
+        known = tuple(keys_of(load_case(SHIPPED[other]).parameters)) if other else ()
+        lines = key_lines(load_case(SHIPPED[name]).parameters, known)
     else:
-        case = load_case(SHIPPED[name])
-        lines = key_lines(case.parameters) if what == "keys" else column_lines(case.row)
-    return "\n".join([f"<!-- {what} {name} -->", *lines, "<!-- end -->"])
+        lines = column_lines(load_case(SHIPPED[name]).row)
+    return "\n".join([f"<!-- {what} {name}{beyond or ''} -->", *lines, "<!-- end -->"])
 
 
 def section_lines(name: str) -> list[str]:

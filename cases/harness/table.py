@@ -1,7 +1,7 @@
 """Tables on the terminal and in the documentation, from the declarations of columns and keys."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import groupby
 
 from rich.box import SIMPLE
@@ -89,10 +89,11 @@ def default_text(key: Key) -> str:
     return "-" if key.default is None else json.dumps(key.default)
 
 
-def key_lines(kind: type[Parameters]) -> list[str]:
-    """The keys of a case as a table for the documentation."""
+def key_lines(kind: type[Parameters], known: Collection[Key] = ()) -> list[str]:
+    """The keys of a case as a table for the documentation, without those that are known."""
     lines = ["| key | default | unit | allowed | meaning |", "|---|---|---|---|---|"]
-    for heading, keys in groupby(keys_of(kind), key=lambda key: key.heading):
+    listed = [key for key in keys_of(kind) if key not in known]
+    for heading, keys in groupby(listed, key=lambda key: key.heading):
         if heading:
             lines.append(_line(f"**{heading}**", "", "", "", ""))
         for key in keys:

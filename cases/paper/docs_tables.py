@@ -1,8 +1,8 @@
-"""The tables and pictures of docs/reproduction.md from the files that `softehl reproduce` wrote.
+"""Tables and pictures of the documentation from the files that `softehl reproduce` wrote.
 
-`python -m softehl.cases.paper.docs_tables DIR [docs/reproduction.md]` replaces what stands between
+`python -m softehl.cases.paper.docs_tables DIR [PAGE ...]` replaces the lines between
 `<!-- table NAME -->` (or `<!-- table NAME: column, column -->`, `<!-- caption NAME -->`) and
-`<!-- end -->` and copies the pictures that the page shows. The words between are written by hand.
+`<!-- end -->` and copies the pictures that a page shows. The other lines are written by hand.
 """
 
 import csv
@@ -60,20 +60,22 @@ def _cell(name: str, text: str) -> str:
     return text if value.is_integer() and "." not in text and "e" not in text else f"{value:.4g}"
 
 
+PAGES = ("docs/reproduction.md", "docs/validation/paper.md")
+
 _LETTERS = ("verdicts", "outstroke", "instroke")
 """Columns of verdict letters, which are no words."""
 
 
 def main(arguments: list[str]) -> None:
-    """Renew the page and copy its pictures."""
+    """Renew the pages and copy their pictures."""
     folder = Path(arguments[0])
-    page = Path(arguments[1] if len(arguments) > 1 else "docs/reproduction.md")
-    text = renewed(page.read_text(encoding="utf-8"), folder)
-    write_text(page, text)
-    for place in _PICTURE.findall(text):
-        target = page.parent / place
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(folder / target.name, target)
+    for page in map(Path, arguments[1:] or PAGES):
+        text = renewed(page.read_text(encoding="utf-8"), folder)
+        write_text(page, text)
+        for place in _PICTURE.findall(text):
+            target = page.parent / place
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(folder / target.name, target)
 
 
 if __name__ == "__main__":

@@ -36,6 +36,7 @@ from softehl.runtime.io import read_arrays, read_table
 from softehl.runtime.solve.newton import Newton
 from tests.reference.calling import fitted_order
 
+VALIDATION = Path(__file__).parents[2] / "docs" / "validation"
 ETA = 6.59e-8
 Gap = Callable[[float], float]
 
@@ -288,7 +289,7 @@ def test_slow_and_fast_cycles_are_periodic_by_the_third(frequency: float, tmp_pa
     table = cycle(tmp_path / "c", f"frequency={frequency}")
     assert table["mass_error"].max() < 1e-9
     assert table["change_percent"][-1] < 0.5
-    page = (Path(__file__).parents[2] / "docs" / "film-physics.md").read_text(encoding="utf-8")
+    page = (VALIDATION / "films.md").read_text(encoding="utf-8")
     (line,) = [x for x in page.splitlines() if x.startswith("| largest friction of a cycle")]
     said = [float(v) for v in line.split("|")[3].split(",")]
     expected = said[0] if frequency < 1.0 else said[2]

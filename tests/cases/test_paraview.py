@@ -108,7 +108,7 @@ def test_what_a_run_writes_of_its_sections(changes: dict[str, Any], tmp_path: Pa
     assert read_series(tmp_path / "section_out.pvd") == [(400.0, file)]
     assert not (tmp_path / "section_in.pvd").exists()
     points, cells, nodal, data = cells_of(tmp_path / file)
-    page = (DOCS / "oring.md").read_text(encoding="utf-8")
+    page = (DOCS / "keys.md").read_text(encoding="utf-8")
     assert {name for name in (*nodal, *data) if f"`{name}`" not in page} == set()
     at_rest = points - nodal["displacement"]
     found = np.stack([data[f"stretch_{name}"] for name in ("1", "2", "hoop")], axis=1)

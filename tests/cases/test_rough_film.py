@@ -19,6 +19,7 @@ from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmRow, FilmState, Silent
 from softehl.runtime.fem.guards import ChangesLittle
 
+VALIDATION = Path(__file__).parents[2] / "docs" / "validation"
 SPEEDS = (2000.0, 500.0, 200.0, 50.0, 10.0, 1.0, 0.1, 0.01)
 
 
@@ -214,8 +215,8 @@ def test_a_rough_film_on_a_section_that_rubs_on_its_housing() -> None:
     ],
 )
 def test_how_much_uncertain_coefficients_matter(what: str, keys: dict[str, Any]) -> None:
-    """Rows of the table in docs/film-physics.md."""
-    page = (Path(__file__).parents[2] / "docs" / "film-physics.md").read_text(encoding="utf-8")
+    """Rows of the table in docs/validation/films.md."""
+    page = (VALIDATION / "films.md").read_text(encoding="utf-8")
     (line,) = [line for line in page.splitlines() if line.startswith(f"| {what}")]
     said = [[float(v) for v in cell.split(",")] for cell in line.split("|")[2:4]]
     speeds = (1.0, 20.0, 200.0)

@@ -1,4 +1,4 @@
-"""What is known of reciprocating seals, by runs: the table of docs/film-physics.md."""
+"""What is known of reciprocating seals, by runs: the table of docs/validation/films.md."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from softehl.cases.seal.states.state import FilmState, Silent
 
 SPEEDS = (800.0, 400.0, 200.0, 100.0)
 MIXED = (2000.0, 1000.0, 500.0, 200.0, 100.0, 50.0, 20.0)
-PAGE = Path(__file__).parents[2] / "docs" / "film-physics.md"
+PAGE = Path(__file__).parents[2] / "docs" / "validation" / "films.md"
 
 
 @cache

@@ -53,8 +53,8 @@ def test_grades() -> None:
 
 @pytest.mark.slow
 def test_what_thinning_does_to_an_o_ring() -> None:
-    """A line of the table of docs/oils.md, computed again: h* and friction, 800 mm/s, both ways."""
-    text = (DOCS / "oils.md").read_text(encoding="utf-8")
+    """A line of docs/validation/films.md, computed again: h* and friction, 800 mm/s, both ways."""
+    text = (DOCS / "validation" / "films.md").read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if line.startswith("|")]
     at = next(i for i, line in enumerate(lines) if line.startswith("| Carreau, 1e5 1/s"))
     h, friction = ([float(v) for v in line.split("|")[2:6]] for line in lines[at : at + 2])
