@@ -19,7 +19,7 @@ ENTRY = """void bench_entry(
 
 @dataclass(frozen=True)
 class Layout:
-    """How a candidate wants its elements: order of our nodes, doubles per node, tangent order.
+    """Element layout of a candidate: order of our nodes, doubles per node, tangent order.
 
     The driver packs before and unpacks after the clock: nobody pays for a foreign layout.
     """

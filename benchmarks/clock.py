@@ -1,4 +1,4 @@
-"""Where the CPU time of a program goes."""
+"""Shares of the CPU time of a program."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Clock:
         self.since = time.process_time()
 
     def turn(self) -> None:
-        """What passed until now belongs to the part that is open."""
+        """Add the time that has passed to the part that is open."""
         now = time.process_time()
         self.seconds[self.open[-1]] += now - self.since
         self.since = now

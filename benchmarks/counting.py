@@ -33,7 +33,7 @@ int main()
 def count(candidate: Candidate, folder: Path, given: Elements, limit: float = 120.0) -> int | None:
     """Operations of the first element (None: no C++ compiler, or not within `limit` seconds).
 
-    What the optimiser later removes or repeats is not seen: it is the work as written.  The
+    The count is that of the text, before the optimiser removes or repeats anything.  The
     program is written into `folder`, where the headers of the candidate are.
     """
     if shutil.which("c++") is None:

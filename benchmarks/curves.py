@@ -1,4 +1,4 @@
-"""What a curve costs: curves an hour, where the time goes, and the same of another checkout.
+"""Cost of a curve: curves an hour and parts of the time, beside those of another checkout.
 
     OMP_NUM_THREADS=1 python -m benchmarks.curves [--before CHECKOUT] [--rounds 3]
 

@@ -64,7 +64,7 @@ def derive(module: str, case: Case, route: str, target: Path, limit: float) -> C
 
 
 def main(module: str, case: str, route: str, target: str) -> None:
-    """What the process does."""
+    """Derive one candidate in a process of its own and print the result."""
     candidate = importlib.import_module(module).derive(Case[case], route)
     Path(target).write_bytes(pickle.dumps(candidate))
 

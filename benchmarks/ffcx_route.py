@@ -60,7 +60,7 @@ def _element(tensor: bool) -> Any:
 
 
 def _own_flags() -> tuple[str, ...]:
-    """What cffi passes when FFCx compiles just in time: C17 and the flags of this Python."""
+    """Flags that cffi passes when FFCx compiles just in time: C17 and the flags of this Python."""
     flags = shlex.split(sysconfig.get_config_var("CFLAGS") or "-O2")
     return ("-std=c17", *(f for f in flags if not f.startswith(("-W", "-I"))))
 
@@ -90,7 +90,7 @@ def _printed(ufl: Any, F: Any, hoop: Any, c: Any) -> Any:
 
 
 def _by_J(ufl: Any, F: Any, hoop: Any, c: Any) -> Any:
-    """The same with fewer and simpler operations: powers of J, in-plane invariants."""
+    """The energy with fewer and simpler operations: powers of J, in-plane invariants."""
     plane, square = ufl.inner(F, F), hoop**2
     det = ufl.det(F)
     J = det * hoop

@@ -1,11 +1,11 @@
-"""What rough films and films in time cost: seconds, and as ratios to the smooth curve.
+"""Cost of rough films and films in time: seconds, and ratios to the smooth curve.
 
     OMP_NUM_THREADS=1 python -m benchmarks.films [--density 2] [--speeds 20] [--repeats 3]
 
-Three runs of the O-ring of Table 1, at outstroke: a smooth curve of falling speed, 2000 to 50 mm/s;
-the Stribeck curve of a seal of 0.3 um from dry contact, 0.01 to 2000 mm/s; and a cycle of 20 mm at
-2 Hz with the same roughness, without the steady film that it begins with. No error estimates,
-nothing is written. CPU seconds of the process, the least of the repeats: on a shared machine the
+Three runs of the O-ring of Table 1, at outstroke: a smooth curve, 2000 to 50 mm/s; the
+Stribeck curve of a seal of 0.3 um, 0.01 to 2000 mm/s; and a cycle of 20 mm at 2 Hz with the same
+roughness, without the steady film that it begins with. No error estimates, nothing is written. CPU
+seconds of the process, the least of the repeats: on a shared machine the
 ratios tell more.
 """
 

@@ -24,9 +24,10 @@ NOBODY = "-"
 
 @dataclass(frozen=True)
 class Settings:
-    """How a run is made: compilers, samples of each kernel, whether also with each tool's own
-    flags, whether by every route, seconds that a derivation and a compilation may take, and whom
-    to tell."""
+    """Settings of a run.
+
+    They are the compilers, the samples of each kernel, whether each tool's own flags and every
+    route are used, the seconds that a derivation and a compilation may take, and the reporter."""
 
     compilers: Sequence[Compiler]
     rounds: int
@@ -38,7 +39,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Row:
-    """What was measured of one route with one compiler; None: not measured, `outcome` says why.
+    """Measurement of one route with one compiler; None: not measured, `outcome` says why.
 
     `outcome` is empty for a verified kernel.  `error` is the largest relative deviation from the
     50-digit reference (three elements) and from our kernel (all of them).  `nanoseconds` are per

@@ -39,7 +39,7 @@ class Case(enum.Enum):
 
     @property
     def title(self) -> str:
-        """What a person reads."""
+        """Title for a reader."""
         return self.value
 
 

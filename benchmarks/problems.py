@@ -98,7 +98,7 @@ def timed(action: Callable[[], object], rounds: int = 30) -> float:
 
 
 def theirs(python: str, tool: str, problem: str, n: int) -> Timing | str:
-    """The same by another tool; the last line of its complaint where it is not there."""
+    """Times of another tool; the last line of its error if it is not there."""
     one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     command = [python, str(Path(__file__).with_name("rivals.py")), tool, problem, str(n)]
     for _ in range(2):  # the first run fills the caches of what is compiled

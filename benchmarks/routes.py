@@ -35,7 +35,7 @@ class Generator:
 
     @property
     def installed(self) -> bool:
-        """Whether the package can be imported."""
+        """True if the package can be imported."""
         return importlib.util.find_spec(self.package) is not None
 
 

@@ -96,7 +96,7 @@ def table(root: Path) -> list[list[str]]:
 
 
 def over_budget(root: Path) -> list[str]:
-    """What is larger than its budget, outside the tests."""
+    """Files and functions that are larger than their budget, outside the tests."""
     found = []
     for room in ROOMS[:-1]:
         found += [f for f in files_of(root / room) if f.lines > FILE]

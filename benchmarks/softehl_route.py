@@ -69,7 +69,7 @@ def printed() -> Definition:
 
 
 def printed_fbar() -> Definition:
-    """The same with Fbar = a F; a has a name because the variation leaves it alone."""
+    """The formula with Fbar = a F; a has a name because the variation leaves it alone."""
     m, X, u, material, xi, eta = _element("printed_fbar")
     F, volume = _gradient(X, u, xi, eta)
     F0, _ = _gradient(X, u, sp.Integer(0), sp.Integer(0))

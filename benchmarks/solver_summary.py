@@ -1,4 +1,4 @@
-"""What `benchmarks.solver` measured, as Markdown tables for benchmarks/README.md."""
+"""Results of `benchmarks.solver` as Markdown tables for benchmarks/README.md."""
 
 from __future__ import annotations
 

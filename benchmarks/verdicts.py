@@ -1,11 +1,11 @@
-"""How far off the states are that a run calls `ok`: settings drawn at random, against finer meshes.
+"""Errors of states that a run calls `ok`, in settings drawn at random, against finer meshes.
 
     python -m benchmarks.verdicts FOLDER [--count 24] [--limit 150] [--only N ...]
 
 Each setting is run as a user would, then on a mesh of at least twice its density (and at least 4)
-with pressures of at least order 4. FOLDER keeps what was found, one JSON file a run: references are
-never run twice; delete the `run_*` files to try another program. A run that ends in an error or
-takes more than the limit, in seconds of CPU, is left out and named.
+with pressures of at least order 4. FOLDER keeps the results, one JSON file a run. References
+are never run twice; delete the `run_*` files to try another program. A run that ends in an error,
+or takes more than the limit (in seconds of CPU), is left out and named.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def drawn(number: int) -> dict[str, Any]:
 
 
 def reference(given: dict[str, Any]) -> dict[str, Any]:
-    """The same on a finer mesh, with the continuous film of at least order 4."""
+    """The setting on a finer mesh, with the continuous film of at least order 4."""
     order, density = max(given["pressure_order"], 4), max(2 * given["density"], 4)
     same = {"reynolds": "fe", "error_estimate": False}
     return {**given, **same, "pressure_order": order, "density": density}

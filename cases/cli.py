@@ -223,7 +223,7 @@ def _write_report(folders: tuple[Path, ...], path: Path, *, xlsx: bool, quiet: b
 
 
 def _by_petsc(case: str) -> str:
-    """What a case is told so that PETSc solves its linear systems.  Raises BadInput."""
+    """Settings of a case by which PETSc solves its linear systems.  Raises BadInput."""
     from softehl.cases.harness.case_file import find_case
     from softehl.cases.harness.errors import BadInput
 

@@ -57,7 +57,7 @@ not-a-number in *every* entry of its `values` and `tangent`; the other elements 
 Targets
 -------
 `simd` (the default): the functions above, several elements at once, one a lane of a vector: eight
-with AVX-512, else four; one after another where there is little to compute.  Where a batch is no
+with AVX-512, else four; one after another where there is little to compute.  If a batch is no
 multiple of the lanes, its last elements are computed and written twice.  A kernel of an
 interpolated field keeps 8 (ndof + ndof^2) bytes a lane on the stack.  The lanes are the vector
 extensions of gcc >= 12 and clang; another compiler, or `-DSOFTEHL_LANES=1`, gets groups of one
@@ -95,7 +95,7 @@ from enum import StrEnum
 
 
 class Task(StrEnum):
-    """What a kernel of a family computes."""
+    """Task of a kernel of a family."""
 
     ENERGY = "energy"
     RESIDUAL = "residual"

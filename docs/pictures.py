@@ -93,7 +93,7 @@ def main(folder: Path) -> None:
 
 
 def shrink(picture: Path, to: Path) -> None:
-    """The same picture with a palette: a third of the bytes."""
+    """Write a picture with a palette: a third of the bytes."""
     Image.open(picture).convert("RGB").quantize(128).save(to, "PNG", optimize=True)
 
 

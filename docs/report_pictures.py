@@ -108,7 +108,7 @@ def browser() -> Iterator[Any]:
 
 
 def edges(driver: Any, shot: Shot) -> Sequence[float]:
-    """Where a picture begins and ends on the page, pixels."""
+    """Beginning and end of a picture on the page, pixels."""
     found = driver.execute_script(_PARTS)
     parts = {title: (top, bottom) for title, top, bottom in found}
     return parts[shot.first][0] if shot.first else 0.0, parts[shot.last][1] + 16.0

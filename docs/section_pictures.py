@@ -1,6 +1,6 @@
 """The drawings of docs/sections.md: every section with its dimensions; `make pictures`.
 
-What may carry film is blue, what sealed pressure acts on red; the axis of the rod is below.
+Blue marks the film, red the sealed pressure; the axis of the rod is below.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where a path begins: at rest, or at the values of a result, matched by node and name."""
+"""Beginning of a path: at rest, or at the values of a result, matched by node and name."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _take_others(whole: System, before: System, x: Array, values: Array) -> None
 
 
 def _histories(whole: System, before: System, state: dict[str, Array]) -> dict[str, Array]:
-    """What points remember as in the result, other point data as this study gives them."""
+    """History of points from the result, other point data as this study gives them."""
     found = whole.histories()
     for name, initial in found.items():
         block, old = whole.blocks[name], before.blocks.get(name)

@@ -61,7 +61,7 @@ RELATIONS = {">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.les
 
 @dataclass(frozen=True)
 class Family:
-    """What one kernel family takes.  Calls take n elements at once, as arrays of float64.
+    """Arguments of one kernel family.  Calls take n elements at once, as arrays of float64.
 
     coordinates (n, nodes*len(coordinates)) (any, for a kernel that has none), dofs (n, ndof),
     data (n, len(data)), point_data (n, points, len(point_data)), parameters (len(parameters),) or
@@ -92,7 +92,7 @@ class Family:
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """What a call is given besides coordinates and unknowns; see `Family` for the shapes."""
+    """Arguments of a call besides coordinates and unknowns; see `Family` for the shapes."""
 
     data: Array | None = None
     point_data: Array | None = None

@@ -1,7 +1,7 @@
 """A layer's tangent, cut between the unknowns that it shares and its own.
 
-Where the entries go is found once for a pattern; its own unknowns are numbered along the layer, so
-that their matrix is a band.
+The places of the entries are found once for a pattern. Its own unknowns are numbered along the
+layer, so that their matrix is a band.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from softehl.runtime.system import System
 
 
 def equations(statement: Statement) -> System:
-    """What is written down, as equations.  Raises StudyError for what does not fit together."""
+    """Equations of a statement.  Raises StudyError for what does not fit together."""
     if not statement.blocks:
         raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
     mesh, pages = statement.mesh, statement.blocks.values()

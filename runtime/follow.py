@@ -32,7 +32,7 @@ class LoadPath:
 
 @dataclass(frozen=True, eq=False)
 class ArcSteps:
-    """How a path is followed: longest step, at most so many points, each handed to `on_step`."""
+    """Settings of a path: longest step, largest number of points, each handed to `on_step`."""
 
     step: float
     newton: Newton
@@ -40,7 +40,7 @@ class ArcSteps:
     on_step: Callable[[Result], object]
 
     def run(self, system: System, start: Beginning, until: Callable[[Result], bool]) -> LoadPath:
-        """What `Study.follow` says.  Raises NotConverged."""
+        """Follow the path as `Study.follow` describes.  Raises NotConverged."""
         begin, x0, histories = start
         state = [(x0, histories)]  # after the last converged point
         results: list[Result] = []

@@ -1,4 +1,4 @@
-"""Whether a problem is held: affine motions that its tangent does not resist, and their names.
+"""Support of a problem: affine motions that its tangent does not resist, and their names.
 
 A body that nothing holds is told before it is solved. Candidates are all fields that are constant
 or linear in the places, on each part of the unknowns that the tangent connects: rigid motions,
@@ -132,7 +132,7 @@ class _Motions:
     size: float
 
     def words(self) -> str:
-        """What they are: translations and shifts, then rotations, then anything else."""
+        """Names of the motions: translations and shifts, then rotations, then anything else."""
         k, names, width = self.motions.shape
         slopes = self.motions[:, :, 1:].reshape(k, -1)
         left, values, _ = np.linalg.svd(slopes)

@@ -60,7 +60,7 @@ def write_arrays(path: Path, arrays: Mapping[str, Array], *, shared: bool = True
 
 
 def read_arrays(path: Path) -> dict[str, Array] | None:
-    """What :func:`write_arrays` wrote; None if the file is missing or anything is wrong with it."""
+    """Arrays that :func:`write_arrays` wrote; None if the file is missing or damaged."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
             return {name: np.asarray(content[name], dtype=np.float64) for name in content.files}
@@ -132,7 +132,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def _plain(value: object) -> object:
-    """The same value in types that JSON has."""
+    """The value in types that JSON has."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float):

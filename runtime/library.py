@@ -1,4 +1,4 @@
-"""Where compiled kernels are found, and calls into them: the only module that knows cffi.
+"""Compiled kernels: finding them and calling them; the only module that knows cffi.
 
 A folder holds generated C, its `manifest.json` and the shared library that was built from it.  Of
 the kernels that ship the library is one tuned to the processor (`tuning`), or where there is none
@@ -102,7 +102,7 @@ class Library:
 
     @property
     def current(self) -> bool:
-        """Whether it was built from the sources that its folder holds now."""
+        """True if it was built from the sources that its folder holds now."""
         built_from: bytes = _ffi.string(self.loaded.softehl_signature())
         return built_from.decode() == _sources_signature(self.directory)
 
@@ -185,7 +185,7 @@ def _opened(path: Path, directory: Path, remedy: str = "") -> Library:
 
 
 def _whole(path: Path) -> bool:
-    """Whether the SHA-256 of a library stands beside it."""
+    """True if the file beside a library has its SHA-256."""
     try:
         told = path.with_name(DIGEST).read_text(encoding="ascii").split()
         return told[:1] == [hashlib.sha256(path.read_bytes()).hexdigest()]
@@ -202,7 +202,7 @@ def _remedy(directory: Path) -> str:
 
 
 def _pointer(array: Array) -> Any:
-    """Where an array begins that is contiguous in memory; raises otherwise."""
+    """Pointer to an array that is contiguous in memory; raises otherwise."""
     return _ffi.from_buffer(_DOUBLES, array)
 
 

@@ -21,7 +21,7 @@ from softehl.runtime.system import System
 
 @dataclass(frozen=True, eq=False)
 class LoadSteps:
-    """How a load is applied: in so many steps, each result handed to `on_step`."""
+    """Settings of a load: the number of steps, each result handed to `on_step`."""
 
     steps: int
     newton: Newton

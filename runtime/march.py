@@ -74,8 +74,9 @@ class Clock:
 
     @classmethod
     def load(cls, path: Path, system: System, asked: float) -> Clock:
-        """What `save` wrote, with the next step as long as is asked for, if that is another than
-        was asked for then.  Raises StudyError where it does not belong to the study.
+        """Clock that `save` wrote.  Raises StudyError if it does not belong to the study.
+
+        If another length of step is asked for than at that time, the next step has it.
         """
         found = read_arrays(path)
         if found is None:
@@ -90,7 +91,7 @@ class Clock:
 
 
 def marks_of(system: System) -> dict[str, Array]:
-    """What a checkpoint belongs to: what is told apart -> digest."""
+    """Marks of the study that a checkpoint belongs to: part -> digest."""
     nodal, layout = system.numbering.nodal, system.numbering.layout
     parts: dict[str, list[object]] = {
         "nodes or cells": [system.mesh.points, *chain(*sorted(system.mesh.cells.items()))],

@@ -86,7 +86,7 @@ def _leave(
 
 
 def _everywhere(comm: Any) -> bool:
-    """Whether all processes are here within a moment."""
+    """True if all processes arrive within a moment."""
     request, end = comm.Ibarrier(), time.monotonic() + _TOGETHER
     while not request.Test():
         if time.monotonic() > end:

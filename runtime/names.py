@@ -17,7 +17,7 @@ _FEW = 2
 def meant(given: object, known: Iterable[str]) -> str:
     """A hint at the name that was probably meant, at several that are as likely, or nothing.
 
-    Capitals do not count. What is like no name may be one of the words of a few.
+    Capitals do not count. A word that is like no name may be one of the words of a few names.
     """
     word, names = str(given).lower(), list(known)
     close = difflib.get_close_matches(word, [name.lower() for name in names], n=2)
@@ -34,7 +34,7 @@ def listed(known: Iterable[str]) -> str:
 
 
 def misfit(function: object, *arguments: str) -> str:
-    """What a function takes, for a message, where it cannot be called with these; else ""."""
+    """Arguments of a function, for a message, if it cannot be called with these; else ""."""
     if not callable(function):
         return f"a function of ({', '.join(arguments)}) is needed, given {function!r}"
     try:

@@ -18,7 +18,7 @@ from softehl.runtime.statement.records import Block
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What a file shows.
+    """Mesh and fields of a file.
 
     points: (n, dim). cells: kind -> nodes (m, k). nodal: name -> (n,). cellwise: name -> kind ->
     (m,).

@@ -1,4 +1,4 @@
-"""What a study found at one load factor: values at places, sums, fields in cells, files."""
+"""Result of a study at one load factor: values at places, sums, fields in cells, files."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 class Result:
     """A converged state of a study.
 
-    Where it is spread over processes, every method is called by all of them, and gives all the
-    same. histories: of the elements of this process.
+    If it is spread over processes, all of them call every method and get the same
+    values. histories: of the elements of this process.
     """
 
     system: System
@@ -47,7 +47,7 @@ class Result:
 
     @property
     def state(self) -> dict[str, Array]:
-        """What points remember: block -> (cells, points, k)."""
+        """History of the points: block -> (cells, points, k)."""
         return self.system.share.whole_state(self.histories)
 
     @property
@@ -133,8 +133,9 @@ class Result:
 
     @cached_property
     def _forces(self) -> Array:
-        """What supports, ties and springs do, (n,): internal less external forces, zero but for
-        rounding where there are none.
+        """Forces of supports, ties and springs, (n,): internal less external forces.
+
+        They are zero to rounding where there are none.
         """
         x, assembler = self.point.solution.x, self.problem.assembler
         holding = [b.name for b in assembler.blocks if isinstance(b.kernel, Spring | Tie)]

@@ -1,4 +1,4 @@
-"""How the unknowns and elements of a study are spread over processes: here, not at all.
+"""Distribution of unknowns and elements over processes: here, all are in one process.
 
 Whoever spreads them (`runtime.engines`) has a subclass. The vectors that pass through a solution
 path are then those of one process, its own unknowns and copies of its neighbours'; whatever decides

@@ -181,7 +181,7 @@ class Study:
     def start(self, where: Where | None = None, **values: Datum) -> None:
         """Values of unknowns at the start, numbers or functions of places; zero if left out.
 
-        What is said later counts where both speak of the same node.
+        Of two values for one node the later one counts.
         """
         read.named("start()", values, "T=20")
         everywhere = np.arange(len(self.mesh.points))
@@ -207,13 +207,13 @@ class Study:
         """The solution at load factor `until`, from 0 (or from `start`) in `steps` steps.
 
         start: a result of this or another study on the same mesh, whose values, history and load
-        factor the path begins with; the equations are those of this study. Where `until` is no
-        other load factor, they are solved there once. Steps are cut where Newton's method fails and
-        grow again; history is committed after each. on_step is given the result of every converged
-        step, write: a .pvd file that names them all. progress: tell of each step on stderr; None:
-        in one line, on a terminal only. engine: "serial", "petsc" (on all processes that mpirun
-        started) or an engine with settings. Raises StudyError; NotConverged if the end is not
-        reached: its `reached` is the last Result, or None.
+        factor the path begins with; the equations are those of this study. If `until` is the
+        load factor of the start, they are solved there once. Steps are cut where Newton's method
+        fails and grow again; history is committed after each. on_step is given the result of every
+        converged step, write: a .pvd file that names them all. progress: tell of each step on
+        stderr; None: in one line, on a terminal only. engine: "serial", "petsc" (on all processes
+        that mpirun started) or an engine with settings. Raises StudyError; NotConverged if the end
+        is not reached: its `reached` is the last Result, or None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
@@ -305,7 +305,7 @@ class Study:
             return path.run(system, begin, until)
 
     def system(self) -> System:
-        """What is written down, as equations.  Raises StudyError for what does not fit together."""
+        """Equations of the study.  Raises StudyError for what does not fit together."""
         return equations(self._statement)
 
     def _add_force(

@@ -26,9 +26,9 @@ from softehl.runtime.statement.records import (
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Where a problem stands: its time or load factor, and what was before.
+    """State of a problem in time: its time or load factor, and the step before.
 
-    factor: what numbers in loads and supports are multiplied by. old: (n,) unknowns of the step
+    factor: of all numbers in loads and supports. old: (n,) unknowns of the step
     before. rate, rest: du/dt = rate u + rest, rest (n,). dt: length of the step. histories: block
     -> (cells, points, k) point data.
     """

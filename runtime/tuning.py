@@ -61,7 +61,7 @@ def tuned() -> Path:
 
 
 def _awaited(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """What a process prints; one that takes a while is announced on a terminal."""
+    """Output of a process; one that takes a while is announced on a terminal."""
     try:
         return process.communicate(timeout=_SOON)
     except subprocess.TimeoutExpired:

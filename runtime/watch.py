@@ -1,4 +1,4 @@
-"""What happens with every converged result: shown on a terminal, written to files, handed on."""
+"""Treatment of every converged result: shown on a terminal, written to files, handed on."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What every case needs around it: parameters, files, progress, processes; no physics."""
+"""Parameters, files, progress and processes of every case; it knows no physics."""

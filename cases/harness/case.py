@@ -58,8 +58,10 @@ class Case(Generic[P, R]):
         return [parameters]
 
     def pieces(self, parameters: P, rows: Sequence[R], jobs: int) -> list[P]:
-        """What is still to be run, given the rows that are there: up to `jobs` sets side by side,
-        or any number one after the other."""
+        """Parameter sets still to be run, given the rows that are there.
+
+        At most `jobs` sets, to run side by side, or any number to run one after the other.
+        """
         there = {row.key for row in rows}
         missing = [key for key in self.requested(parameters) if key not in there]
         shares = [missing[start::jobs] for start in range(jobs)]
@@ -67,7 +69,7 @@ class Case(Generic[P, R]):
         return [parameters.model_copy(update=update) for update in chosen]
 
     def piece_name(self, piece: P) -> str:
-        """What tells a piece from those that run beside it."""
+        """A name that distinguishes a piece from those that run beside it."""
         return str(self.requested(piece))
 
     def tables(self, rows: Sequence[R]) -> Mapping[str, Sequence[Record]]:
@@ -85,22 +87,22 @@ class Case(Generic[P, R]):
     def complaints(
         self, parameters: P, rows: Sequence[R], rejected: Sequence[R], advice: str
     ) -> list[str]:
-        """What is wrong with the rows that are there, in words; empty if nothing.
+        """Faults of the rows that are there, in words; empty if there are none.
 
-        advice: what the rejected ones came with.
+        advice: the advice that came with the rejected ones.
         """
         return [f"not a result: {self.named(rejected)}. {advice}"] if rejected else []
 
     def assumed(self, parameters: P, given: Collection[str]) -> list[str]:
-        """What results hang on and was not said, in words.  given: the keys that were."""
+        """Important values that were not given, in words.  given: the keys that were."""
         return []
 
     def warnings(self, parameters: P) -> list[str]:
-        """What is unusual about a run before it begins; it runs all the same."""
+        """Unusual settings of a run, told before it begins; it runs all the same."""
         return []
 
     def answer(self, parameters: P, rows: Sequence[R]) -> list[str]:
-        """What is asked of rows that are results first, in words, a line each."""
+        """The main results in words, a line each."""
         return []
 
     def titled(self, parameters: P) -> str:
@@ -108,15 +110,15 @@ class Case(Generic[P, R]):
         return self.title
 
     def foreword(self, parameters: P) -> list[str]:
-        """What a user should know of a run before it begins, a line each."""
+        """Lines that a user should read before the run begins."""
         return []
 
     def notes(
         self, rows: Sequence[R], advice: Mapping[float, str] = MappingProxyType({})
     ) -> list[str]:
-        """What is to be known of rows that are results, but not plain ones.
+        """Remarks on rows that are results with a reservation.
 
-        advice: what they came with, by their keys.
+        advice: advice of the rows by their keys.
         """
         return []
 
@@ -139,8 +141,10 @@ class Case(Generic[P, R]):
         return ()
 
     def share(self, parameters: P) -> tuple[float, str]:
-        """How long a run takes compared with others, and a name that is equal for those which can
-        use what the other leaves in the shared folder."""
+        """Duration of a run compared with others, and the name of what it can share.
+
+        Runs of one name can use each other's files in the shared folder.
+        """
         return 0.0, ""
 
 

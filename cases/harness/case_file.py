@@ -123,7 +123,7 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
 
 
 def read_toml(given: str, missing: str, allowed: str, known: Iterable[str] = ()) -> dict[str, Any]:
-    """What a TOML file holds; the words are for a file that is not there.  Raises BadInput."""
+    """Content of a TOML file; the words are for a file that is not there.  Raises BadInput."""
     try:
         return tomllib.loads(_text(Path(given)))
     except FileNotFoundError:
@@ -135,7 +135,7 @@ def read_toml(given: str, missing: str, allowed: str, known: Iterable[str] = ())
 
 
 def _text(path: Path) -> str:
-    """What a file holds.  Raises OSError, and ValueError for a file that is no text or too long."""
+    """Text of a file.  Raises OSError, and ValueError for a file that is no text or too long."""
     with path.open("rb") as file:
         content = file.read(_LARGEST + 1)
     if len(content) > _LARGEST:

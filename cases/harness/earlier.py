@@ -1,4 +1,4 @@
-"""What an earlier run left in a folder, and which of its rows can be believed.
+"""Results of an earlier run in a folder, and which of its rows are intact.
 
 A row is kept if `curve.csv` and `run.json` say the same of it, value by value, and its files are
 those that were written. Anything else is computed again, and the user is told.
@@ -49,18 +49,18 @@ class Earlier:
 
     @property
     def advice(self) -> dict[float, str]:
-        """What run.json says of rows that are kept, by their keys."""
+        """Advice in run.json on rows that are kept, by their keys."""
         return advice_of(self.content, self.rows)
 
     @property
     def stages(self) -> tuple[Any, ...]:
-        """What run.json says of its stages."""
+        """Stages as run.json records them."""
         stages = self.content.get("stages", ())
         return tuple(stages) if isinstance(stages, list) else ()
 
 
 def advice_of(content: Mapping[str, Any], rows: Sequence[Row]) -> dict[float, str]:
-    """What run.json says of rows whose verdict is not ok, by their keys."""
+    """Advice in run.json on rows whose verdict is not ok, by their keys."""
     found = {}
     for row in rows:
         name = row.key_column().name
@@ -71,7 +71,7 @@ def advice_of(content: Mapping[str, Any], rows: Sequence[Row]) -> dict[float, st
 
 
 def holds_a_run(folder: Path) -> bool:
-    """Whether there is anything of a run in a folder."""
+    """True if a folder holds anything of a run."""
     return any((folder / name).exists() for name in ("run.json", "curve.csv"))
 
 
@@ -124,7 +124,7 @@ def _states(content: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _difference(content: Mapping[str, Any], run: Run, version: str | None) -> str:
-    """What an earlier run has otherwise than this one, in words; empty if nothing."""
+    """Differences of an earlier run from this one, in words; empty if there are none."""
     if content.get("case") != run.case.name:
         return f"other parameters: case = {content.get('case')!r}, now {run.case.name!r}"
     before, now = content.get("parameters"), run.parameters.model_dump(mode="json")

@@ -8,7 +8,7 @@ from softehl.cases.harness.errors import BadInput
 
 @contextmanager
 def leading(engine: str, jobs: int) -> Iterator[bool]:
-    """Whether this process runs the case; those that do not have done their part by then.
+    """Yield True in the process that runs the case; the others have done their part by then.
 
     engine: "serial" or "petsc".  Raises BadInput where PETSc is missing, or for jobs beside it.
     """

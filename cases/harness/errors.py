@@ -1,10 +1,10 @@
-"""What the user gave cannot be used."""
+"""The error for input that cannot be used."""
 
 import click
 
 
 class BadInput(click.ClickException):
-    """What the user gave cannot be used; the message is one line.  Exit code 2."""
+    """Input that cannot be used; the message is one line.  Exit code 2."""
 
     exit_code = 2
 

@@ -1,4 +1,4 @@
-"""What a run writes beside its tables: columns of numbers, and fields on plane cells."""
+"""Files of a run beside its tables: columns of numbers, and fields on plane cells."""
 
 import hashlib
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ Content = Mapping[str, Array] | Cells
 
 
 def file_digest(path: Path) -> str:
-    """What tells a file from any other, 16 letters.  Raises OSError."""
+    """Digest of a file, 16 letters.  Raises OSError."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 

@@ -24,7 +24,7 @@ def unnamed_folder(first: Path, existing: Existing) -> tuple[Path, str]:
 
 
 def _is_free(folder: Path) -> bool:
-    """Whether nothing is there but hidden files, and no run is under way."""
+    """True if a folder has hidden files at most, and no run is under way in it."""
     if not folder.exists():
         return True
     try:

@@ -1,4 +1,4 @@
-"""What a case tells the outside while it runs, and what it hands back at the end.
+"""Messages of a case while it runs, and the outcome that it returns at the end.
 
 A case computes; it neither prints nor writes.  Everything that leaves it goes through an
 :class:`Observer`, at the moment it exists, so that a run that is killed keeps what it had reached.
@@ -30,12 +30,12 @@ class State:
 
 @dataclass(frozen=True)
 class StageRecord:
-    """What one stage of the path to the solutions cost.
+    """Cost of one stage of a run.
 
     residual_histories: for each converged step the norms Newton went through.  parameters: the path
     parameter of each of those steps.  factorisations: None where it is not known, because the run
-    was cut short.  where: what else tells this stage from others, as run.json has it.  method: how
-    it was solved, and why not faster if a faster way gave up.
+    was cut short.  where: further values that identify the stage, as run.json has them.  method:
+    the method that solved it, and why a faster one gave up if one did.
     """
 
     name: str
@@ -50,12 +50,12 @@ class StageRecord:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run reached; `status` and `message` say why it is not more, if it is not.
+    """States that a run reached; `status` and `message` say why it is not more, if it is not.
 
-    states: what the observer was told, in the words of the case.  unknowns: their numbers, "total"
+    states: as the observer was told them.  unknowns: their numbers, "total"
     and those of parts.  kernel_signatures: kernel name -> signature of the compiled kernel.
     solvers: "linear" -> the linear solver in use, "solver" -> the way that was asked for.
-    numbers: what else is to be known of the run as a whole, name with unit -> value.
+    numbers: further results of the run as a whole, name with unit -> value.
     stages: their cost; empty where the observer was told all that is to be recorded.
     """
 
@@ -70,7 +70,7 @@ class Outcome:
 
     @property
     def converged(self) -> bool:
-        """Whether every requested state was reached (whatever its verdict)."""
+        """True if every requested state was reached (whatever its verdict)."""
         return self.status is Status.CONVERGED
 
 
@@ -113,7 +113,7 @@ class Observer(Protocol):
         return None
 
     def draft(self, key: float, arrays: Mapping[str, Array]) -> None:
-        """What there is by now of a row that takes long, for a run that goes on from here.
+        """Keep the unfinished part of a row that takes long, for a run that goes on from here.
 
         Of a run in this process only, like `drafted`.
         """

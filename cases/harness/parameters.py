@@ -113,7 +113,7 @@ def _listed(kind: type[Parameters], name: str, value: object) -> object:
 
 
 def _item(kind: Any) -> Any:
-    """What a type is a list of, of any length; None if it is none."""
+    """Type of the items of a list of any length; None if the type is no list."""
     if get_origin(kind) is not tuple:
         return next(filter(None, map(_item, get_args(kind))), None)
     first, *rest = get_args(kind)
@@ -159,7 +159,7 @@ def key(
 
 
 def _values(kind: Any) -> str:
-    """What a type allows, in words, if it is one of a few values or a list of numbers."""
+    """Allowed values of a type in words, if it has a few values or is a list of numbers."""
     if kind is bool:
         return "true or false"
     if get_origin(kind) is tuple:

@@ -26,7 +26,7 @@ _HOW: Mapping[str, Mapping[str, Any]] = {
 def save(figure: "Figure", stem: Path, kinds: Sequence[str]) -> None:
     """Write a figure, each file at once or not at all, the same bytes every time.
 
-    What an earlier run left of the other kinds is no picture of this one.
+    Pictures of other kinds that an earlier run left are removed.
     """
     for kind in set(KINDS) - set(kinds):
         stem.with_suffix(f".{kind}").unlink(missing_ok=True)

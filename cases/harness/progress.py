@@ -1,4 +1,4 @@
-"""What the user sees while a case runs: a bar on a terminal, plain lines elsewhere, or nothing."""
+"""Progress of a case: a bar on a terminal, plain lines elsewhere, or nothing."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -139,7 +139,7 @@ class Bars(Display):
 def make_counter(done: int, total: int) -> Iterator[Callable[[], None]]:
     """Shows how many runs are done: a bar on a terminal, elsewhere a line now and then, on stderr.
 
-    What it gives is to be called after each run.
+    Yields a function to be called after each run.
     """
     console, last = Console(stderr=True), time.monotonic()
     columns = ("{task.completed} of {task.total} runs", BarColumn(), TimeRemainingColumn())

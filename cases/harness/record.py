@@ -47,7 +47,7 @@ _PACKAGES = (
 
 @dataclass
 class StageLog:
-    """What is known of a stage while it runs, for the record of a run that is cut short."""
+    """Data of a stage while it runs, for the record of a run that is cut short."""
 
     name: str
     where: Mapping[str, Any]
@@ -117,12 +117,12 @@ class RunRecord:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What of an earlier run could not be believed, and is computed again."""
+        """Rows of an earlier run that are not intact and are computed again."""
         return self._earlier.doubts
 
     @property
     def began(self) -> bool:
-        """Whether anything was written."""
+        """True if anything was written."""
         return self._began is not None
 
     def begin(self) -> None:
@@ -175,14 +175,14 @@ class RunRecord:
         write_arrays(self.folder / _DRAFT, {**arrays, _KEY: np.array([key])}, shared=False)
 
     def drafted(self, key: float) -> dict[str, Array] | None:
-        """What the earlier run that is resumed had of a row, None if nothing that can be read."""
+        """Unfinished part of a row of the run that is resumed, None if none can be read."""
         arrays = read_arrays(self.folder / _DRAFT) if self._earlier.content else None
         if arrays is None or arrays.pop(_KEY, np.empty(0)).tolist() != [key]:
             return None
         return arrays
 
     def set_outcomes(self, outcomes: Sequence[Outcome]) -> None:
-        """What is known only at the end: the size, the kernels and the cost of each stage."""
+        """Record what only the end of a run shows: size, kernels and cost of each stage."""
         for outcome in outcomes:
             if not outcome.kernel_signatures:
                 continue

@@ -41,7 +41,7 @@ def draw_responses(folder: Path, rows: Rows, keys: Mapping[str, str], kind: type
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What is drawn over a key.  keys: all that varied -> their units."""
+    """Results to be drawn over a key.  keys: all that varied -> their units."""
 
     key: str
     keys: Mapping[str, str]
@@ -136,10 +136,10 @@ def _is_known(value: Cell) -> bool:
 
 
 def _height(value: Cell) -> Cell:
-    """Where a result stands; one that is not there is not drawn."""
+    """Ordinate of a result; one that is not there is not drawn."""
     return nan if value == "" else value
 
 
 def _place(value: Cell) -> Cell:
-    """Where a value stands on the axis; words and lists side by side."""
+    """Abscissa of a value; words and lists stand side by side."""
     return float(value) if isinstance(value, int) else value

@@ -107,7 +107,7 @@ class Row(Record):
 
     @property
     def key(self) -> float:
-        """What tells this row from the others of its run: one of the values asked for."""
+        """Value that identifies this row in its run: one of those asked for."""
         return float(getattr(self, self.key_column().name))
 
     @classmethod
@@ -128,7 +128,7 @@ class Row(Record):
 
     @property
     def usable(self) -> bool:
-        """Whether this is a result; what is none goes to the folder `rejected`."""
+        """True for a result; other rows go to the folder `rejected`."""
         return True
 
     @property

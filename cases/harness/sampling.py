@@ -33,7 +33,7 @@ _SHARE = re.compile(r"(\+-\s*)?(?P<size>\d+(\.\d*)?([eE][-+]?\d+)?)\s*%")
 
 
 class Form(BaseModel):
-    """What a table of a study may hold."""
+    """Allowed content of a table of a study."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -191,7 +191,7 @@ def tolerance_points(table: Random, values: Mapping[str, Any], read: Read) -> Po
 
 
 def _tolerance(name: str, given: object, values: Mapping[str, Any], read: Read) -> Tolerance:
-    """What is behind `"key, other" = "15 %"`, a share of both, or `key = "0.05 mm"`."""
+    """Tolerance of a line `"key, other" = "15 %"`, a share of both, or `key = "0.05 mm"`."""
     where = f"[random] tolerances.{name} = {given!r}"
     keys = tuple(part.strip() for part in name.split(","))
     for key in keys:

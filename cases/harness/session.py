@@ -195,7 +195,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
 
 
 def _failures(outcomes: Sequence[Outcome]) -> list[str]:
-    """What the runs that stopped early say."""
+    """Messages of the runs that stopped early."""
     return [
         f"{outcome.status.value}: {' '.join(outcome.message.split())}"
         for outcome in outcomes

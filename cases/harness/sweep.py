@@ -50,7 +50,7 @@ class Curve:
 
     @property
     def converged(self) -> bool:
-        """Whether there is all that was asked for."""
+        """True if everything asked for is there."""
         return not self.complaints
 
 
@@ -62,7 +62,7 @@ def solve_all(
 ) -> list[Curve]:
     """Run every case with its parameters into the folder of its name; curves in the same order.
 
-    What runs leave for each other is in the shared folder of their case beside them.
+    Files that runs share are in the shared folder of their case beside them.
     """
     base = folder.absolute()  # a worker may have another working directory
     tasks = [
@@ -74,7 +74,7 @@ def solve_all(
 
 
 def shared_folder(case: AnyCase, base: Path) -> Path | None:
-    """Where the runs of a case below `base` leave something for each other, if they do."""
+    """Folder below `base` for the files that runs of a case share; None if they share none."""
     return base / case.shared if case.shared else None
 
 
@@ -112,9 +112,9 @@ def kept_task(task: Task) -> Curve:
 
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:
-    """Those first that take longest, and of these one of each that can use what others leave.
+    """Tasks in the order in which they begin: the longest first, one of each shared name.
 
-    Such curves at the same time would each compute it.
+    Two curves that begin together would both compute what they could share.
     """
     seen: Counter[str] = Counter()
     ranked: list[tuple[float, int, int]] = []
@@ -156,7 +156,7 @@ def _require_plain(name: object, case: AnyCase) -> None:
 
 
 def _name(case: AnyCase, parameters: Parameters) -> str:
-    """What is not at its default, as a folder name; BadInput if that is too long for one."""
+    """Folder name of the keys that are not at their defaults; BadInput if it is too long."""
     name = "-".join(differences(parameters, case.parameters(), case.ways)) or "default"
     if len(name) > _LONGEST:
         raise BadInput(f"a folder called {name} would be too long; allowed: a dict of named cases")
@@ -164,7 +164,7 @@ def _name(case: AnyCase, parameters: Parameters) -> str:
 
 
 def differences(parameters: Parameters, default: Parameters, but: Iterable[str]) -> list[str]:
-    """What is not as in `default`, as `key=value` for a folder name, but for some keys."""
+    """Keys that differ from `default`, as `key=value` for a folder name, but for some keys."""
     usual = default.model_dump()
     given = parameters.model_dump(exclude=set(but))
     return [f"{key}={_text(value)}" for key, value in given.items() if value != usual[key]]

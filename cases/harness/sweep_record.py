@@ -120,11 +120,11 @@ class SweepRecord:
         return rows
 
     def counts(self) -> dict[str, int]:
-        """How a run ended -> number of such runs."""
+        """Status at the end of a run -> number of such runs."""
         return dict(Counter(map(self.status, range(len(self.study.runs)))))
 
     def complaint(self) -> str:
-        """How many runs are not what was asked for, and what the first of them says."""
+        """Number of runs that are not as asked for, and the message of the first of them."""
         wrong = [n for n in range(len(self.study.runs)) if self.status(n) != "converged"]
         if not wrong:
             return ""
@@ -132,7 +132,7 @@ class SweepRecord:
         return f"{len(wrong)} of {len(self.study.runs)} runs did not converge; {first}"
 
     def status(self, number: int) -> str:
-        """How a run ended: converged, not converged, failed, not possible, or that it has not."""
+        """Status of a run: converged, not converged, failed, not possible, or not run."""
         curve = self.curves.get(number)
         if curve is None:
             return "not possible" if isinstance(self.study.runs[number], str) else "not run"
@@ -166,7 +166,7 @@ class SweepRecord:
         return holds_a_run(self.folder) or (self.folder / TABLE).exists()
 
     def _read(self) -> Mapping[str, Any]:
-        """What an earlier sweep says of itself, empty if it is overwritten.  Raises BadInput."""
+        """Record of an earlier sweep, empty if it is overwritten.  Raises BadInput."""
         if self._existing == "overwrite":
             return {}
         if self._existing == "refuse":

@@ -24,7 +24,7 @@ _DEFAULT = 15
 def print_rows(case: AnyCase, rows: Sequence[Row], rejected: Sequence[Row] = ()) -> None:
     """Print the rows to stdout, at full width where stdout is not a terminal.
 
-    Where a terminal is too narrow the last columns are left out, and named: digits never are.
+    On a narrow terminal the last columns are left out and named; digits are never cut.
     """
     console, left = Console(), 0
     width = console.width if console.is_terminal else 10 * _WIDTH

@@ -40,7 +40,7 @@ _KINEMATIC = ("cSt", "St", "mm2/s", "mm^2/s", "mm²/s", "m2/s")
 
 
 def is_quantity(text: str) -> bool:
-    """Whether a text is a number and something behind it."""
+    """True if a text is a number and something behind it."""
     return _QUANTITY.fullmatch(text) is not None
 
 

@@ -1,4 +1,4 @@
-"""What is no figure of the paper: verdict matrix, mesh study, shear traction, leakage, inverse."""
+"""Items beyond the paper: verdict matrix, mesh study, shear traction, leakage, inverse."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def _shear_setups(scope: Scope) -> list[ORing]:
 
 
 def shear(store: Store, scope: Scope) -> Product:
-    """What the shear stress (17) on the seal changes: deformation and h*."""
+    """Effect of the shear stress (17) on the deformation of the seal and on h*."""
     with_it, without = _shear_setups(scope)
     rows: list[list[Cell]] = []
     for u in both(scope.some_speeds()):

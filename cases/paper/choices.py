@@ -1,4 +1,4 @@
-"""What the paper chooses and does not show to be harmless: arc, cavitation, pressure order."""
+"""Choices that the paper does not show to be harmless: arc, cavitation, pressure order."""
 
 from __future__ import annotations
 

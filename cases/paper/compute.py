@@ -41,7 +41,7 @@ def _executor(jobs: int) -> AbstractContextManager[Executor | None]:
 
 
 def is_complete(request: Request, store: Store) -> bool:
-    """Whether a run has ended that was asked for all these speeds (reached or not)."""
+    """True if a run that was asked for all these speeds (reached or not) has ended."""
     earlier = _earlier(request, store)
     if earlier is None or earlier[0] not in ENDED or not _has_its_files(request, store):
         return False
@@ -52,7 +52,7 @@ def is_complete(request: Request, store: Store) -> bool:
 
 
 def _has_its_files(request: Request, store: Store) -> bool:
-    """Whether every file that run.json names is there: a lost one is computed again."""
+    """True if every file that run.json names is there: a lost one is computed again."""
     folder = store.run_folder(request.setup)
     content = read_json(folder / "run.json")
     rows = [*content.get("states", ()), *content.get("rejected", ())]
@@ -60,7 +60,7 @@ def _has_its_files(request: Request, store: Store) -> bool:
 
 
 def _run(request: Request, store: Store, resume: bool) -> Run:
-    """What to run: what is asked for, and what an earlier run was asked for if it is kept."""
+    """The run to be made: the speeds asked for, with those of an earlier run that is kept."""
     speeds = set(request.speeds)
     earlier = _earlier(request, store) if resume else None
     if earlier:

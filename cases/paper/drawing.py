@@ -139,7 +139,7 @@ def draw_line(axes: Axes, line: Line) -> None:
 
 
 def marks_words() -> str:
-    """What the marks of :func:`draw_line` mean."""
+    """Meaning of the marks of :func:`draw_line`."""
     return "Hollow markers: o = oscillating, u = under-resolved."
 
 

@@ -1,7 +1,7 @@
 """The inverse hydrodynamic theory as a cross-check of h*, from the largest inlet gradient of p.
 
-Where p is given, the Reynolds equation (14) with (16), dp/dx = 12 eta u (h - h*) / h^3, u = U/2, is
-an equation for h. Where (dp/dx) / eta is largest its right side is stationary in h, so h = 3/2 h*,
+For a given p, the Reynolds equation (14) with (16), dp/dx = 12 eta u (h - h*) / h^3, u = U/2, is
+an equation for h. At the largest (dp/dx) / eta its right side is stationary in h, so h = 3/2 h*,
 and with w = max |dp/dx| / eta
 
     w = 16 u / (9 h*^2),    h* = sqrt(8 |U| / (9 w)).

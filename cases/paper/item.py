@@ -1,4 +1,4 @@
-"""What a table or figure of the paper is here: the runs that it needs, and what is made of them."""
+"""A table or figure of the paper: the runs that it needs, and the product made of them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ STUDY_DENSITIES = DENSITIES[1:]
 
 @dataclass(frozen=True)
 class Scope:
-    """How finely and how widely to reproduce.
+    """Fineness and extent of a reproduction.
 
     density: mesh density, None = the default of each item; never finer than the paper's own.
     speeds: rod speeds |U| to be kept, None = all; where an item has none of them, it takes the
@@ -68,7 +68,7 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """What is written for an item.
+    """Tables and picture of an item.
 
     tables: file stem -> table. caption: text below the picture. draw: fills a figure of `size`
     inches, None for a table.
@@ -174,5 +174,5 @@ def both(speeds: Sequence[float]) -> list[float]:
 
 
 def with_all(base: ORing, **changes: object) -> ORing:
-    """The same parameters with some changed, checked again."""
+    """Copy of the parameters with some changed, checked again."""
     return ORing(**(base.model_dump() | changes))

@@ -1,4 +1,4 @@
-"""Where oscillations set in: the ripple of the film over speed, density, p_s and stroke."""
+"""Onset of oscillations: the ripple of the film over speed, density, p_s and stroke."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many points the film rules need: h* by the rules of Gauss and Lobatto with few of them."""
+"""Quadrature points of the film: h* by the rules of Gauss and Lobatto with few points."""
 
 from __future__ import annotations
 

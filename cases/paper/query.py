@@ -17,7 +17,7 @@ from softehl.runtime.arrays import Array
 
 @dataclass(frozen=True)
 class Finding:
-    """What was measured, in words, and whether the statement holds (None: not known)."""
+    """A measured value in words, and whether the statement holds (None: not known)."""
 
     text: str
     holds: bool | None
@@ -67,7 +67,7 @@ Measure = Callable[[Query], Finding]
 
 
 def all_hold(tests: Sequence[tuple[float, float]]) -> tuple[int, int]:
-    """How many of the pairs rise, and how many have both numbers."""
+    """Number of pairs that rise, and number of pairs that have both values."""
     known = [(a, b) for a, b in tests if isfinite(a) and isfinite(b)]
     return sum(a < b for a, b in known), len(known)
 

@@ -1,4 +1,4 @@
-"""What the paper states, with the number measured here, and whether it holds."""
+"""Statements of the paper, each with the number measured here and whether it holds."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

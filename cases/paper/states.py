@@ -68,7 +68,7 @@ class Request:
 
     @property
     def parameters(self) -> ORing:
-        """What `softehl run` takes; both strokes get the same speeds where both are needed."""
+        """Parameters for `softehl run`; both strokes get the same speeds if both are needed."""
         strokes = [
             stroke for stroke, sign in SIGNS.items() if any(sign * u > 0 for u in self.speeds)
         ]
@@ -111,12 +111,12 @@ class State:
 
     @property
     def usable(self) -> bool:
-        """Whether there are numbers to be shown, if only marked ones."""
+        """True if there are numbers to be shown, even if they are marked."""
         return self.row is not None and self.row.verdict != COLLAPSED
 
     @property
     def plain(self) -> bool:
-        """Whether this is a result without reservation."""
+        """True for a result without reservation."""
         return self.verdict == OK
 
     @property
@@ -146,11 +146,11 @@ class Store:
     _rows: dict[Path, list[FilmRow]] = field(default_factory=dict, repr=False)
 
     def run_folder(self, parameters: ORing) -> Path:
-        """Where the run of these parameters is or would be."""
+        """Folder of the run of these parameters, whether it exists or not."""
         return self.folder / Request(parameters, frozenset()).name
 
     def ended(self, parameters: ORing) -> bool:
-        """Whether the run of these parameters came to its end.  Raises OSError, ValueError."""
+        """True if the run of these parameters came to its end.  Raises OSError, ValueError."""
         path = self.run_folder(parameters) / "run.json"
         return path.exists() and read_json(path).get("status") in ENDED
 

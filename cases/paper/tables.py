@@ -65,7 +65,7 @@ def counted(p: ORing) -> tuple[int, int]:
 
 
 def unknowns(density: int) -> tuple[int, int]:
-    """The same of a mesh, m_p = 4."""
+    """Numbers of unknowns and of pressures of a mesh, m_p = 4."""
     return counted(setup(density, 1.0))
 
 

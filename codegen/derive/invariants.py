@@ -158,7 +158,7 @@ class _Search:
     def run(
         self, targets: Sequence[Node]
     ) -> tuple[dict[Node, _Recipe], list[Node], tuple[Node, ...]] | None:
-        """How each polynomial is made of which terms, and the named quadratic ones of these."""
+        """Recipe of each polynomial from its terms, and the named quadratic terms."""
         solved = [t for t in targets if self.degree[t] in (2, 4)]
         parts = [p for p in map(self.split, solved) if p is not None]
         fixed, direct = self._indispensable([t for t in targets if t not in solved])

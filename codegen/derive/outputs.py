@@ -1,4 +1,4 @@
-"""What a task computes: values, each with its row and column."""
+"""Outputs of a task: values, each with its row and column."""
 
 from __future__ import annotations
 
@@ -26,5 +26,5 @@ class Entry:
 
 
 def placed(entries: Sequence[Entry], roots: Sequence[Node]) -> list[Entry]:
-    """The same rows and columns with new values."""
+    """Entries with new values in the same rows and columns."""
     return [Entry(x.row, x.column, n) for x, n in zip(entries, roots, strict=True)]

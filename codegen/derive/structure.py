@@ -1,4 +1,4 @@
-"""What is found in a potential: linear forms of its unknowns, and quadratic values of these."""
+"""Structure of a potential: linear forms of its unknowns, and quadratic values of these."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def linear_forms(d: Definition) -> Structure | None:
 
 
 def quadratic_values(d: Definition, s: Structure) -> Structure:
-    """The same through named quadratic values of the forms: invariants where some suffice."""
+    """The structure through named quadratic values of the forms: invariants where some suffice."""
     g = d.graph
     reduced = through_invariants(g, [s.root], s.forms, s.constant)
     if reduced is not None:
@@ -69,7 +69,7 @@ def quadratic_values(d: Definition, s: Structure) -> Structure:
 
 
 def _left(new: Mapping[Node, Node], constant: Iterable[Node]) -> tuple[Node, ...]:
-    """What became of constant values; one that is now inside a named form needs no freezing.
+    """New nodes of the constant values; one that is now inside a named form needs no freezing.
 
     Forms have coefficients that do not depend on the unknowns.
     """
@@ -96,8 +96,8 @@ _PARTIAL = frozenset({Op.RECIP, Op.POW, Op.POWER, Op.SQRT, Op.CBRT, Op.RCBRT, Op
 def _guarded_coefficients(root: Node, sources: Sequence[Node]) -> bool:
     """True where a polynomial of the unknowns holds what has a value on one side of a branch only.
 
-    An interface would take such a coefficient out of its branch.  What is no polynomial, as the
-    logarithm of a volume ratio, stands above all interfaces and stays where it is.
+    An interface would take such a coefficient out of its branch.  Other values, such as the
+    logarithm of a volume ratio, stand above all interfaces and stay there.
     """
     unguarded = set(always([root]))
     degree = degrees([root], sources, ())

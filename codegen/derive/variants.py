@@ -20,7 +20,7 @@ SMALL = 100
 
 
 def tasks(d: Definition) -> list[str]:
-    """What a model offers: an energy only where the residual is its gradient, or what it chose."""
+    """Tasks that a model offers: those it chose; else all, an energy only for a potential."""
     offered: list[str] = [Task.RESIDUAL, Task.TANGENT]
     if d.conservative:
         offered.insert(0, Task.ENERGY)

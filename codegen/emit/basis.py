@@ -26,7 +26,7 @@ def gather(p: Printer, depth: int, value: str, array: str, before: int = 0) -> N
 
 
 def _shapes(d: Definition, mode: str) -> list[str]:
-    """Where the components of a shape function stand in the basis of a point."""
+    """Places of the components of a shape function in the basis of a point."""
     offsets = ["", *(f" + {k}" for k in range(1, d.components))]
     return [f"B[{d.components} * {mode}{offset}]" for offset in offsets]
 

@@ -1,9 +1,9 @@
 """Values of several elements at once as lines of C: one vector, one lane per element.
 
-What depends on parameters, the rule and the basis alone is the same in all lanes and stays a
-scalar.  A branch is computed where some lane wants it and blended by bits, so that nothing of the
-side that a lane does not take, not-a-number included, gets into it; where all lanes agree the
-other side is skipped.
+A value that depends on parameters, the rule and the basis alone is the same in all lanes and
+stays a scalar.  A branch is computed where some lane wants it and blended by bits, so that nothing
+of the side that a lane does not take, not-a-number included, gets into it; where all lanes agree
+the other side is skipped.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How many temporaries of a plan are live at once: what a compiler has to keep in registers.
+"""Number of temporaries of a plan that are live at once: a compiler keeps them in registers.
 
 Counted backwards over the statements in the plan's order.  A temporary is live from where it is
 computed to where it is last read on a path that is taken; constants and arguments are not

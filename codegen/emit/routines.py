@@ -69,7 +69,7 @@ class Body:
 
 
 def newton_values(r: Newton) -> tuple[list[Node], list[str]]:
-    """What every step of a local iteration computes, and where it goes."""
+    """Values of every step of a local iteration, and the variables that take them."""
     n, first = r.outputs, r.inputs - r.outputs
     slopes = [a for rows in (r.by_local, r.by_external) for row in rows for a in row]
     targets = [*(f"g[{i}]" for i in range(n)), *(f"A[{i}]" for i in range(n * n))]
@@ -77,7 +77,7 @@ def newton_values(r: Newton) -> tuple[list[Node], list[str]]:
 
 
 def rounding(r: Newton) -> str:
-    """What the rounding of its terms may change an equation by, relative to their sum."""
+    """Bound of the rounding of an equation, relative to the sum of its terms."""
     return number(r.inputs * sys.float_info.epsilon)
 
 

@@ -23,7 +23,7 @@ PART = 64
 
 
 def arranged_plan(g: Graph, plan: Schedule, roots: Sequence[Node]) -> Schedule:
-    """The same stages, every run of every block arranged."""
+    """The plan with every run of every block arranged."""
     work = _Runs(g, plan, roots)
     stages, computed = [], set[Node]()
     for stage in plan.stages:

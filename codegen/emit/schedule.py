@@ -1,4 +1,4 @@
-"""Where each value is computed: before the loop over points, in it, after it, inside a branch.
+"""Place of each computation: before the loop over points, in it, after it, inside a branch.
 
 A kernel is a sequence of stages.  A stage computes what does not vary with the point and is known
 by then, and then runs one loop over the points that feeds the sums of the next stage.  Inside a
@@ -236,7 +236,7 @@ def _place(nodes: Sequence[Node], ends: set[Node], group: dict[Node, int]) -> li
         members.setdefault(placement.path[n], []).append(n)
 
     def item(n: Node, path: Path, region: Path) -> Node | tuple[int, ...]:
-        """What stands for `n` (used or placed at `path`) among the statements of `region`."""
+        """Statement that stands for `n` (used or placed at `path`) in `region`."""
         if len(path) > len(region):
             return (path[len(region)][0],)
         return (group[n],) if n.op is Op.BRANCH else n

@@ -77,7 +77,7 @@ def _widths(d: Definition, task: str) -> dict[str, str]:
 
 
 def along_basis(x: Entry) -> bool:
-    """Whether an output is spread over the shape functions of an interpolated field."""
+    """True if an output is spread over the shape functions of an interpolated field."""
     return x.row.basis or (x.column is not None and x.column.basis)
 
 
@@ -243,7 +243,7 @@ class _Group:
             self.p.line(2, f"softehl_store{len(run)}({at}, {self.widths['values']}, {values});")
 
     def _finish(self) -> None:
-        """What does not vary, sums of the basis, and not-a-number where something failed."""
+        """Write values that do not vary, sums of the basis, and not-a-number after a failure."""
         p = self.p
         fixed = [x for x in self.entries if not x.node.varying]
         if self.task in abi.AT_POINTS and fixed:
@@ -292,7 +292,7 @@ def added_at_once(loop: Loop) -> dict[Node, list[tuple[Node, str, Node]]]:
 
 
 def _values(s: Statement) -> Sequence[Node]:
-    """What is known after a statement."""
+    """Values that are known after a statement."""
     if isinstance(s, If):
         return s.merged
     return [s if isinstance(s, Node) else s.old]

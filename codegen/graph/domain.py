@@ -1,4 +1,4 @@
-"""Where values exist: what is never negative, and what may be not-a-number for finite arguments.
+"""Domains of values: which are never negative, which may be not-a-number for finite arguments.
 
 Both answers are one-sided: True of `positive`, `nonnegative` and `exists` is certain, False is not.
 """
@@ -38,15 +38,15 @@ class Domain:
         self._fixed: dict[Node, bool] = {}
 
     def positive(self, n: Node, known: Known = frozenset()) -> bool:
-        """Whether a value, where it exists, is > 0."""
+        """True if a value, where it exists, is > 0."""
         return self._sign(n, known) == 2
 
     def nonnegative(self, n: Node, known: Known = frozenset()) -> bool:
-        """Whether a value, where it exists, is >= 0."""
+        """True if a value, where it exists, is >= 0."""
         return self._sign(n, known) >= 1
 
     def exists(self, n: Node, known: Known = frozenset(), depth: int = 0) -> bool:
-        """Whether a value is a number for all finite arguments (overflow apart)."""
+        """True if a value is a number for all finite arguments (overflow apart)."""
         key = (n, known)
         if key not in self._exist:
             self._exist[key] = depth < _DEEP and self._found(n, known, depth + 1)
@@ -63,7 +63,7 @@ class Domain:
         return n.op in EVERYWHERE or not n.args or self._allowed(n, known)
 
     def _allowed(self, n: Node, known: Known) -> bool:
-        """Whether the argument of a function lies in its domain."""
+        """True if the argument of a function lies in its domain."""
         a = n.args[0]
         match n.op:
             case Op.SQRT:
@@ -86,7 +86,7 @@ class Domain:
         return False
 
     def _given(self, n: Node) -> bool:
-        """Whether a value comes from parameters, data and constants alone."""
+        """True if a value comes from parameters, data and constants alone."""
         if n not in self._fixed:
             sources = {m.payload.array for m in reachable([n]) if isinstance(m.payload, Input)}
             called = any(m.op is Op.CALL for m in reachable([n]))
@@ -94,7 +94,7 @@ class Domain:
         return self._fixed[n]
 
     def propagates(self, otherwise: Node, a: Node) -> bool:
-        """Whether `otherwise` and its derivatives are not-a-number wherever `a` is."""
+        """True if `otherwise` and its derivatives are not-a-number wherever `a` is."""
         strict = set(reachable([otherwise], stop=lambda n: n.op is Op.BRANCH))
         cores = self._cores(a)
         wider = any(m.op in _WIDER for m in reachable(cores))
@@ -156,7 +156,7 @@ class Domain:
         return 0
 
     def _is_plain(self, n: Node) -> bool:
-        """Whether a value is a number where its operands are finite."""
+        """True if a value is a number for finite operands."""
         whole = n.op is Op.POW and n.payload in WHOLE
         product = n.op is Op.MUL and all(a.op is not Op.RECIP for a in n.args)
         return n.op in _PLAIN or whole or product
@@ -167,7 +167,7 @@ class Domain:
         return same and a.op is Op.NEG and a.args[0] is b
 
     def _says(self, c: Node, holds: bool = False) -> Known:
-        """What is positive where a condition holds, or where it does not."""
+        """Values that are positive if a condition holds, or if it does not."""
         if holds and c.op is Op.AND:
             return self._says(c.args[0], True) | self._says(c.args[1], True)
         if not holds and c.op is Op.OR:
@@ -183,7 +183,7 @@ class Domain:
 def decidable(
     g: Graph, domain: Domain, c: Node, otherwise: Node | None = None
 ) -> tuple[Node | None, list[Node]]:
-    """Where a condition is true or false, although it may compare what is not-a-number.
+    """Condition under which `c` is decidable, although it may compare a not-a-number.
 
     None: everywhere.  Also the differences of what is compared, for the comparisons that may not
     be decidable.  `a and b` is false where one of them is, whatever the other one is.

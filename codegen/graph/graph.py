@@ -9,7 +9,7 @@ A node *varies* when its value depends on the quadrature point; `SUM` adds its o
 points of the element and does not vary.
 
 A `CALL` runs a `Routine`, a function of its own with several results, on its operands; `ITEM`
-is one of the results.  How a routine is differentiated is the routine's affair.
+is one of the results.  The routine says how it is differentiated.
 """
 
 from __future__ import annotations

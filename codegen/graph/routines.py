@@ -35,8 +35,8 @@ class Local:
 def localise(g: Graph, values: Sequence[Node], unknowns: Sequence[Node]) -> Local:
     """Cut `values` off from the graph around them: what `unknowns` do not enter comes from outside.
 
-    What can be computed once, outside, is; but not across a branch, whose other side may have no
-    value there.
+    Values that can be computed once are computed outside, but not across a branch, whose other
+    side may have no value there.
     """
     inside, nodes = depends(values, unknowns), reachable(values)
     branched = any(n.op is Op.BRANCH for n in nodes)
@@ -318,7 +318,7 @@ def upper(i: int, j: int) -> int:
 
 
 def derivatives_of_energy(g: Graph, r: Isotropic) -> list[Node]:
-    """What the C function of order 0, 1 or 2 needs: w; w_a; w_a, then the rows of w_ab."""
+    """Values that the C function of order 0, 1 or 2 needs: w; w_a; w_a, then the rows of w_ab."""
     if r.order == 0:
         return [r.energy]
     c = [g.input("local", k) for k in range(3)]

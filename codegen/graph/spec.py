@@ -1,4 +1,4 @@
-"""What a legal graph is: an executable specification, run between passes in the tests."""
+"""Specification of a legal graph, executable: the tests run it between passes."""
 
 from __future__ import annotations
 

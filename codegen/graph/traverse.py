@@ -1,7 +1,7 @@
 """Walking a graph and building it anew: what lies below some roots, and roots of changed nodes.
 
 A model may name ten thousand intermediates, each made of the one before, and Python's stack does
-not hold as many calls.  What is recursive by nature is therefore written as a generator that
+not hold as many calls.  A recursive function is therefore written as a generator that
 yields its inner calls, and run by `recursion`, which keeps the stack in a list.
 """
 

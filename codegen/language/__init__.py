@@ -1,1 +1,1 @@
-"""What a model page is written in: the model, its symbols, kinematics, shapes and rules."""
+"""The language of model pages: the model, its symbols, kinematics, shapes and rules."""

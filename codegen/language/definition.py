@@ -20,7 +20,7 @@ class Argument:
 
 @dataclass(frozen=True)
 class Condition:
-    """What a parameter or datum must satisfy: `name relation bound`, and the page's line."""
+    """Condition on a parameter or datum: `name relation bound`, and the page's line."""
 
     name: str
     relation: str

@@ -33,7 +33,7 @@ class Entries:
         return Entries([value], [""], lambda v: v[0])
 
     def map(self, function: Callable[[Any], Any]) -> Entries:
-        """The same arrangement of other values."""
+        """Entries with other values in the same arrangement."""
         return Entries([function(v) for v in self.values], self.suffixes, self.arrange)
 
     def shaped(self) -> Any:

@@ -85,7 +85,7 @@ SUPPORTED = (
 def _decimal(e: sp.Float) -> Fraction:
     """The decimal as which a float was written, exactly.
 
-    What rounding has touched has more digits than anybody writes: 1 / 3, 0.1 + 0.2.
+    A result of rounding has more digits than anybody writes: 1 / 3, 0.1 + 0.2.
     """
     text = str(e)
     if not e.is_finite or sp.Float(text, precision=e._prec) != e:
@@ -312,6 +312,6 @@ class Lowering:
         return result
 
     def _choice(self, e: Any) -> Recursion[Node]:
-        """What SymPy makes of a condition on a branch: (c and a) or (not c and b)."""
+        """Condition on a branch as SymPy writes it: (c and a) or (not c and b)."""
         c, a, b = e.args
         return (yield self._lower(sp.Or(sp.And(c, a), sp.And(sp.Not(c), b))))

@@ -1,4 +1,4 @@
-"""How a model is written: declared symbols, named intermediates, one potential or weak form.
+"""The model of a page: declared symbols, named intermediates, one potential or weak form.
 
 A model page declares its arguments, writes its mathematics in SymPy, and ends with `potential` or
 `weak_form`.  Nothing is differentiated here; `codegen.pipeline` does that.
@@ -236,7 +236,7 @@ class Model:
         return found
 
     def history(self, **new: Any) -> None:
-        """What `point_data` become after a converged step: m.history(v_old=v).
+        """Declare new values of `point_data` after a converged step: m.history(v_old=v).
 
         Each is a field of the kernel, named new_v_old.
         """
@@ -252,7 +252,7 @@ class Model:
             self._history.append((name, self._lower(value)))
 
     def require(self, *conditions: Any) -> None:
-        """What parameters and data must satisfy, e.g. `mu > 0`; checked at every call.
+        """Require conditions on parameters and data, e.g. `mu > 0`; checked at every call.
 
         Each condition compares one parameter or datum with a number by <, <=, > or >=.
         """
@@ -317,7 +317,7 @@ class Model:
     def norm(self, values: Any) -> Any:
         """Length of a scalar, list or matrix: the root of the sum of its squares.
 
-        Where it is zero its derivatives are zero too, first and second: a direction that does not
+        If it is zero, its first and second derivatives are zero too: a direction that does not
         exist contributes nothing.  (Of lengths below 1e-154 the squares are zero.)
         """
         self._norms += 1
@@ -484,7 +484,7 @@ class Model:
         fields_rate: bool = False,
         derivatives: Sequence[Any] = (),
     ) -> None:
-        """What is generated: tasks by name, derivatives of the residual by argument.
+        """Choose what is generated: tasks by name, derivatives of the residual by argument.
 
         `tasks` are chosen among energy, residual, tangent (residual and tangent together), fields
         and product; left out, all but the product.  `product` adds the tangent times a vector.
@@ -511,8 +511,9 @@ class Model:
     def example(self, **values: float) -> None:
         """Values near which the model makes sense, by name; the check of its kernel starts there.
 
-        Names of parameters, data, unknowns (`u_x1`) and coordinates (`X1`).  What is not named is
-        about 1 (parameters, data), a few per cent (unknowns), the unit cell (coordinates).
+        Names of parameters, data, unknowns (`u_x1`) and coordinates (`X1`).  Values that are not
+        named are about 1 (parameters, data), a few per cent (unknowns), the unit cell
+        (coordinates).
         """
         unknown = set(values) - {str(s) for s, n in self._bound.items() if n.op is Op.INPUT}
         if unknown:

@@ -1,6 +1,6 @@
 """Named quantities as symbols through which SymPy differentiates and substitutes.
 
-What `Model.define` returns stands for an expression.  To SymPy a plain symbol would be a constant:
+The result of `Model.define` stands for an expression.  To SymPy a plain symbol would be a constant:
 `sp.diff(W, x)` of a W that uses a name of something with x in it would lose a term, and so would
 `subs`.  A `Name` follows its definition there, or refuses where it has none (a local unknown, an
 integral, ...).  `Written` does the same in another way, for the second reading of a page by which
@@ -226,17 +226,17 @@ class Written(sp.Expr):  # type: ignore[misc]
 
     @property
     def definition(self) -> Any:
-        """What the label stands for."""
+        """Expression that the label stands for."""
         return self.args[1]
 
     @property
     def func(self) -> Any:
-        """What SymPy calls with changed arguments: it is another quantity then, without a name."""
+        """Constructor that SymPy calls with changed arguments; its result has no name."""
         return lambda _, definition: definition
 
     @property
     def free_symbols(self) -> set[Any]:
-        """Those of the definition."""
+        """Free symbols of the definition."""
         if self._free is None:
             self._free = set(self.definition.free_symbols)
         return self._free

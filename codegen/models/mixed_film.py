@@ -1,10 +1,10 @@
 """Films that rupture, move and touch: void fraction, squeeze, roughness (docs/film-physics.md).
 
 Unknowns of a segment are displacements, pressures, and void fractions v = 1 - theta where the
-pressures stand. What flows between neighbours is that of a wedge, exactly: on a subcell from one
+pressures stand. The flux between neighbours is that of a wedge, exactly: on a subcell from one
 to the other the oil has the pressure `p_cell`, linear in between, and comes with the void fraction
-`v_out` of the one end at outstroke, `v_in` of the other at instroke. What the film bears is `p`,
-the polynomial through the pressures. A table of shape functions says so. The smooth pages are the
+`v_out` of the one end at outstroke, `v_in` of the other at instroke. The film bears `p`, the
+polynomial through the pressures. A table of shape functions says so. The smooth pages are the
 limit of the rough ones without roughness.
 """
 
@@ -32,7 +32,7 @@ from softehl.codegen.models.film import (
 
 @dataclass(frozen=True)
 class Surfaces:
-    """What the surfaces make of a thickness h, by (14) and (17) with flow factors.
+    """Effective thicknesses and factors of surfaces with a gap h, by (14) and (17).
 
     effective: thickness of flow and shear; content: mean gap; carried: thickness that a rod of
     unit mean speed carries along; effective_of: the first of them for another h; pressure_flow,

@@ -129,5 +129,5 @@ def carreau(m: Model) -> Flow:
 
 
 def more_fields(slope: Any, driving: Any) -> dict[str, Any]:
-    """What films of oils that thin tell besides: the p' of the same flux without thinning."""
+    """Additional field of films of oils that thin: the p' of the same flux without thinning."""
     return {} if driving is slope else {"driving": driving}

@@ -1,4 +1,4 @@
-"""What holds a ring that nothing else holds: mean rotation, mean axial place, a weak spring."""
+"""Supports of a ring that nothing else holds: mean rotation, mean axial place, a weak spring."""
 
 from __future__ import annotations
 

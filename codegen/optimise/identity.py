@@ -69,7 +69,7 @@ class _Values:
     rng: random.Random = field(default_factory=lambda: random.Random(0))
 
     def has_value_where(self, a: Node, b: Node) -> bool:
-        """Whether `a` has a value wherever `b` has one, as far as conditions tell."""
+        """True if `a` has a value wherever `b` has one, as far as conditions tell."""
         return self.conditions[a] & ~self.conditions[b] == 0
 
     def add(self, n: Node) -> None:

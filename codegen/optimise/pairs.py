@@ -84,7 +84,7 @@ def _unsigned(value: Node) -> tuple[Node, int]:
 
 
 class _Pairs:
-    """How many rows share each pair of terms."""
+    """Numbers of rows that share each pair of terms."""
 
     def __init__(self, g: Graph, rows: Sequence[Row], at: dict[Node, set[int]]) -> None:
         self.g, self.rows, self.at = g, rows, at

@@ -62,7 +62,7 @@ class Batch:
         return (wide, values), (square, tangent), lambda: function(*arguments)
 
     def direction(self, task: str, e: int) -> Vector:
-        """What a task follows in one element: its unknowns, or a random variation of all else."""
+        """Direction of a task in one element: its unknowns, or a random variation of all else."""
         if task not in (abi.Task.PSEUDO_LOAD, abi.Task.FIELDS_RATE):
             return self.along[e]
         state = self.states[e]
@@ -73,7 +73,7 @@ class Batch:
         return varied + (self.along[e] if task == abi.Task.FIELDS_RATE else [])
 
     def silent(self, task: str, *, first: bool = False) -> bool:
-        """Whether a model with routines is not-a-number in a whole element: its way to say no.
+        """True if a model with routines is not-a-number in a whole element, which says no.
 
         In any element, or in the first one.
         """

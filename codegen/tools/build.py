@@ -63,7 +63,7 @@ def signature(directory: Path) -> str:
 
 
 def intact(directory: Path) -> bool:
-    """Whether the library there is whole and was built from the sources there; never loads it."""
+    """True if the library there is whole and was built from the sources there; never loads it."""
     try:
         data = (directory / LIBRARY).read_bytes()
         told = (directory / DIGEST).read_text(encoding="ascii").split()
@@ -124,7 +124,7 @@ def tuned() -> tuple[tuple[str, ...], str]:
 
 
 def identification(flags: Sequence[str] = FLAGS) -> str:
-    """What the compiler says of itself, the flags and the processor they compile for.
+    """Identification of the compiler, the flags and the processor they compile for.
 
     Its predefined macros hold all of that, the instruction set of -march=native included.
     """
@@ -167,7 +167,7 @@ def _called(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
 
 
 def _processors() -> int:
-    """How many processors this process may use."""
+    """Number of processors that this process may use."""
     allowed = getattr(os, "sched_getaffinity", None)  # not on macOS
     return len(allowed(0)) if allowed else os.cpu_count() or 1
 

@@ -10,7 +10,7 @@ else ~/.cache/softehl.  It may be deleted at any time.  It holds
 Everything is made under a temporary name in the same folder and moved into place in one step, so
 no reader waits and nothing is ever half there.  Of two processes that make the same thing one waits
 for the other while that lives; this only spares work, and is left out where files have no locks.
-What a killed process leaves behind is a temporary folder, removed a day later.
+A killed process leaves a temporary folder behind, which is removed a day later.
 """
 
 from __future__ import annotations

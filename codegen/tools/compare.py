@@ -40,12 +40,12 @@ LOST = 1e-6
 
 @dataclass
 class Report:
-    """What the check of one kernel found.
+    """Result of the check of one kernel.
 
     errors: the largest of each task. compared: states. unreal, unsolved, unclear: states left out
     because the page has no real value there, a local iteration has no solution, or doubles cannot
-    hold the result. missing: what no state met, in words; tasks: those that were compared at no
-    state. late: whether time was short.
+    hold the result. missing: conditions that no state met, in words; tasks: those that were
+    compared at no state. late: whether time was short.
     """
 
     errors: dict[str, float] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class Report:
     late: bool = False
 
     def told(self, seconds: float) -> str:
-        """How far the check went, in one line."""
+        """Extent of the check, in one line."""
         left = {
             "without a real value": self.unreal,
             "without a local solution": self.unsolved,
@@ -236,7 +236,7 @@ class _View:
         return [[K[n * i + j] * w[j] for j in range(n)] for i in range(n)]
 
     def expected(self, task: str, page: Page) -> Vector:
-        """The same values of the page."""
+        """Values of the page, in the order of the kernel."""
         key = (id(page), task)
         if key not in self._known:
             self._known[key] = [_double(v) for v in self._expected(task, page)]
@@ -269,7 +269,7 @@ class _View:
         return self.called.direction(task, self.e)
 
     def scales(self, task: str, exact: Vector) -> Vector:
-        """What errors are relative to."""
+        """Reference sizes of errors."""
         if task == abi.Task.ENERGY:
             work = max(map(abs, self.expected(abi.Task.RESIDUAL, self.page)))
             size = max(abs(exact[0]), work * max(abs(float(u)) for u in self.page.state.dofs))

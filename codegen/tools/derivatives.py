@@ -1,4 +1,4 @@
-"""What the tasks of a kernel compute, by differences of the values of a page as written."""
+"""Results of the tasks of a kernel, by differences of the values of a page as written."""
 
 from __future__ import annotations
 

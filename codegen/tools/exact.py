@@ -86,7 +86,7 @@ class Evaluator:
 
 
 def _function(s: Step, n: Exact) -> Function | None:
-    """What is done with the operands of a step."""
+    """Function of the operands of a step."""
     plain: dict[str, Function] = {
         "<": operator.lt,
         "<=": operator.le,
@@ -237,7 +237,7 @@ class Evaluation:
     def _with(
         self, s: Step, q: int, slots: Sequence[int], values: Vector, wanted: Sequence[int]
     ) -> Vector:
-        """What `wanted` is where `slots` of point q have other values, by the inner operations."""
+        """Values of `wanted` if `slots` of point q have other values, by the inner operations."""
         inner = self.evaluator.inner(s)
         whole = any(o.step.name == "integral" for o in inner)
         rows = self.rows if whole else self.rows[q : q + 1]
@@ -278,7 +278,7 @@ class Evaluation:
         return max(map(abs, found))
 
     def real(self) -> bool:
-        """Whether potentials and fields have real values."""
+        """True if potentials and fields have real values."""
         page = self.evaluator.program
         try:
             for slot, _ in page.potentials:

@@ -6,7 +6,7 @@ stays sound at large strain. Steered states make the page change its behaviour: 
 met on both sides, far from it and near it, and the argument of each function that saturates or
 repeats is below -4, near 0 and above 4 (beyond pi; tanh, erf and exp are constant there to 2 %).
 They are found by a line search in doubles: along the argument by which a condition changes most,
-then by bisection. What was found nowhere is `missing`.
+then by bisection. Conditions that were found nowhere are `missing`.
 """
 
 from __future__ import annotations
@@ -345,7 +345,7 @@ _RELATIONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": opera
 
 
 def _allowed(d: Definition, s: State) -> bool:
-    """Whether the page's own conditions on parameters and data hold."""
+    """True if the page's own conditions on parameters and data hold."""
     named = {a.name: v for a, v in zip(d.parameters, s.parameters, strict=True)}
     named |= {a.name: v for a, v in zip(d.data, s.data, strict=True)}
     return all(_RELATIONS[c.relation](named[c.name], c.bound) for c in d.conditions)

@@ -66,7 +66,7 @@ def write_target(paths: Sequence[Path], target: Target, out: Path | None) -> int
 
 
 def default_folder(path: Path) -> Path:
-    """Where the kernels of a model file go."""
+    """Folder for the kernels of a model file."""
     return path.parent / "generated" / path.stem
 
 
@@ -100,7 +100,7 @@ def _reports(
     made: library.Library,
     seconds: float,
 ) -> tuple[dict[str, verify.Report], list[str]]:
-    """What the check of each kernel found, and why some kernels could not be checked."""
+    """Reports of the check of each kernel, and reasons why some could not be checked."""
     written = {name: d for p in paths for name, d in user.written_out(p, seconds / 4).items()}
     reports, unchecked = {}, []
     for d in definitions:

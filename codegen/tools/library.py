@@ -167,7 +167,7 @@ def _counts(f: Field[Any]) -> bool:
 def _entries(value: Any, shown: Callable[[Node], str]) -> str:
     """A value as text, nodes as `shown`.
 
-    What a record notes for itself (_name) or does not compare does not count.
+    Fields that a record keeps for itself (_name) or does not compare are left out.
     """
     from softehl.codegen.graph.graph import Graph, Node
 

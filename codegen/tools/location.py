@@ -1,6 +1,6 @@
-"""Where the user's cache is, and whether what lies in it may be run.
+"""Place of the user's cache, and whether its content may be run.
 
-What is in the cache is code: one that belongs to somebody else, or that others may write to, is not
+The cache contains code. A cache that belongs to somebody else, or that others may write to, is not
 used.
 """
 
@@ -65,7 +65,7 @@ def fault(folder: Path) -> str:
 
 
 def wanted() -> Path:
-    """Where the cache is to be.  Raises `CacheError` where there is no home folder."""
+    """Wanted place of the cache.  Raises `CacheError` where there is no home folder."""
     chosen = os.environ.get("SOFTEHL_CACHE")
     try:
         if chosen:

@@ -2,7 +2,7 @@
 
 Without further words: nodes on the unit cell (a line, square, cube, triangle, tetrahedron, moved
 by 1 from every axis, so that it is a ring in axisymmetry too) and slightly off it, unknowns of a
-few per cent, parameters and data (of points, too) about 1.  What a model's `example` gives is used
+few per cent, parameters and data (of points, too) about 1.  Values of a model's `example` are used
 instead, also varied by a few per cent.  A state is admissible if the potential and the fields are
 real numbers there: no logarithm or root of something negative, no division by zero.
 """

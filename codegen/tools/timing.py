@@ -1,4 +1,4 @@
-"""How long a compiled kernel takes for one element, measured where it was compiled."""
+"""Time of a compiled kernel for one element, measured where it was compiled."""
 
 from __future__ import annotations
 

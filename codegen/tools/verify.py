@@ -62,7 +62,7 @@ def check(
     """Compare one kernel with its page; NoStateError if no admissible state is found.
 
     The page is `written`, the same one with its names written out (`user.written_out`), if there
-    is one. Where it gives a derivative of its own, only energy and fields can be compared.
+    is one. If it gives a derivative of its own, only energy and fields can be compared.
     """
     start = perf_counter()
     tasks = [t for t in tasks if not definition.given or t in (abi.Task.ENERGY, abi.Task.FIELDS)]
@@ -90,7 +90,7 @@ def check(
 
 
 def culprit(d: Definition, task: str) -> str | None:
-    """What has no value in a task whose result is not a number, for the author of the page."""
+    """Expression without a value in a task whose result is not a number, for the page's author."""
     slopes = gradient(d.graph, d.potential, d.directions, constant=d.constant, given=d.given)
     states = samples.admissible(d, BATCH)
     for nodes in ([slopes[u] for u in d.directions], [x.node for x in outputs(d, task)]):

@@ -1,7 +1,7 @@
 """A page as written, as a list of operations: each SymPy expression once, operands first.
 
 This is made from the expressions that `language.record` has noted, not from the graph of the
-compiler. What the operations mean is in `tools.exact`; here is only their order, and what each
+compiler. `tools.exact` defines the operations; here is only their order, and what each
 depends on: points, arrays of arguments, local unknowns.
 """
 
@@ -44,7 +44,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Switch:
-    """Where a page changes its behaviour: at `slot` > `other`, as the page has it in `text`."""
+    """Switch of a page's behaviour at `slot` > `other`, as the page has it in `text`."""
 
     slot: int
     other: int | None
@@ -96,7 +96,7 @@ def program(d: Definition) -> Program:
 
 
 def _changes(p: Program, s: Switch) -> bool:
-    """Whether a switch depends on arguments, and on no local unknowns."""
+    """True if a switch depends on arguments, and on no local unknowns."""
     operands = [p.steps[k] for k in (s.slot, s.other) if k is not None]
     return not any(x.locals for x in operands) and any(x.depends or x.varying for x in operands)
 

@@ -49,7 +49,7 @@ def main(names: list[str]) -> None:
 
 @contextlib.contextmanager
 def namespace(entry: str) -> Iterator[dict[str, Any]]:
-    """What the blocks of an entry leave behind, in the folder in which they were run."""
+    """Namespace that the blocks of an entry leave, in the folder in which they were run."""
     reader = Reader(HERE / "models")
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for block in blocks((HERE / f"{entry}.md").read_text(encoding="utf-8")):

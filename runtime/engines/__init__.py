@@ -1,1 +1,1 @@
-"""Where a study is solved: in this process, or by PETSc on all processes that mpirun started."""
+"""Engines that solve a study: this process, or PETSc on all processes of mpirun."""

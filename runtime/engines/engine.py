@@ -1,4 +1,4 @@
-"""What a study asks of an engine, and the engines by name."""
+"""The interface between a study and its engine, and the engines by name."""
 
 from __future__ import annotations
 

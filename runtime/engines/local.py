@@ -17,7 +17,7 @@ from softehl.runtime.system import System
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What a process has.
+    """Part of a study that one process has.
 
     system: its part of the equations, in local numbers. unknowns: (m,) number of each of its
     unknowns in the whole system, rising. elements: block -> number of each of its elements.

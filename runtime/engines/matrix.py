@@ -212,5 +212,5 @@ class Solver:
 
 
 def _words(error: BaseException) -> str:
-    """What PETSc says in the end, after the calls that led there."""
+    """Message of PETSc's error, after the calls that led there."""
     return " ".join(str(error).split()).rsplit("] ", 1)[-1]

@@ -41,7 +41,7 @@ def main_blocks(system: System) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """What is cut into parts: the cells of the main blocks, each once.
+    """Cells to be cut into parts: those of the main blocks, each once.
 
     nodes: for each kind (n, k). rows: block -> number of the cell of each element.
     """

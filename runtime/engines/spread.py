@@ -20,7 +20,7 @@ from softehl.runtime.mpi import world
 
 @dataclass(eq=False)
 class Team:
-    """What the processes share through a whole path: how vectors are exchanged, and the matrix.
+    """Objects that the processes share through a whole path: exchange of vectors, and the matrix.
 
     tangent: of the latest set of prescribed unknowns. reach, counts: see `Assembler`, of own
     unknowns.
@@ -50,7 +50,7 @@ class Team:
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """What Newton's method is given as a matrix, and asks for a solution."""
+    """Matrix and solver of Newton's method on all processes."""
 
     tangent: Tangent
     solver: Solver
@@ -67,7 +67,7 @@ class Distributed:
     name: str = "petsc"
 
     def factorise(self, K: Any) -> Factors:
-        """What is given is what solves."""
+        """The matrix itself, which can solve."""
         assert isinstance(K, Factors)
         return K
 
@@ -214,5 +214,5 @@ class Spread:
 
 
 def _first(words: str) -> str:
-    """What the first process says that says anything."""
+    """Words of the first process that has any."""
     return next((w for w in world().allgather(words) if w), "")

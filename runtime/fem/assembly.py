@@ -26,7 +26,7 @@ _SETS = 4  # sets of prescribed unknowns that are remembered
 
 
 class ElementKernel(Protocol):
-    """What assembly needs of a compiled kernel; arrays are batched over n elements."""
+    """Interface of a compiled kernel to assembly; arrays are batched over n elements."""
 
     @property
     def name(self) -> str:
@@ -183,7 +183,7 @@ class ElementBlock:
 
 @dataclass(eq=False)
 class Memo:
-    """What assembly has computed before and may be asked for again: it saves time only.
+    """Results of assembly that may be needed again; they only save time.
 
     tangents: block name -> the latest parameters of a constant tangent, the positions of its
     entries and their values. crosses: prescribed unknowns -> see `Assembler.cross`. counts: names
@@ -286,7 +286,7 @@ class Assembler:
         return np.flatnonzero(self.counts(names) == 0)
 
     def counts(self, names: Iterable[str]) -> Integers:
-        """How many elements of the blocks of these names have each unknown, (size,)."""
+        """Number of elements of the blocks of these names that have each unknown, (size,)."""
         key = frozenset(names)
         if key not in self.memo.counts:
             found = np.zeros(self.size, dtype=np.int64)
@@ -310,7 +310,7 @@ class Assembler:
     def reach(self) -> Array:
         """Largest coordinate of the elements that each unknown occurs in, (size,).
 
-        Where kernels add displacements to coordinates, a displacement is lost in the rounding of
+        Kernels that add displacements to coordinates lose a displacement in the rounding of
         this number.
         """
         if self.memo.reach is None:

@@ -1,4 +1,4 @@
-"""What is wrong with a problem, named: parameters, prescribed values, elements, unknowns."""
+"""Checks of a problem that name the fault: parameters, prescribed values, elements, unknowns."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def element_name(block: ElementBlock, row: int) -> str:
 
 
 def unknown_name(blocks: Iterable[ElementBlock], number: int) -> str:
-    """What an unknown is in an element of the blocks; empty if none has it."""
+    """Name of an unknown by an element of the blocks; empty if none has it."""
     for block in blocks:
         rows, columns = np.nonzero(block.dofs == number)
         if not len(rows):

@@ -1,4 +1,4 @@
-"""How a problem changes when its elements and parameters do: pseudo-loads, gradients of fields.
+"""Derivatives of a problem by its elements and parameters: pseudo-loads, gradients of fields.
 
 A variation says of every block how the coordinates and data of its elements and its parameters
 move, and how prescribed values do. With dq = q_x dx + q_v and K dx = -load(v), sensitivities follow
@@ -35,7 +35,7 @@ class Inputs:
 
     @classmethod
     def of(cls, problem: Problem) -> Inputs:
-        """Those of a problem."""
+        """Inputs of a problem."""
         rows = {
             b.name: _rows(b, problem.parameters[b.name])
             for b in problem.assembler.blocks
@@ -54,8 +54,8 @@ def _rows(block: ElementBlock, parameters: Array) -> Array:
 
 def rate_of(inputs: Callable[[float], Inputs], step: float, degree: int = 4) -> Inputs:
     """d inputs / ds at s = 0 by the central difference that is exact for polynomials of this
-    degree, 2 or 4: then only rounding is left, however wide the step is. What does not move has
-    no rate, to the last bit.
+    degree, 2 or 4: then only rounding is left, however wide the step is. Inputs that do not move
+    have no rate, to the last bit.
     """
     pairs = [(inputs(k * step), inputs(-k * step)) for k in (1, 2)[: degree // 2]]
     names = pairs[0][0].blocks

@@ -17,7 +17,7 @@ AXES = ("x", "y", "z", "r")
 
 @dataclass(frozen=True)
 class DofLayout:
-    """Where each named field lives in the vector of unknowns.
+    """Places of the named fields in the vector of unknowns.
 
     names, counts: fields in the order in which they are numbered.
     """

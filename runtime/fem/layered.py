@@ -53,7 +53,7 @@ class Layer:
 
     @cached_property
     def cut(self) -> Cut:
-        """Where the entries of the tangent go."""
+        """Places of the entries of the tangent in the cut matrix."""
         pattern = self.assembler.pattern
         return Cut.of(pattern.indptr, pattern.indices, len(self.shared), self.size)
 

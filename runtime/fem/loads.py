@@ -32,7 +32,7 @@ def amount(value: Amount, places: Array, t: float, factor: float) -> Array:
 
 
 class _Kernel:
-    """What the kernels of this module share: no data, no fields."""
+    """Base of the kernels of this module: no data, no fields."""
 
     name = ""
     signature = "built in"

@@ -1,4 +1,4 @@
-"""How far equations are from being fulfilled, as one number without a unit.
+"""Measure of the residual as one number without a unit.
 
 Two things must be small. Every equation by itself: its residual relative to what cancels in it,
 which is the contributions of its elements and loads, and the tangent's entries times the unknowns.
@@ -75,10 +75,10 @@ def size(squares: Array, worst: float) -> float:
 
 
 def is_lost(largest: float, known: float, noise: float, size: float) -> bool:
-    """Whether the largest unknown is far from what is known of the problem, and rounding (noise)
-    as large as the loads and internal forces (size).
+    """True if the largest unknown is far beyond the known ones and rounding hides the loads.
 
-    Where a body floats, a tangent that rounding alone keeps regular moves it by any amount.
+    noise: the rounding. size: the loads and internal forces. If a body floats, a tangent that
+    rounding alone keeps regular moves it by any amount.
     """
     return largest > _FAR * known > 0.0 and noise > _SWAMPED * size
 

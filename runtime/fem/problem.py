@@ -1,7 +1,7 @@
 """A nonlinear problem: assembled blocks, prescribed unknowns, reference sizes, and guards.
 
-It satisfies the solvers' `MeasuredProblem` and `NamedProblem`. What continuation changes are
-parameters, prescribed values and guards: `with_parameters` and `with_fixed` give another problem on
+It satisfies the solvers' `MeasuredProblem` and `NamedProblem`. Continuation changes parameters,
+prescribed values and guards: `with_parameters` and `with_fixed` give another problem on
 the same assembler.
 """
 
@@ -114,7 +114,7 @@ class Problem:
     def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
         """R(x), (n,), and K = dR/dx, (n, n), with prescribed unknowns eliminated.
 
-        Where x does not yet have the prescribed values, their influence on the other equations
+        If x does not yet have the prescribed values, their influence on the other equations
         is moved into R, so that -K^-1 R is the exact Newton step of the whole system.
         """
         return self.linearise_with(x, None)
@@ -193,7 +193,7 @@ class Problem:
         return float(np.linalg.norm([a / (b or 1.0) for a, b in sizes]))
 
     def _terms(self, magnitudes: Array, K: csc_array[np.float64]) -> Array:
-        """What cancels in each equation, (n,), where unknowns have these magnitudes, (n,).
+        """Terms that cancel in each equation, (n,), for unknowns of these magnitudes, (n,).
 
         An entry of K may itself be what is left of larger numbers, of which sqrt(K_ii K_jj) is a
         bound wherever an energy is convex (Cauchy and Schwarz).
@@ -219,7 +219,7 @@ class Problem:
         return self.norm(np.maximum(np.abs(r) - noise, 0.0))
 
     def _is_lost(self, x: Array, forces: Array, K: csc_array[np.float64]) -> bool:
-        """Whether unknowns have grown until rounding is as large as the loads."""
+        """True if unknowns have grown until rounding is as large as the loads."""
         reach = self.assembler.reach()
         noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + reach))
         known = max(float(reach.max()), float(np.abs(self.values).max(initial=0.0)))

@@ -29,7 +29,7 @@ class Slot:
 
 
 def slots(kernel: Kernel) -> tuple[Slot, ...]:
-    """What each unknown of a kernel is: what its page says, else what the names do."""
+    """Field and node of each unknown of a kernel, by its page, else by the names."""
     if kernel.places:
         return tuple(Slot(name, node) for name, node in kernel.places)
     return from_names(kernel.unknowns, kernel.nodes)

@@ -1,1 +1,1 @@
-"""What a study has been told: pages on elements, supports, loads, values at the start."""
+"""Statement of a study: pages on elements, supports, loads, values at the start."""

@@ -25,7 +25,7 @@ def finite(name: str, value: object) -> float:
 
 
 def amount(words: str, name: str, value: Amount) -> Amount:
-    """What is prescribed or loaded: a number, or a function of (x, t) whose values are looked at.
+    """A prescribed value or load: a number, or a function of (x, t) whose values are checked.
 
     words: the call, for messages. Raises StudyError.
     """

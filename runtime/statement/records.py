@@ -23,7 +23,7 @@ Datum: TypeAlias = float | Array | Callable[[Array], Array]
 
 
 class StudyError(ValueError):
-    """What was asked of a study cannot be; the message says what was given and what is allowed."""
+    """A request that a study cannot meet; the message says what was given and what is allowed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Condition:
 
     @property
     def words(self) -> str:
-        """What was asked for, for messages."""
+        """The request in words, for messages."""
         return f"fix({shown(self.where)}, {self.name}=...)"
 
 
@@ -95,7 +95,7 @@ class Statement:
 
     @property
     def count(self) -> int:
-        """How many things have been said; it only grows."""
+        """Number of statements; it only grows."""
         return sum(map(len, (self.blocks, self.conditions, self.forces, self.start)))
 
     def prescribed(self, name: str) -> Integers:

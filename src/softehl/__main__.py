@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code.  What is wrong is said in one line on stderr."""
+    """The command line; returns the exit code.  An error is one line on stderr."""
     import click
 
     # One thread a process, before NumPy is loaded: the systems are small, the runs are parallel.
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _hint(error: "click.ClickException") -> str:
-    """How keys are set, where a command that has some was given what looks like one."""
+    """Hint at `--set`, for a word on the command line that looks like a key."""
     import click
 
     if not isinstance(error, click.UsageError) or error.ctx is None:

@@ -98,7 +98,7 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part]) -> str:
 
 
 def _title(runs: Sequence[FinishedRun]) -> str:
-    """What the runs are, each kind once."""
+    """Title that names the runs, each kind once."""
     return "; ".join(dict.fromkeys(run.case.titled(run.parameters) for run in runs))
 
 

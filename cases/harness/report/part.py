@@ -1,4 +1,4 @@
-"""What a report is made of; a case adds parts of its own, the page puts them one below another."""
+"""Parts of a report; a case adds parts of its own, the page puts them one below another."""
 
 from __future__ import annotations
 
@@ -56,5 +56,5 @@ class FinishedRun:
 
     @property
     def name(self) -> str:
-        """What it is called in a report."""
+        """Name of the run in a report."""
         return self.folder.resolve().name

@@ -190,7 +190,7 @@ def of(nodes: int, dimension: int) -> tuple[Element, quadrature.Region] | None:
 
 
 def foreign(rule: QuadratureRule, nodes: int) -> str:
-    """What is wrong where a rule is that of another cell than the one with so many nodes."""
+    """Message for a rule of another cell than the one with so many nodes."""
     mine = of(nodes, rule.dimension)
     if mine is None or mine[1].fits(rule):
         return ""

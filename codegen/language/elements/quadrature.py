@@ -39,7 +39,7 @@ class Region:
     rule: str
 
     def fits(self, rule: QuadratureRule) -> bool:
-        """Whether all points lie in it and the weights sum to its measure."""
+        """True if all points lie in it and the weights sum to its measure."""
         points = [[float(x) for x in p] for p in rule.points]
         inside = all(self._holds(p) for p in points)
         return inside and abs(sum(map(float, rule.weights)) - float(self.measure)) < _SLACK
