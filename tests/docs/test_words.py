@@ -41,6 +41,9 @@ HISTORY = (
 SAMPLES = r"\b([Gg]lands?|X-rings?|U-cups?|[Tt]rapezoids?) (#|no\. |number )?\d+\b(?!\.\d)"
 """Numbers of glands and seals in a sample, which only pages of measurements may name."""
 
+ROUTES = ("weighting", "rod approach", "emptied groove", "speed path", "falling speed")
+"""Stages of a solution path, which only the page of the paper may describe."""
+
 CLAUSES = re.compile(r"(What|Where|Whether|How|That of|The same|Those)\b")
 """Beginnings of docstrings that say what a thing is by a clause instead of by its name."""
 
@@ -79,6 +82,13 @@ def test_numbers_of_glands_are_in_validation_alone() -> None:
         assert [match[0] for match in re.finditer(SAMPLES, text)] == [], is_named(path)
     assert re.search(SAMPLES, "as of gland 71 or of X-ring no. 3")
     assert not re.search(SAMPLES, "300 glands, a gland 3.2 mm high")
+
+
+def test_pages_describe_no_stages() -> None:
+    for page in TIMELESS:
+        if page.name not in ("reproduction.md", "paper.md"):
+            text = " ".join(page.read_text(encoding="utf-8").split())
+            assert [words for words in ROUTES if words in text] == [], is_named(page)
 
 
 def sources() -> Iterator[Path]:
