@@ -1,6 +1,6 @@
 """`softehl run`, `sweep`, `keys`, `design` and `reproduce`.
 
-What is heavy is imported when a command needs it.
+Heavy modules are imported when a command needs them.
 """
 
 from collections.abc import Callable
@@ -174,9 +174,9 @@ def sweep(
 def report_runs(folders: tuple[Path, ...], out: Path | None, xlsx: bool) -> int:
     """Report the run in DIR, or several side by side: one file of HTML that works offline.
 
-    What was asked, gland, deformed section, film with a slider over the speeds, curve with errors
-    and verdicts, friction, leakage, tolerances, limits and versions; of several runs also the
-    differences from the first, in per cent.
+    It has what was asked, the gland, the deformed section and the film with a slider over the
+    speeds; the curve with errors and verdicts, friction, leakage, tolerances, limits and versions.
+    Of several runs it also has the differences from the first, in per cent.
     """
     _write_report(folders, out or folders[0] / "report.html", xlsx=xlsx, quiet=False)
     return 0

@@ -57,7 +57,7 @@ def solve_cases(
     overwrite: begin anew there; without both a folder that holds a run is refused, or other
         files.
 
-    What runs leave for each other is shared (the contact states of an O-ring in `folder/contacts`).
+    Runs share files (the contact states of an O-ring in `folder/contacts`).
     A run that does not reach everything is no error: see `Curve.complaints`. Raises BadInput, also
     for two curves of one name, and whatever else ends a run; curves that have not begun are then
     given up, what was reached is saved.

@@ -3,8 +3,8 @@
 A small error of the displacements, as interpolation makes it, gives a volume ratio times a large
 bulk modulus: useless pressures, and with them a useless geometric part of the tangent. Here that
 part is taken at a pressure p_e of each element that follows from the step before,
-p_e <- p(u) + kappa dJ, as the linearisation of p_e = p(u) as an equation of its own would have it,
-with p_e eliminated. The residual is that of the problem itself; when it has converged, so has the
+p_e <- p(u) + kappa dJ. This is the linearisation of p_e = p(u), an equation of its own, with p_e
+eliminated. The residual is that of the problem itself; when it has converged, so has the
 tangent.
 """
 
