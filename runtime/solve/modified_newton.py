@@ -27,6 +27,7 @@ from softehl.runtime.solve.solution import Solution, Status
 
 _CUTS = (1.0, 0.3, 0.1, 0.03)  # of a step, one after the other
 _MUCH = 1.5  # times the residual before
+_STUCK = "the layer's own iteration failed"
 _WILD, _WILD_STEPS = 1e3, 5
 """Times the least residual, and how many inner iterations in a row above that are in vain."""
 
@@ -60,14 +61,17 @@ class ModifiedNewton:
         history = AndersonMixing(problem, self.depth)
         history.add(x, problem.residual(x))
         norms = [residual_size(problem, history.latest.r)]
+        best = x
         while True:
+            if norms[-1] == min(norms):
+                best = x
             status = self._status(norms)
             if status is not None:
-                return _solution(x, status, norms)
+                return _solution(x, status, norms, best=best)
             start = history.latest if len(norms) < 3 else history.mixed()
             y = self._outer(problem, condensed, start, self._target(norms[-1]))
             if y is None:
-                return _solution(x, Status.DIVERGED, norms, "the layer's own iteration failed")
+                return _solution(x, Status.DIVERGED, norms, _STUCK, best)
             if len(norms) == 1:
                 history.clear()  # the start does not fulfil the layer's equations, all others do
             x = y
@@ -158,7 +162,9 @@ def _along(inner: CondensedSystem, x: Array, step: Array, norm: float) -> Array:
     return found
 
 
-def _solution(x: Array, status: Status, norms: list[float], message: str = "") -> Solution:
+def _solution(
+    x: Array, status: Status, norms: list[float], message: str = "", best: Array | None = None
+) -> Solution:
     return Solution(
         x=x,
         status=status,
@@ -166,4 +172,5 @@ def _solution(x: Array, status: Status, norms: list[float], message: str = "") -
         residual_norms=tuple(norms),
         factorisations=0,
         iterations=len(norms) - 1,
+        best=None if best is x or status is Status.CONVERGED else best,
     )

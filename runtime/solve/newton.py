@@ -51,6 +51,15 @@ class Corrector(Protocol):
 
 
 @runtime_checkable
+class Informed(Corrector, Protocol):
+    """A corrector that begins from what its last solution left, and may be told of another's."""
+
+    def take_up(self, problem: Any, x: Array) -> None:
+        """Go on from a solution x, (n,), of the problem that another corrector found."""
+        ...
+
+
+@runtime_checkable
 class EvolvingProblem(NonlinearProblem, Protocol):
     """A problem whose tangent depends on the iterates so far (its residual must not)."""
 
@@ -158,9 +167,12 @@ class Newton:
         # An inadmissible trial is a handled value here, so numpy need not warn of it.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             state = self.terminate(self.init(problem, x0))
+            best = state
             while state.status is None:
                 before = state.x
                 state = self.terminate(self.step(problem, state))
+                if state.norms[-1] < best.norms[-1]:
+                    best = state
                 if isinstance(problem, EvolvingProblem):
                     problem = problem.after(before, state.x)
         return Solution(
@@ -170,12 +182,13 @@ class Newton:
             residual_norms=state.norms,
             factorisations=state.factorisations,
             iterations=state.iterations,
+            best=None if state.norms[-1] <= best.norms[-1] else best.x,
         )
 
     def init(self, problem: NonlinearProblem, x0: Array) -> NewtonState:
         """The state before the first iteration."""
         x = np.array(x0, dtype=np.float64)
-        state = NewtonState(x, (_norm_at(problem, x),))
+        state = NewtonState(x, (norm_at(problem, x),))
         if math.isfinite(state.norms[0]):
             return state
         where = _where(problem, x)
@@ -223,7 +236,7 @@ class Newton:
         before = self._merit(problem, state.x, state.norms[-1])
         for _ in range(self.halvings + 1):
             x = state.x + fraction * dx
-            norm = _norm_at(problem, x, K)
+            norm = norm_at(problem, x, K)
             merit = self._merit(problem, x, norm) if math.isfinite(norm) else math.inf
             if merit < least:
                 best, best_norm, least = x, norm, merit
@@ -265,7 +278,7 @@ class Newton:
         return not self.line_search or merit <= (1.0 - _SUFFICIENT_DECREASE * fraction) * before
 
 
-def _norm_at(problem: NonlinearProblem, x: Array, K: SparseMatrix | None = None) -> float:
+def norm_at(problem: NonlinearProblem, x: Array, K: SparseMatrix | None = None) -> float:
     """Norm of the residual at x, inf if either is not finite.  K: a tangent near x, if known."""
     if isinstance(problem, MeasuredProblem):
         norm = problem.measure(x, K)

@@ -89,6 +89,10 @@ class SchurCorrector:
             tangent.outdated = rate > self.stale
         return solution
 
+    def take_up(self, problem: LayeredProblem, x: Array) -> None:
+        """Go on from a solution (n,) that another corrector found; see `Informed`."""
+        self.tangent.accepted, self.tangent.outdated = problem.admissible(x), True
+
     def _iterate(self, problem: LayeredProblem, x0: Array, accepted: Array) -> Solution:
         """The solution from x0, with new condensations where the one in use makes it too slow."""
         tangent = self.tangent
@@ -186,6 +190,7 @@ def _continued(solution: Solution, exact: Solution, x: Array | None = None) -> S
         residual_norms=(*norms, *exact.residual_norms[1:]) if x is None else norms,
         factorisations=solution.factorisations + exact.factorisations,
         iterations=solution.iterations + exact.iterations,
+        best=None if x is None else solution.best,
     )
 
 

@@ -25,6 +25,7 @@ class Status(enum.Enum):
     SINGULAR = "singular tangent"
     NOT_HELD = "not held"
     NOT_FINITE = "residual not finite"
+    REFUSED = "refused by a guard"
     STEP_TOO_SMALL = "continuation step too small"
     KILLED = "ended from outside"
 
@@ -50,6 +51,9 @@ _ADVICE = {
     Status.NOT_FINITE: (
         "Take a smaller step; check that the start is admissible (positive Jacobian, positive "
         "film thickness) and that step_limit keeps it so."
+    ),
+    Status.REFUSED: (
+        "Equations hold there, but what they mean does not: take a smaller step, or a finer mesh."
     ),
     Status.KILLED: "Give it more memory or fewer processes at a time.",
     Status.STEP_TOO_SMALL: (
@@ -80,6 +84,8 @@ class Solution:
     residual_norms: dimensionless norm at x0 and after each iteration (iterations + 1 values).
     factorisations: matrices factorised, including one that turned out singular.
     iterations: completed Newton iterations.
+    best: (n,) of a failed solve, the iterate of the least norm where that is not x.
+    rung: number of the corrector of a `Ladder` that this is the end of; others were tried before.
     """
 
     x: Array
@@ -88,15 +94,22 @@ class Solution:
     residual_norms: tuple[float, ...]
     factorisations: int
     iterations: int
+    best: Array | None = None
+    rung: int = 0
 
     @property
     def converged(self) -> bool:
         """True if the status is CONVERGED."""
         return self.status is Status.CONVERGED
 
+    @property
+    def nearest(self) -> Array:
+        """Iterate (n,) of the least norm."""
+        return self.x if self.best is None else self.best
+
     def forget(self) -> Solution:
         """The same summary without the solution vector, which a long branch cannot afford."""
-        return replace(self, x=np.empty(0))
+        return replace(self, x=np.empty(0), best=None)
 
     def raise_for_status(self) -> Solution:
         """Return self if converged, else raise NotConverged: for the outermost caller only."""
