@@ -11,8 +11,8 @@ from softehl.runtime.begin import SMALLEST, Beginning
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
-from softehl.runtime.solve.continuation import Continuation
 from softehl.runtime.solve.held import FirstStep
+from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
 from softehl.runtime.solve.steps import StepRule

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import chain
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -19,15 +19,18 @@ from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.share import Share
 from softehl.runtime.solve.held import FirstStep
+from softehl.runtime.solve.homotopy import Trial, walk
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import NotConverged, Point, Solution
+from softehl.runtime.solve.record import End, Record
+from softehl.runtime.solve.solution import Point, Solution, Status
+from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import Step, System
 
 Method: TypeAlias = Literal["euler", "bdf2"]
 
 _ORDER = {"euler": 1, "bdf2": 2}
-_GROWTH, _SAFETY = 2.0, 0.9
+_GROWTH, _CUT, _SAFETY = 2.0, 0.2, 0.9
 _ROUNDING = 1e-12  # of the whole time: a step is not cut to less than that before the end
 
 
@@ -132,51 +135,25 @@ class March:
     ) -> Iterator[Result]:
         """Every converged step until the end.  Raises NotConverged."""
         length = until - clock.t
+        if length <= 0.0:
+            return
+        shortest = min(length, SMALLEST * self.dt)  # longer ones may be cut
+        with np.errstate(all="ignore"):
+            posed = system.problem(self.posed(system, clock, shortest))
+            require_held(system, posed, clock.states[0])
+        way = _ByTime(self, FirstStep(self.newton), system, clock, until, _ROUNDING * length)
+        log = Record("t")
         marks = {} if checkpoint is None else marks_of(system.everywhere)
-        first_step = FirstStep(self.newton)
-        settings = replace(self, newton=first_step.newton)
-        if length > 0.0:
-            shortest = min(length, SMALLEST * self.dt)  # longer ones may be cut
-            with np.errstate(all="ignore"):
-                posed = system.problem(self._posed(system, clock, shortest))
-                require_held(system, posed, clock.states[0])
-        while until - clock.t > _ROUNDING * abs(length):
-            dt = _towards(until - clock.t, clock.dt)
-            result, clock = settings._step(system, clock, dt)
-            first_step.check(result.problem, result.point.solution)
+        for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):
+            log.points = log.points[-1:]  # a march may be long
+            if way.result is None:
+                continue  # it stands at the start
             if checkpoint is not None:
-                clock.save(checkpoint, system.share, self.dt, marks)
-            yield result
+                way.clock.save(checkpoint, system.share, self.dt, marks)
+            yield way.result
+        log.branch().raise_for_status()
 
-    def _step(self, system: System, clock: Clock, dt: float) -> tuple[Result, Clock]:
-        """One accepted step; it is cut as often as Newton's method or the error asks for it."""
-        wanted = max(clock.dt, dt)
-        while True:
-            step = self._posed(system, clock, dt)
-            problem = system.problem(step)
-            guess = _extrapolated(clock, step.t)
-            with np.errstate(all="ignore"):
-                solution = self.newton.solve(problem, guess)
-            if not solution.converged:
-                dt = self._cut(dt, 0.5, solution)
-                wanted = dt
-                continue
-            factor = self._factor(system, clock, step, solution.x)
-            if factor < 1.0 and self.tolerance is not None:
-                dt = self._cut(dt, max(factor, 0.2), solution)
-                wanted = dt
-                continue
-            break
-        after = system.committed(problem, solution.x, clock.histories)
-        following = min(factor, _GROWTH) * dt if self.tolerance is not None else wanted
-        if self.tolerance is None and wanted < self.dt:
-            following = min(_GROWTH * wanted, self.dt)
-        states = np.vstack([solution.x, clock.states])[:3]
-        times = (step.t, *clock.times)[:3]
-        reached = Result(system, problem, Point(step.t, solution), after)
-        return reached, Clock(times, states, after, following)
-
-    def _posed(self, system: System, clock: Clock, dt: float) -> Step:
+    def posed(self, system: System, clock: Clock, dt: float) -> Step:
         """The step of length dt: du/dt = rate u + rest."""
         old = clock.states[0]
         if self.method == "bdf2" and len(clock.times) > 1:
@@ -187,7 +164,7 @@ class March:
             rate, rest = 1.0 / dt, -old / dt
         return Step(clock.t + dt, 1.0, old, rate, rest, dt, clock.histories)
 
-    def _factor(self, system: System, clock: Clock, step: Step, x: Array) -> float:
+    def factor(self, system: System, clock: Clock, step: Step, x: Array) -> float:
         """By how much the next step may be longer; below 1 where the error is too large."""
         order = _ORDER[self.method] if len(clock.times) > 1 else 1
         if self.tolerance is None or len(clock.times) <= order:
@@ -209,10 +186,79 @@ class March:
             return _GROWTH
         return float(_SAFETY * math.pow(self.tolerance / worst, 1.0 / (order + 1)))
 
-    def _cut(self, dt: float, factor: float, solution: Solution) -> float:
-        if factor * dt < SMALLEST * self.dt:
-            raise NotConverged(replace(solution, message=f"{solution.message}; dt = {dt:.3g}"))
-        return factor * dt
+
+@dataclass(eq=False)
+class _ByTime:
+    """See `Way`. clock: where it stands; over: time left before the end that is none; result: of
+    the last step, None at the start; again: the last attempt failed, so that the next one is as
+    long as it is told.
+    """
+
+    march: March
+    first_step: FirstStep
+    system: System
+    clock: Clock
+    until: float
+    over: float
+    result: Result | None = None
+    again: bool = False
+    _tried: tuple[Step, Any] | None = None
+
+    @property
+    def resolution(self) -> float:
+        """See `Way`."""
+        return 0.0
+
+    def begin(self) -> Trial:
+        """The state that is known."""
+        known = Solution(self.clock.states[0], Status.CONVERGED, "", (), 0, 0)
+        return Trial(self.clock.t, known, following=self.clock.dt)
+
+    def attempt(self, step: float) -> Trial:
+        """A step in time; refused where its error is too large."""
+        left = self.until - self.clock.t
+        dt = step if self.again else _towards(left, step)
+        posed = self.march.posed(self.system, self.clock, dt)
+        problem = self.system.problem(posed)
+        with np.errstate(all="ignore"):
+            guess = _extrapolated(self.clock, posed.t)
+            solution = self.first_step.newton.solve(problem, guess)
+        self._tried = posed, problem
+        following = 0.5 * dt
+        if solution.converged:
+            factor = self.march.factor(self.system, self.clock, posed, solution.x)
+            following = self._following(dt, step, factor)
+            if factor < 1.0:
+                words = "the local error is above its tolerance"
+                solution = replace(solution, status=Status.REFUSED, message=words)
+        self.again = not solution.converged
+        return Trial(posed.t, solution, dt, following)
+
+    def accept(self, trial: Trial) -> None:
+        """Commit what points remember, and set the clock."""
+        if self._tried is None:
+            return
+        (posed, problem), solution, system = self._tried, trial.solution, self.system
+        self.first_step.check(problem, solution)
+        after = system.committed(problem, solution.x, self.clock.histories)
+        states = np.vstack([solution.x, self.clock.states])[:3]
+        times = (posed.t, *self.clock.times)[:3]
+        assert trial.following is not None
+        self.clock = Clock(times, states, after, trial.following)
+        self.result = Result(system, problem, Point(posed.t, solution), after)
+
+    def end(self) -> End | None:
+        """See `Way`."""
+        if self.until - self.clock.t > self.over:
+            return None
+        return Status.CONVERGED, f"reached t = {self.clock.t:.9g}"
+
+    def _following(self, dt: float, step: float, factor: float) -> float:
+        """Length of the next step after one of length dt, when `step` was offered."""
+        if self.march.tolerance is not None:
+            return min(max(factor, _CUT), _GROWTH) * dt
+        wanted = dt if self.again else max(step, dt)
+        return min(_GROWTH * wanted, self.march.dt) if wanted < self.march.dt else wanted
 
 
 def _largest(system: System, values: Array) -> float:

@@ -11,12 +11,12 @@ import numpy as np
 from scipy.sparse import csc_array, hstack, vstack
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.continuation import ProblemAt
+from softehl.runtime.solve.homotopy import ProblemAt, Trial, followed
 from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import MeasuredProblem, Newton, NonlinearProblem
 from softehl.runtime.solve.predictor import admissible_fraction
-from softehl.runtime.solve.record import OnPoint, Record
-from softehl.runtime.solve.solution import Branch, LimitPoint, Solution, Status
+from softehl.runtime.solve.record import End, OnPoint, Record
+from softehl.runtime.solve.solution import Branch, LimitPoint, Status
 from softehl.runtime.solve.steps import StepRule
 
 Derivative: TypeAlias = Callable[[float, Array], Array]
@@ -24,12 +24,14 @@ _FOLD_ITERATIONS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class _Trial:
-    """A point of arc-length continuation, accepted or refused; t: unit tangent, shape (n + 1,)."""
+class _Trial(Trial):
+    """A point of arc-length continuation, accepted or refused.
 
-    parameter: float
-    solution: Solution
+    t: unit tangent, shape (n + 1,); leaves: it is the last one, on a bound of the parameter.
+    """
+
     t: Array = field(default_factory=lambda: np.empty(0))
+    leaves: bool = False
 
     @property
     def y(self) -> Array:
@@ -168,89 +170,118 @@ class Arclength:
             raise ValueError(f"start {start} lies outside {within}")
         path = _Path(problem_at, derivative, self.x_scale, self.parameter_scale, self.difference)
         log = Record(self.name, self.keep_all, on_point)
-        here, step = _counted(log, self._start(path, start, x0, direction)), self.steps.first
-        if not here.solution.converged:
-            return log.no_start(start, here.solution)
-        log.accept(here.parameter, here.solution)
-        while len(log.points) < self.max_points:
-            trial = _counted(log, self._trial(path, here, step))
-            leaving = trial.solution.converged and not within[0] <= trial.parameter <= within[1]
-            if leaving:
-                trial = _counted(log, self._leave(path, here, trial, within))
-            if not trial.solution.converged:
-                log.refuse(trial.parameter, trial.solution)
-                step = self.steps.after_failure(step, trial.solution.status)
-                if step < self.steps.smallest:
-                    return log.too_small(step, self.steps.smallest)
-                continue
-            if not leaving and _turns(here, trial):
-                log.limit_points.append(self._locate(path, log, (here, trial), step))
-            log.accept(trial.parameter, trial.solution)
-            if leaving or (until is not None and until(log.branch(Status.CONVERGED, ""))):
-                return log.branch(Status.CONVERGED, f"reached {self.name} = {trial.parameter:.9g}")
-            here, step = trial, self.steps.after_success(step, step, trial.solution.iterations)
-        endless = until is None and math.isinf(within[0]) and math.isinf(within[1])
-        status = Status.CONVERGED if endless else Status.MAX_ITERATIONS
-        message = f"{self.max_points} points, the last at {self.name} = {here.parameter:.9g}"
-        return log.branch(status, message)
+        return followed(
+            _ByLength(self, path, log, start, x0, direction, within, until), self.steps, log
+        )
 
-    def _start(self, path: _Path, start: float, x0: Array, direction: float) -> _Trial:
-        """Solve at `start` and find the tangent on which the parameter changes as asked."""
-        trial = _Trial(start, self.newton.solve(path.problem_at(start), x0))
+
+@dataclass(eq=False)
+class _ByLength:
+    """See `Way`; here: where it stands."""
+
+    settings: Arclength
+    path: _Path
+    log: Record
+    start: float
+    x0: Array
+    direction: float
+    within: tuple[float, float]
+    until: Callable[[Branch], bool] | None
+    here: _Trial | None = None
+
+    @property
+    def resolution(self) -> float:
+        """See `Way`."""
+        return 0.0
+
+    def begin(self) -> _Trial:
+        """Solve at the start and find the tangent on which the parameter changes as asked."""
+        newton = self.settings.newton
+        trial = _Trial(self.start, newton.solve(self.path.problem_at(self.start), self.x0))
         along = np.zeros(trial.y.size)
-        along[-1] = math.copysign(1.0 / self.parameter_scale, direction)
-        return self._with_tangent(path, trial, along, cosine=0.0)
+        along[-1] = math.copysign(1.0 / self.settings.parameter_scale, self.direction)
+        return self._with_tangent(trial, along, cosine=0.0)
 
-    def _trial(self, path: _Path, here: _Trial, length: float) -> _Trial:
+    def attempt(self, step: float) -> _Trial:
+        """Predict and correct; onto the bound of the parameter where that is passed."""
+        trial = self._trial(step)
+        if not trial.converged or self.within[0] <= trial.parameter <= self.within[1]:
+            return trial
+        self.log.count(trial.solution)
+        return self._leave(trial)
+
+    def accept(self, trial: Trial) -> None:
+        """See `Way`; a fold that was passed is located first."""
+        assert isinstance(trial, _Trial)
+        if self.here is not None and not trial.leaves and _turns(self.here, trial):
+            self.log.limit_points.append(self._locate(self.here, trial))
+        self.here = trial
+
+    def end(self) -> End | None:
+        """See `Way`."""
+        here, settings = self._here, self.settings
+        if here.leaves or (here.taken and self.until is not None and self.until(self.log.branch())):
+            return Status.CONVERGED, f"reached {settings.name} = {here.parameter:.9g}"
+        if len(self.log.points) < settings.max_points:
+            return None
+        endless = self.until is None and math.isinf(self.within[0]) and math.isinf(self.within[1])
+        words = f"{settings.max_points} points, the last at {settings.name} = {here.parameter:.9g}"
+        return Status.CONVERGED if endless else Status.MAX_ITERATIONS, words
+
+    @property
+    def _here(self) -> _Trial:
+        assert self.here is not None, "begin() and accept() come first"
+        return self.here
+
+    def _trial(self, length: float) -> _Trial:
         """Predict along the tangent, no further than the problem admits, and correct."""
-        corrector = _Corrector(path, here.y, path.weigh(here.t), length)
+        here, newton = self._here, self.settings.newton
+        corrector = _Corrector(self.path, here.y, self.path.weigh(here.t), length)
         dy = length * here.t
-        end = self.newton.solve(corrector, here.y + admissible_fraction(corrector, here.y, dy) * dy)
-        trial = _Trial(float(end.x[-1]), replace(end, x=end.x[:-1]))
-        cosine = math.cos(math.radians(self.turn))
-        return self._with_tangent(path, trial, corrector.covector, cosine)
+        end = newton.solve(corrector, here.y + admissible_fraction(corrector, here.y, dy) * dy)
+        trial = _Trial(float(end.x[-1]), replace(end, x=end.x[:-1]), length)
+        cosine = math.cos(math.radians(self.settings.turn))
+        return self._with_tangent(trial, corrector.covector, cosine)
 
-    def _with_tangent(self, path: _Path, trial: _Trial, along: Array, cosine: float) -> _Trial:
+    def _with_tangent(self, trial: _Trial, along: Array, cosine: float) -> _Trial:
         """The trial with its tangent; refused if there is none or it turns away from `along`."""
-        if not trial.solution.converged:
+        if not trial.converged:
             return trial
         count = trial.solution.factorisations + 1
+        trial = replace(trial, solution=replace(trial.solution, factorisations=count))
         try:
-            t = path.tangent(trial.y, along, self.newton.linear)
+            t = self.path.tangent(trial.y, along, self.settings.newton.linear)
         except SingularMatrix as error:
-            refused = trial.refuse(Status.SINGULAR, f"no tangent of the path: {error}")
-            return replace(refused, solution=replace(refused.solution, factorisations=count))
-        trial = replace(trial, solution=replace(trial.solution, factorisations=count), t=t)
+            return trial.refuse(Status.SINGULAR, f"no tangent of the path: {error}")
         if along @ t < cosine:
             angle = math.degrees(math.acos(float(along @ t)))
             return trial.refuse(Status.DIVERGED, f"the path turned by {angle:.0f} degrees")
-        return trial
+        return replace(trial, t=t)
 
-    def _leave(
-        self, path: _Path, here: _Trial, trial: _Trial, within: tuple[float, float]
-    ) -> _Trial:
-        """The point on the bound that the path crosses between `here` and `trial`."""
+    def _leave(self, trial: _Trial) -> _Trial:
+        """The point on the bound that the path crosses before the trial."""
+        here = self._here
         if _turns(here, trial):
             return trial.refuse(Status.DIVERGED, "a limit point and the bound within one step")
-        bound = within[0] if trial.parameter < within[0] else within[1]
+        bound = self.within[0] if trial.parameter < self.within[0] else self.within[1]
         part = (bound - here.parameter) / (trial.parameter - here.parameter)
         guess = here.y + part * (trial.y - here.y)
-        return _Trial(bound, self.newton.solve(path.problem_at(bound), guess[:-1]))
+        solution = self.settings.newton.solve(self.path.problem_at(bound), guess[:-1])
+        return _Trial(bound, solution, trial.taken, leaves=True)
 
-    def _locate(
-        self, path: _Path, log: Record, ends: tuple[_Trial, _Trial], step: float
-    ) -> LimitPoint:
+    def _locate(self, here: _Trial, there: _Trial) -> LimitPoint:
         """The fold between the ends, where the tangent has no parameter component (Illinois)."""
-        here, there = ends
-        kind, index = "maximum" if here.t[-1] > 0.0 else "minimum", len(log.points)
-        a, slope_a, b, slope_b = 0.0, float(here.t[-1]), step, float(there.t[-1])
-        near = min(ends, key=lambda end: abs(end.t[-1]))
+        kind, index = "maximum" if here.t[-1] > 0.0 else "minimum", len(self.log.points)
+        a, slope_a, b, slope_b = 0.0, float(here.t[-1]), there.taken, float(there.t[-1])
+        near = min(here, there, key=lambda end: abs(end.t[-1]))
+        located = self.settings.fold_tolerance * self.settings.parameter_scale
         for _ in range(_FOLD_ITERATIONS):
-            if abs(near.t[-1]) <= self.fold_tolerance * self.parameter_scale:
+            if abs(near.t[-1]) <= located:
                 return LimitPoint(near.parameter, near.solution.x, kind, index, located=True)
             c = b - slope_b * (b - a) / (slope_b - slope_a)
-            trial = _counted(log, self._trial(path, here, c))
-            if not trial.solution.converged:
+            trial = self._trial(c)
+            self.log.count(trial.solution)
+            if not trial.converged:
                 break
             slope = float(trial.t[-1])
             if slope * slope_b < 0.0:
@@ -264,8 +295,3 @@ class Arclength:
 def _turns(here: _Trial, there: _Trial) -> bool:
     """True if the parameter changes direction between the two points."""
     return bool(here.t[-1] != 0.0 and here.t[-1] * there.t[-1] <= 0.0)
-
-
-def _counted(log: Record, trial: _Trial) -> _Trial:
-    log.count(trial.solution)
-    return trial

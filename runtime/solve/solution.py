@@ -17,7 +17,7 @@ from softehl.runtime.arrays import Array
 
 
 class Status(enum.Enum):
-    """How a solver ended; `advice` says what to try next."""
+    """How a solver or a path ended; `advice` says what to try next."""
 
     CONVERGED = "converged"
     MAX_ITERATIONS = "too many iterations"
@@ -27,6 +27,8 @@ class Status(enum.Enum):
     NOT_FINITE = "residual not finite"
     REFUSED = "refused by a guard"
     STEP_TOO_SMALL = "continuation step too small"
+    TURNING_POINT = "the path turns back"
+    ROUNDING = "continuation step lost in rounding"
     KILLED = "ended from outside"
 
     @property
@@ -60,6 +62,11 @@ _ADVICE = {
         "The path may end or turn back here (limit point: follow it by arc length), or the mesh "
         "is too coarse for this parameter; otherwise allow smaller steps."
     ),
+    Status.TURNING_POINT: (
+        "There is no solution beyond a limit point: follow the path by arc length (`follow` of a "
+        "study), or on a finer mesh if the turn is not expected."
+    ),
+    Status.ROUNDING: "Measure the parameter from a place nearby, so that its digits suffice.",
 }
 
 

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from softehl.runtime.kernels import Kernel
     from softehl.runtime.mesh.mesh import Mesh
     from softehl.runtime.solve.arclength import Arclength
-    from softehl.runtime.solve.continuation import Continuation
+    from softehl.runtime.solve.homotopy import Continuation
+    from softehl.runtime.solve.ladder import Ladder
     from softehl.runtime.solve.newton import Newton
     from softehl.runtime.solve.solution import Branch, Solution, Status
     from softehl.runtime.solve.steps import StepRule
@@ -43,12 +44,13 @@ _PUBLIC = {
     "Arclength": "softehl.runtime.solve.arclength",
     "Assembler": "softehl.runtime.fem.assembly",
     "Branch": "softehl.runtime.solve.solution",
-    "Continuation": "softehl.runtime.solve.continuation",
+    "Continuation": "softehl.runtime.solve.homotopy",
     "Curve": "softehl.cases.harness.sweep",
     "DofLayout": "softehl.runtime.fem.dofs",
     "ElementBlock": "softehl.runtime.fem.assembly",
     "FilmState": "softehl.cases.seal.states.state",
     "Kernel": "softehl.runtime.kernels",
+    "Ladder": "softehl.runtime.solve.ladder",
     "Mesh": "softehl.runtime.mesh.mesh",
     "Newton": "softehl.runtime.solve.newton",
     "ORing": "softehl.cases.seal.gland.parameters",
@@ -87,6 +89,7 @@ __all__ = [
     "ElementBlock",
     "FilmState",
     "Kernel",
+    "Ladder",
     "Mesh",
     "Model",
     "Newton",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -15,7 +16,8 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.arclength import Arclength
-from softehl.runtime.solve.continuation import Continuation
+from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.ladder import Ladder
 from softehl.runtime.solve.linear import SparseMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.predictor import Predictor
@@ -255,10 +257,13 @@ def test_a_step_too_long_is_cut_until_newton_converges() -> None:
     assert branch.factorisations == sum(solution.factorisations for solution in attempts)
 
 
-def test_a_turning_path_ends_with_a_step_too_small_next_to_its_fold() -> None:
+def test_a_turning_path_ends_next_to_its_fold_and_says_where_that_is() -> None:
     walk = Continuation(Newton(), STEPS, name="load factor")
     branch = walk.follow(parabola, 0.0, 2.0, np.ones(1))
-    assert branch.status is Status.STEP_TOO_SMALL
+    assert branch.status is Status.TURNING_POINT
+    found = re.search(r"at about load factor = (\S+);", branch.message)
+    assert found
+    assert float(found[1]) == pytest.approx(1.0, abs=STEPS.smallest)
     reached = branch.parameters[-1]
     assert 0.0 <= 1.0 - reached < 4.0 * STEPS.smallest
     assert branch.last.x == pytest.approx([math.sqrt(1.0 - reached)], abs=1e-7)
@@ -269,6 +274,60 @@ def test_a_turning_path_ends_with_a_step_too_small_next_to_its_fold() -> None:
     with pytest.raises(NotConverged, match="load factor") as caught:
         branch.raise_for_status()
     assert caught.value.result is branch
+
+
+def blocked(status: Status) -> Callable[[float], Algebraic]:
+    """x = p, which cannot be solved beyond p = 1."""
+
+    def problem_at(p: float) -> Algebraic:
+        def residual(x: Array) -> Array:
+            return np.where((x != 0.0) & (p > 1.0) & (status is Status.NOT_FINITE), np.nan, x - p)
+
+        slope = 0.0 if p > 1.0 and status is Status.SINGULAR else 1.0
+        if p > 1.0 and status is Status.MAX_ITERATIONS:
+            slope = -1.0
+        return Algebraic(residual, lambda x: slope * np.eye(1))
+
+    return problem_at
+
+
+@pytest.mark.parametrize(
+    ("failure", "end"),
+    [
+        (Status.SINGULAR, Status.SINGULAR),
+        (Status.NOT_FINITE, Status.NOT_FINITE),
+        (Status.MAX_ITERATIONS, Status.STEP_TOO_SMALL),
+    ],
+)
+def test_a_path_that_ends_says_what_stands_there(failure: Status, end: Status) -> None:
+    branch = natural(predictor="previous").follow(blocked(failure), 0.0, 2.0, np.zeros(1))
+    assert branch.status is end
+    assert 0.0 <= 1.0 - branch.parameters[-1] < 4.0 * STEPS.smallest
+    assert branch.failures[-1].solution.status.value in branch.message
+
+
+def test_a_guard_ends_a_path_by_its_words() -> None:
+    ladder = Ladder((Newton(),), lambda x: "" if x[0] <= 1.0 else f"x = {x[0]:.3f} is too large")
+    branch = Continuation(ladder, STEPS).follow(line, 0.5, 2.0, np.full(1, 0.5))
+    assert branch.status is Status.REFUSED
+    assert "is too large" in branch.message
+
+
+def test_a_step_that_rounding_swallows_ends_a_path() -> None:
+    """At 1e12 numbers are 1.2e-4 apart."""
+    far, tiny = 1e12, StepRule(0.1, 1e-9)
+    path = Continuation(Newton(), tiny, "previous")
+
+    def wall(p: float) -> Algebraic:
+        return blocked(Status.MAX_ITERATIONS)(p - far)
+
+    branch = path.follow(wall, far, far + 2.0, np.zeros(1))
+    assert branch.status is Status.ROUNDING
+    assert branch.parameters[-1] == pytest.approx(far + 1.0, abs=1e-3)
+
+
+def test_every_end_but_the_wanted_one_has_a_remedy() -> None:
+    assert [status for status in Status if not status.advice] == [Status.CONVERGED]
 
 
 def test_no_solution_at_the_start_is_reported_as_it_is() -> None:
@@ -501,7 +560,7 @@ def test_path_that_ends_is_reported_with_the_parameter_reached() -> None:
         )
 
     branch = arc(name="load factor").follow(wall, 0.0, np.zeros(1), within=(0.0, 2.0))
-    assert branch.status is Status.STEP_TOO_SMALL
+    assert branch.status is Status.NOT_FINITE
     reached = branch.parameters[-1]
     assert 0.0 <= 1.0 - reached < 1e-3
     assert f"reached load factor = {reached:.9g};" in branch.message

@@ -12,6 +12,7 @@ import sympy as sp
 
 from softehl import Definition, Mesh, Model, Study, element, kinematics, quadrature
 from softehl.runtime.result import Result
+from softehl.runtime.solve.solution import NotConverged, Status
 from softehl.runtime.study import StudyError
 
 
@@ -280,3 +281,28 @@ def test_pages_that_are_refused() -> None:
         m.rates("w")
     with pytest.raises(ModelError, match="nodes = 3, must be 1 to 2"):
         m.nodal_unknowns("p", nodes=3)
+
+
+def test_a_march_that_cannot_go_on_says_when_and_why() -> None:
+    """u^2 = 1 - t has no solution after t = 1."""
+    m = Model("closing", nodes=1, rule=quadrature.point_rule())
+    ((u,),) = m.nodal_unknowns("u")
+    (t,) = m.parameters(t="time")
+    m.weak_form([(u**2 - 1 + t, u)])
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("closing", m.finish(), on=lambda x: x[:, 0] == 0.0, t=lambda t: t)
+    study.start(u=1.0)
+    reached = list[float]()
+    with pytest.raises(NotConverged, match=r"turns back: at about t = (0\.97|1)") as error:
+        reached.extend(result.t for result in study.march(dt=0.1, until=2.0))
+    assert error.value.result.status is Status.TURNING_POINT
+
+
+def test_a_local_error_that_no_step_keeps_ends_a_march() -> None:
+    """A jump of the load from 0 to 1, relative to which no step is short enough."""
+    study = Study(Mesh.line(1.0, cells=4))
+    study.add("rod", heat(), k=1.0)
+    study.fix("right", u=lambda x, t: np.full(len(x), float(t > 0.05)))
+    march = study.march(dt=1e-2, until=0.1, tolerance=1e-2)
+    with pytest.raises(NotConverged, match=r"refused.*the local error is above its tolerance"):
+        list(march)

@@ -17,7 +17,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.cut import Cut, Parts
 from softehl.runtime.solve import pardiso
 from softehl.runtime.solve.condensed import eliminated_own
-from softehl.runtime.solve.continuation import Continuation
+from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.linear import Condenser, SingularMatrix
 from softehl.runtime.solve.modified_newton import ModifiedNewton
 from softehl.runtime.solve.newton import Newton
