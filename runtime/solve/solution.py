@@ -182,6 +182,16 @@ class Branch:
         """Solution of the last converged point; IndexError if not even the first converged."""
         return self.points[-1].solution
 
+    @property
+    def end(self) -> Solution:
+        """Solution at the end of the path; where that was not reached, the last attempt (without x)
+        with the status and the message of the branch.
+        """
+        if self.converged:
+            return self.last
+        attempts = self.failures or self.points
+        return replace(attempts[-1].solution, status=self.status, message=self.message)
+
     def raise_for_status(self) -> Branch:
         """Return self if the end was reached, else raise NotConverged (outermost caller only)."""
         if not self.converged:

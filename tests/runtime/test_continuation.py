@@ -274,6 +274,7 @@ def test_a_turning_path_ends_next_to_its_fold_and_says_where_that_is() -> None:
     with pytest.raises(NotConverged, match="load factor") as caught:
         branch.raise_for_status()
     assert caught.value.result is branch
+    assert (branch.end.status, branch.end.message) == (branch.status, branch.message)
 
 
 def blocked(status: Status) -> Callable[[float], Algebraic]:

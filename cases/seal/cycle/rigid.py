@@ -1,6 +1,7 @@
 """The films of a given gap: with a penalty of cavitation, or with void fractions."""
 
 from dataclasses import replace
+from math import exp, log
 
 import numpy as np
 
@@ -12,8 +13,13 @@ from softehl.runtime.fem import dofs, rules
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.chain import chain_block
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution, Status
+from softehl.runtime.solve.steps import StepRule
+
+_SOFT = 1e-8  # of the penalty, where the path begins
+_STIFFER = StepRule(log(100.0), log(2.0))  # longer first steps cost twice the iterations
 
 
 def strip_of(p: Slider, alpha: float) -> Strip:
@@ -79,12 +85,16 @@ def transformed(
 
 
 def penalty_solution(p: Slider, speed: float) -> tuple[Problem, Solution]:
-    """The penalty is raised from a soft one; Barus' law then transforms the pressure."""
+    """The penalty rises from a soft one; Barus' law then transforms the pressure."""
     problem, alpha = film_problem(p, speed, 0.0), p.pressure_viscosity
-    x, newton = np.zeros(problem.layout.total), Newton(max_iterations=60, line_search=True)
-    for penalty in np.geomspace(1e-8, 1.0, 5) * p.cavitation_penalty:
-        stage = problem.with_parameters(film={"cavitation_penalty": penalty})
-        x = (solution := newton.solve(stage, x)).x
+    newton = Newton(max_iterations=60, line_search=True)
+
+    def softened(t: float) -> Problem:
+        return problem.with_parameters(film={"cavitation_penalty": exp(t) * p.cavitation_penalty})
+
+    path = Continuation(newton, _STIFFER, "previous", name="log of the penalty")
+    branch = path.follow(softened, log(_SOFT), 0.0, np.zeros(problem.layout.total))
+    solution = branch.end
     if not alpha or not solution.converged:
         return problem, solution
     return transformed(film_problem(p, speed, alpha), alpha, newton, solution)
