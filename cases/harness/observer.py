@@ -6,7 +6,7 @@ A case computes; it neither prints nor writes.  Everything that leaves it goes t
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, TypedDict, Unpack
 
 from softehl.cases.harness.files import Content
 from softehl.cases.harness.row import Row
@@ -74,6 +74,20 @@ class Outcome:
         return self.status is Status.CONVERGED
 
 
+class Step(TypedDict):
+    """A step of a path that has converged, as observers are told of it.
+
+    label: name of the path parameter as it is shown. parameter: its value. residuals: norms of
+    Newton's iterates. fraction: share of the stage done in [0, 1], if known.
+    """
+
+    label: str
+    parameter: float
+    iterations: int
+    residuals: Sequence[float]
+    fraction: float | None
+
+
 class Observer(Protocol):
     """The listener a case reports to.  Calls come in order, from one thread."""
 
@@ -81,20 +95,8 @@ class Observer(Protocol):
         """A stage begins.  title: what the user sees.  where: see :class:`StageRecord`."""
         return None
 
-    def step(
-        self,
-        *,
-        label: str,
-        parameter: float,
-        iterations: int,
-        residuals: Sequence[float],
-        fraction: float | None,
-    ) -> None:
-        """A step of the path converged.
-
-        label: name of the path parameter as it is shown.  parameter: its value.  residuals: norms
-        of Newton's iterates.  fraction: share of the stage done in [0, 1], if known.
-        """
+    def step(self, **step: Unpack[Step]) -> None:
+        """A step of the path converged."""
         return None
 
     def state(self, state: State) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import click
 
@@ -13,7 +13,7 @@ from softehl.cases.harness.case import Run
 from softehl.cases.harness.earlier import Existing
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.files import Content
-from softehl.cases.harness.observer import Observer, Outcome, State
+from softehl.cases.harness.observer import Observer, Outcome, State, Step
 from softehl.cases.harness.progress import Display, make_display
 from softehl.cases.harness.record import RunRecord, StageLog
 from softehl.cases.harness.row import Row
@@ -91,19 +91,13 @@ class Reporter(Observer):
             self.log = self.record.stage(name, where)
         self.display.stage(self.worker, title)
 
-    def step(
-        self,
-        *,
-        label: str,
-        parameter: float,
-        iterations: int,
-        residuals: Sequence[float],
-        fraction: float | None,
-    ) -> None:
+    def step(self, **step: Unpack[Step]) -> None:
         """See :class:`Observer`."""
         if self.log is not None:
-            self.log.step(parameter, iterations, residuals)
-        self.display.step(self.worker, f"{label} = {parameter:.4g}", fraction)
+            self.log.step(step["parameter"], step["iterations"], step["residuals"])
+        self.display.step(
+            self.worker, f"{step['label']} = {step['parameter']:.4g}", step["fraction"]
+        )
 
     def state(self, state: State) -> None:
         """See :class:`Observer`."""

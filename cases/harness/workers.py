@@ -7,11 +7,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, Unpack
 
 from softehl.cases.harness.case import Solve
 from softehl.cases.harness.files import Content
-from softehl.cases.harness.observer import Observer, Outcome, State
+from softehl.cases.harness.observer import Observer, Outcome, State, Step
 from softehl.cases.harness.processes import processes
 from softehl.runtime.solve.solution import Status
 
@@ -109,8 +109,8 @@ class _Forwarder(Observer):
     def stage(self, name: str, **details: Any) -> None:
         self.sender.send(("stage", (name,), details))
 
-    def step(self, **details: Any) -> None:
-        self.sender.send(("step", (), details))
+    def step(self, **step: Unpack[Step]) -> None:
+        self.sender.send(("step", (), dict(step)))
 
     def state(self, state: State) -> None:
         self.sender.send(("state", (state,), {}))

@@ -2,12 +2,13 @@
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 import pytest
 
+from softehl.cases.harness.observer import Step
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.report.section import boundary_edges
@@ -44,17 +45,9 @@ class Recorder(Silent):
         self.films: list[FilmState] = []
         self.fractions: list[float] = []
 
-    def step(
-        self,
-        *,
-        label: str,
-        parameter: float,
-        iterations: int,
-        residuals: Sequence[float],
-        fraction: float | None,
-    ) -> None:
-        assert fraction is not None
-        self.fractions.append(fraction)
+    def step(self, **step: Unpack[Step]) -> None:
+        assert step["fraction"] is not None
+        self.fractions.append(step["fraction"])
 
     def contact_state(self, state: ContactState) -> None:
         self.contacts.append(state)

@@ -3,10 +3,10 @@
 Units are mm, MPa, N, s; film thicknesses are in micrometres.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from math import nan
-from typing import Any, Protocol
+from typing import Any, Protocol, Unpack
 
 from softehl.cases.harness import observer as harness
 from softehl.cases.harness.files import Cells
@@ -261,21 +261,8 @@ class Observer(Protocol):
         """A stage begins.  steps: how many are expected, None if the path decides."""
         return None
 
-    def step(
-        self,
-        *,
-        label: str,
-        parameter: float,
-        iterations: int,
-        residuals: Sequence[float],
-        fraction: float | None,
-    ) -> None:
-        """A step of the path converged.
-
-        label: name of the path parameter as it is shown, for instance "U [mm/s]" or "load".
-        parameter: its value.  residuals: norms of Newton's iterates.  fraction: share of the stage
-        done in [0, 1], if known.
-        """
+    def step(self, **step: Unpack[harness.Step]) -> None:
+        """A step of the path converged; its label is for instance "U [mm/s]" or "load"."""
         return None
 
     def contact_state(self, state: ContactState) -> None:
@@ -301,26 +288,3 @@ def doubt(state: FilmRow) -> tuple[int, float]:
 
 class Silent(Observer):
     """The observer that does nothing (for tests and scripts)."""
-
-    def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
-        """See :class:`Observer`."""
-
-    def step(
-        self,
-        *,
-        label: str,
-        parameter: float,
-        iterations: int,
-        residuals: Sequence[float],
-        fraction: float | None,
-    ) -> None:
-        """See :class:`Observer`."""
-
-    def contact_state(self, state: ContactState) -> None:
-        """See :class:`Observer`."""
-
-    def film_state(self, state: FilmState) -> None:
-        """See :class:`Observer`."""
-
-    def film_draft(self, state: FilmState) -> None:
-        """See :class:`Observer`."""

@@ -1,8 +1,8 @@
 """From what a run of a seal tells to what the harness keeps, rows and files; and back."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
@@ -32,23 +32,9 @@ class Teller(Observer):
         title = f"{name}, p_s = {sealed_pressure:g} MPa, stroke {stroke}"
         self.to.stage(name, title=title, where=place(sealed_pressure, stroke))
 
-    def step(
-        self,
-        *,
-        label: str,
-        parameter: float,
-        iterations: int,
-        residuals: Sequence[float],
-        fraction: float | None,
-    ) -> None:
+    def step(self, **step: Unpack[harness.Step]) -> None:
         """See :class:`Observer`."""
-        self.to.step(
-            label=label,
-            parameter=parameter,
-            iterations=iterations,
-            residuals=residuals,
-            fraction=fraction,
-        )
+        self.to.step(**step)
 
     def contact_state(self, state: ContactState) -> None:
         """Written as contact_<p_s>.csv and .vtu."""
