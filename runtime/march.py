@@ -19,10 +19,11 @@ from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.share import Share
 from softehl.runtime.solve.held import FirstStep
-from softehl.runtime.solve.homotopy import Trial, walk
+from softehl.runtime.solve.homotopy import Trial, Way, walk
 from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.predictor import through
 from softehl.runtime.solve.record import End, Record
-from softehl.runtime.solve.solution import Point, Solution, Status
+from softehl.runtime.solve.solution import Point, Status
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import Step, System
@@ -188,8 +189,8 @@ class March:
 
 
 @dataclass(eq=False)
-class _ByTime:
-    """See `Way`. clock: where it stands; over: time left before the end that is none; result: of
+class _ByTime(Way):
+    """clock: where it stands; over: time left before the end that is none; result: of
     the last step, None at the start; again: the last attempt failed, so that the next one is as
     long as it is told.
     """
@@ -204,15 +205,9 @@ class _ByTime:
     again: bool = False
     _tried: tuple[Step, Any] | None = None
 
-    @property
-    def resolution(self) -> float:
+    def start(self) -> Trial:
         """See `Way`."""
-        return 0.0
-
-    def begin(self) -> Trial:
-        """The state that is known."""
-        known = Solution(self.clock.states[0], Status.CONVERGED, "", (), 0, 0)
-        return Trial(self.clock.t, known, following=self.clock.dt)
+        return Trial.known(self.clock.t, self.clock.states[0], self.clock.dt)
 
     def attempt(self, step: float) -> Trial:
         """A step in time; refused where its error is too large."""
@@ -274,8 +269,4 @@ def _towards(left: float, dt: float) -> float:
 
 def _extrapolated(clock: Clock, t: float, count: int = 2) -> Array:
     """Unknowns at t on the polynomial through the last states, at most `count` of them."""
-    times, states = clock.times[:count], clock.states[:count]
-    found = np.zeros_like(states[0])
-    for a, state in zip(times, states, strict=True):
-        found += math.prod((t - b) / (a - b) for b in times if b != a) * state
-    return np.asarray(found)
+    return through(clock.times[:count], clock.states[:count], t)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csc_array, hstack, vstack
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.homotopy import ProblemAt, Trial, followed
+from softehl.runtime.solve.homotopy import ProblemAt, Trial, Way, followed
 from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import MeasuredProblem, Newton, NonlinearProblem
 from softehl.runtime.solve.predictor import admissible_fraction
@@ -176,28 +176,23 @@ class Arclength:
 
 
 @dataclass(eq=False)
-class _ByLength:
-    """See `Way`; here: where it stands."""
+class _ByLength(Way):
+    """here: where it stands."""
 
     settings: Arclength
     path: _Path
     log: Record
-    start: float
+    begin: float
     x0: Array
     direction: float
     within: tuple[float, float]
     until: Callable[[Branch], bool] | None
     here: _Trial | None = None
 
-    @property
-    def resolution(self) -> float:
-        """See `Way`."""
-        return 0.0
-
-    def begin(self) -> _Trial:
+    def start(self) -> _Trial:
         """Solve at the start and find the tangent on which the parameter changes as asked."""
         newton = self.settings.newton
-        trial = _Trial(self.start, newton.solve(self.path.problem_at(self.start), self.x0))
+        trial = _Trial(self.begin, newton.solve(self.path.problem_at(self.begin), self.x0))
         along = np.zeros(trial.y.size)
         along[-1] = math.copysign(1.0 / self.settings.parameter_scale, self.direction)
         return self._with_tangent(trial, along, cosine=0.0)
@@ -230,7 +225,7 @@ class _ByLength:
 
     @property
     def _here(self) -> _Trial:
-        assert self.here is not None, "begin() and accept() come first"
+        assert self.here is not None, "start() and accept() come first"
         return self.here
 
     def _trial(self, length: float) -> _Trial:

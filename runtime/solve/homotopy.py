@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import Protocol, Self, TypeAlias
 
 import numpy as np
 
@@ -37,6 +37,11 @@ class Trial:
     taken: float = 0.0
     following: float | None = None
 
+    @classmethod
+    def known(cls, parameter: float, x: Array, following: float) -> Self:
+        """The start of a path that begins with a state (n,) which needs no solving."""
+        return cls(parameter, Solution(x, Status.CONVERGED, "", (), 0, 0), following=following)
+
     @property
     def converged(self) -> bool:
         """True if it is a point of the path."""
@@ -49,9 +54,9 @@ class Way(Protocol):
     @property
     def resolution(self) -> float:
         """Length of step that is lost in rounding from where it stands."""
-        ...
+        return 0.0
 
-    def begin(self) -> Trial:
+    def start(self) -> Trial:
         """The attempt at the start."""
         ...
 
@@ -60,7 +65,7 @@ class Way(Protocol):
         ...
 
     def accept(self, trial: Trial) -> None:
-        """Stand at a trial that has converged."""
+        """Stand at a trial that has converged, at first that of the start."""
         ...
 
     def end(self) -> End | None:
@@ -70,7 +75,7 @@ class Way(Protocol):
 
 def walk(way: Way, steps: StepRule, log: Record) -> Iterator[Point]:
     """Converged points in order; afterwards the log has the end."""
-    trial, step = way.begin(), steps.first
+    trial, step = way.start(), steps.first
     while log.end is None:
         log.count(trial.solution)
         step = _following(steps, step, trial)
@@ -149,12 +154,12 @@ class Continuation:
 
 
 @dataclass(eq=False)
-class _ByParameter:
-    """See `Way`. goals: parameters to be hit, in order; known: the last points, latest first."""
+class _ByParameter(Way):
+    """goals: parameters to be hit, in order; known: the last points, latest first."""
 
     settings: Continuation
     problem_at: ProblemAt
-    start: float
+    begin: float
     x0: Array
     goals: list[float]
     known: list[Point]
@@ -164,10 +169,10 @@ class _ByParameter:
         """See `Way`."""
         return float(np.spacing(abs(self.known[0].parameter)))
 
-    def begin(self) -> Trial:
+    def start(self) -> Trial:
         """See `Way`."""
         corrector = self.settings.starter or self.settings.newton
-        return Trial(self.start, corrector.solve(self.problem_at(self.start), self.x0))
+        return Trial(self.begin, corrector.solve(self.problem_at(self.begin), self.x0))
 
     def attempt(self, step: float) -> Trial:
         """Predict, no further than the problem admits, and correct."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -23,6 +23,15 @@ _LONGEST_EXTRAPOLATION = 10.0  # a secant prolonged further mostly amplifies its
 _PARABOLA = 2.5  # the same for a parabola, in lengths of the shorter chord
 
 
+def through(times: Sequence[float], states: Iterable[Array], t: float) -> Array:
+    """Value (n,) at t of the polynomial through the states (n,) at different times (Lagrange)."""
+    parts = [
+        math.prod((t - b) / (a - b) for b in times if b != a) * state
+        for a, state in zip(times, states, strict=True)
+    ]
+    return np.asarray(np.sum(parts, axis=0))
+
+
 def extrapolated(known: Sequence[Point], parameter: float) -> Array:
     """Change (n,) from the first of the points to `parameter`, on the polynomial through them all;
     on that of fewer points where it goes further beyond them than they are apart.
@@ -36,11 +45,8 @@ def extrapolated(known: Sequence[Point], parameter: float) -> Array:
         return extrapolated(known[:2], parameter)
     if len(others) == 1:
         t = math.copysign(min(abs(t), _LONGEST_EXTRAPOLATION * abs(distances[0])), t)
-    dx = np.zeros_like(here.solution.x)
-    for point, d in zip(others, distances, strict=True):
-        rest = math.prod((t - e) / (d - e) for e in distances if e != d)
-        dx += (t / d) * rest * (point.solution.x - here.solution.x)
-    return dx
+    changes = [point.solution.x - here.solution.x for point in known]
+    return through([0.0, *distances], changes, t)
 
 
 def predicted(predictor: Predictor | Guess, known: Sequence[Point], parameter: float) -> Array:

@@ -19,7 +19,7 @@ from softehl.cases.seal.cycle.restart import (
     taken_up,
     unpacked,
 )
-from softehl.cases.seal.cycle.transient import Instant, March, Reading, StuckError, TimeSteps
+from softehl.cases.seal.cycle.transient import Instant, March, Reading, TimeSteps
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.parameters import ORing
@@ -35,7 +35,7 @@ from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.schur import StaleTangent
-from softehl.runtime.solve.solution import Point, Status
+from softehl.runtime.solve.solution import Branch, Point, Status
 
 OUTLINES = 48
 """Outlines of the section that are kept of a cycle, at most."""
@@ -94,14 +94,14 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
     steps = TimeSteps(tolerance=parameters.time_tolerance, order=parameters.time_order)
     returned = parameters.supply == "returned"
     march = March(path.system, motion, begun[0], corrector, steps, returned)
-    try:
-        _cycles(march, begun[1], parameters.cycles, observer, log)
-    except StuckError as error:
-        return _outcome(p, Status.MAX_ITERATIONS, str(error))
+    stuck = _cycles(march, begun[1], parameters.cycles, observer, log)
+    if stuck is not None:
+        return _outcome(p, stuck.status, stuck.message)
     return _outcome(p, Status.CONVERGED, "all cycles")
 
 
-def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> None:
+def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) -> Branch | None:
+    """All cycles; the one that did not come to its end, if there is one."""
     period = march.motion.period
     apart = period / OUTLINES
     before, done, last = march.begin(x), 0, None
@@ -146,10 +146,13 @@ def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) ->
                 fraction=(reading.t_s / period) % 1.0,
             )
 
-        march.until(number * period, told)
+        branch = march.until(number * period, told)
+        if not branch.converged:
+            return branch
         films.end = packed(march)
         last = log(number, films, before, last)
         before = films.readings[-1]
+    return None
 
 
 def _film(march: March, instant: Instant) -> dict[str, Array]:

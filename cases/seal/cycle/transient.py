@@ -23,7 +23,15 @@ from softehl.cases.seal.states.results import rough_numbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.homotopy import Trial, Way, followed
+from softehl.runtime.solve.predictor import through
+from softehl.runtime.solve.record import End, Record
 from softehl.runtime.solve.schur import SchurCorrector
+from softehl.runtime.solve.solution import Branch, Status
+from softehl.runtime.solve.steps import StepRule
+
+_ROUGH = 4.0  # tolerances: a larger error is refused
+_FAILED, _REFUSED = 0.25, 0.5  # of a step: the next one, where it failed or its error is large
 
 _TOUCHING = 0.05
 """Film thickness (um) below which any surfaces touch."""
@@ -80,12 +88,17 @@ class TimeSteps:
     order: int = 2
 
 
-class StuckError(RuntimeError):
-    """Steps became too small; the message says when."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Step(Trial):
+    """A step that may be accepted, with the problem and the loads at its end."""
+
+    following: float
+    problem: Problem
+    film: FilmLoads
 
 
 @dataclass(eq=False)
-class March:
+class March(Way):
     """A march in time; `behind` holds the last instants, newest first, and changes with steps.
 
     film: loads that do not change. returned: whether the instroke finds what the outstroke left.
@@ -102,6 +115,8 @@ class March:
     behind: list[Instant] = field(default_factory=list)
     dt: float = 0.0
     condensed_at: float = 0.0
+    goal: float = 0.0
+    told: Callable[[Instant, Reading], None] = lambda instant, reading: None
     _layer: Layer | None = None
 
     def begin(self, x: Array, t: float = 0.0) -> Reading:
@@ -114,15 +129,12 @@ class March:
         self._layer = film_layer(self.system, x)
         return self._reading(problem, film, first, 0)
 
-    def until(self, end: float, on_step: Callable[[Instant, Reading], None]) -> None:
-        """March to a time; every step is told.  Raises StuckError."""
-        while self.behind[0].t < end * (1.0 - 1e-12):
-            now = self.behind[0].t
-            corner = self.motion.speed.next_corner(now) if self.motion.corners else end
-            dt = min(self.dt, self.steps.largest * self.motion.period)
-            left = min(corner, end) - now
-            dt = left if dt >= left * (1.0 - 1e-9) else min(dt, 0.5 * left)
-            self._step(now, dt, on_step)
+    def until(self, goal: float, on_step: Callable[[Instant, Reading], None]) -> Branch:
+        """March to a time; every step is told."""
+        self.goal, self.told = goal, on_step
+        smallest = self.steps.smallest * self.motion.period
+        branch = followed(self, StepRule(max(self.dt, smallest), smallest), Record("t"))
+        return branch if branch.converged else replace(branch, message=self._stuck())
 
     def left(self, reading: Reading) -> float | None:
         """Film (mm) that an outstroke leaves on the rod, None at instroke."""
@@ -138,31 +150,58 @@ class March:
 
     # --- inside -----------------------------------------------------------------------------------
 
-    def _step(self, now: float, dt: float, on_step: Callable[[Instant, Reading], None]) -> None:
-        guess = self._predicted(dt)
-        film = self._loads(now + dt)
+    def start(self) -> Trial:
+        """See `Way`."""
+        return Trial.known(self.behind[0].t, self.behind[0].x, self.dt)
+
+    def attempt(self, step: float) -> Trial:
+        """Solve for the film a step later, or where the speed has a corner, or at the goal."""
+        now = self.behind[0].t
+        corner = self.motion.speed.next_corner(now) if self.motion.corners else self.goal
+        dt = min(step, self.steps.largest * self.motion.period)
+        left = min(corner, self.goal) - now
+        dt = left if dt >= left * (1.0 - 1e-9) else min(dt, 0.5 * left)
+        guess, film = self._predicted(dt), self._loads(now + dt)
         problem, layer = self._problem(film, dt)
-        layered = Layered(problem, layer, (self.system.film_guard(),))
         tangent = self.corrector.tangent.state
+        layered = Layered(problem, layer, (self.system.film_guard(),))
         solution = self.corrector.solve(layered, guess)
         if self.corrector.tangent.state is not tangent:
             self.condensed_at = now + dt
-        error = self._error(solution.x, guess) if solution.converged else np.inf
-        if not solution.converged or error > 4.0:
-            self.dt = dt * (0.25 if not solution.converged else 0.5)
-            if self.dt < self.steps.smallest * self.motion.period:
-                where = f"no step from t = {now:.6g} s on, U = {film.rod_speed:.4g} mm/s"
-                raise StuckError(f"{where}: {self._advice()}")
-            return
-        instant = self._instant(problem, solution.x, dt)
-        reading = self._reading(problem, film, instant, solution.iterations)
-        self.behind = [instant, *self.behind[:2]]
+        if not solution.converged:
+            return Trial(now + dt, solution, dt, _FAILED * dt)
+        error = self._error(solution.x, guess)
+        if error > _ROUGH:
+            words = f"its error is {error:.2g} tolerances"
+            refused = replace(solution, status=Status.REFUSED, message=words)
+            return Trial(now + dt, refused, dt, _REFUSED * dt)
+        power = 1.0 / 3.0 if len(self.behind) > 1 else 0.5
+        following = dt * float(np.clip(0.8 * max(error, 1e-4) ** -power, 0.3, 1.8))
+        return _Step(now + dt, solution, dt, following=following, problem=problem, film=film)
+
+    def accept(self, trial: Trial) -> None:
+        """See `Way`."""
+        if not isinstance(trial, _Step):
+            return  # the start
+        instant = self._instant(trial.problem, trial.solution.x, trial.taken)
+        reading = self._reading(trial.problem, trial.film, instant, trial.solution.iterations)
+        self.behind, self.dt = [instant, *self.behind[:2]], trial.following
         left = self.left(reading)
         if left is not None:
             self.rod.leave(reading.place_mm, left)
-        power = 1.0 / 3.0 if len(self.behind) > 2 else 0.5
-        self.dt = dt * float(np.clip(0.8 * max(error, 1e-4) ** -power, 0.3, 1.8))
-        on_step(instant, reading)
+        self.told(instant, reading)
+
+    def end(self) -> End | None:
+        """See `Way`."""
+        now = self.behind[0].t
+        going = now < self.goal * (1.0 - 1e-12)
+        return None if going else (Status.CONVERGED, f"reached t = {now:.9g}")
+
+    def _stuck(self) -> str:
+        """From when on there is no step, and what may help."""
+        now = self.behind[0].t
+        speed = self.motion.speed.at(now)
+        return f"no step from t = {now:.6g} s on, U = {speed:.4g} mm/s: {self._advice()}"
 
     def _advice(self) -> str:
         """What may help where a step was not found."""
@@ -223,13 +262,8 @@ class March:
 
     def _predicted(self, dt: float) -> Array:
         """Polynomial through the last instants, at the end of the step."""
-        known = self.behind[:3]
-        t = self.behind[0].t + dt
-        guess = np.zeros_like(known[0].x)
-        for a in known:
-            others = [b for b in known if b is not a]
-            guess += np.prod([(t - b.t) / (a.t - b.t) for b in others]) * a.x
-        return guess
+        times, states = [i.t for i in self.behind], [i.x for i in self.behind]
+        return through(times, states, times[0] + dt)
 
     def _error(self, x: Array, guess: Array) -> float:
         """Prediction and result differ by so many tolerances in the film thickness."""
