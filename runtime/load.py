@@ -1,27 +1,77 @@
-"""Load steps of a study, from one load factor to another: cut and grown as Newton needs."""
+"""Paths of a study in its load factor: load steps, and arc length where the load may turn back."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, Beginning
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
+from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.held import FirstStep
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import NotConverged, Point
+from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.system import System
+
+_NAME = "load factor"
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPath:
+    """Converged results in order, and where the load factor turned.
+
+    limits: each with `parameter` (the load factor), `kind` ("maximum" or "minimum") and `x`.
+    """
+
+    results: tuple[Result, ...]
+    limits: tuple[LimitPoint, ...]
+
+
+@dataclass(eq=False)
+class _Reached:
+    """A study on its path: after each point history is committed, and `on_step` is told.
+
+    x, histories: after the last point. results: all of them, or the last one.
+    """
+
+    system: System
+    x: Array
+    histories: dict[str, Array]
+    on_step: Callable[[Result], object]
+    keep_all: bool = False
+    results: list[Result] = field(default_factory=list)
+
+    def problem_at(self, t: float) -> Problem:
+        """The problem at a load factor."""
+        return self.system.problem(self.system.still(t, self.x, self.histories))
+
+    def keep(self, point: Point) -> None:
+        """Go on from a converged point."""
+        problem = self.problem_at(point.parameter)
+        self.x = point.solution.x
+        self.histories = self.system.committed(problem, self.x, self.histories)
+        result = Result(self.system, problem, point, self.histories)
+        if not self.keep_all:
+            self.results.clear()
+        self.results.append(result)
+        self.on_step(result)
+
+    def require_end(self, branch: Branch) -> None:
+        """Raise NotConverged where the path did not reach its end."""
+        if not branch.converged:
+            raise NotConverged(branch, self.results[-1] if self.results else None)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadSteps:
-    """Settings of a load: the number of steps, each result handed to `on_step`."""
+    """Settings of load steps: their number; each result is handed to `on_step`."""
 
     steps: int
     newton: Newton
@@ -30,26 +80,48 @@ class LoadSteps:
     def run(self, system: System, start: Beginning, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
         begin, x0, histories = start
-        state = [(x0, histories)]  # after the last converged step
-        reached: list[Result] = []
-        first_step = FirstStep(self.newton)
-
-        def problem_at(t: float) -> Problem:
-            return system.problem(system.still(t, *state[0]))
+        at, first_step = _Reached(system, x0, histories, self.on_step), FirstStep(self.newton)
 
         def keep(point: Point) -> None:
-            problem, x = problem_at(point.parameter), point.solution.x
-            first_step.check(problem, point.solution)
-            state[0] = x, system.committed(problem, x, state[0][1])
-            reached[:] = [Result(system, problem, point, state[0][1])]
-            self.on_step(reached[0])
+            first_step.check(at.problem_at(point.parameter), point.solution)
+            at.keep(point)
 
         first = abs(until - begin) / self.steps or 1.0  # nowhere to go: one solution there
         with np.errstate(all="ignore"):
-            require_held(system, problem_at(begin + (until - begin) / self.steps), x0)
+            require_held(system, at.problem_at(begin + (until - begin) / self.steps), x0)
         rule = StepRule(first, min(SMALLEST, first), first)
-        path = Continuation(first_step.newton, rule, name="load factor")
-        branch = path.follow(problem_at, begin, until, x0, on_point=keep)
-        if not branch.converged:
-            raise NotConverged(branch, reached[0] if reached else None)
-        return reached[0]
+        path = Continuation(first_step.newton, rule, name=_NAME)
+        at.require_end(path.follow(at.problem_at, begin, until, x0, on_point=keep))
+        return at.results[-1]
+
+
+@dataclass(frozen=True, eq=False)
+class ArcSteps:
+    """Settings of a path by arc length: longest step, points at most; each result is handed to
+    `on_step`.
+    """
+
+    step: float
+    newton: Newton
+    most: int
+    on_step: Callable[[Result], object]
+
+    def run(self, system: System, start: Beginning, until: Callable[[Result], bool]) -> LoadPath:
+        """What `Study.follow` says.  Raises NotConverged."""
+        begin, x0, histories = start
+        at, first_step = _Reached(system, x0, histories, self.on_step, True), FirstStep(self.newton)
+        with np.errstate(all="ignore"):
+            problem = at.problem_at(begin + self.step)
+            require_held(system, problem, x0)
+            first = first_step.newton.solve(problem, x0)
+        if not first.converged:
+            raise NotConverged(first)
+        first_step.check(problem, first)
+        scale = float(np.sqrt(np.mean((first.x - x0) ** 2))) / self.step
+        rule = StepRule(self.step, 1e-6 * self.step, self.step)
+        path = Arclength(self.newton, rule, x_scale=scale or 1.0, max_points=self.most, name=_NAME)
+        branch = path.follow(
+            at.problem_at, begin, x0, until=lambda _: until(at.results[-1]), on_point=at.keep
+        )
+        at.require_end(branch)
+        return LoadPath((*at.results,), branch.limit_points)

@@ -24,9 +24,8 @@ from softehl.runtime.begin import beginning
 from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
-from softehl.runtime.follow import ArcSteps, LoadPath
 from softehl.runtime.kernels import Kernel
-from softehl.runtime.load import LoadSteps
+from softehl.runtime.load import ArcSteps, LoadPath, LoadSteps
 from softehl.runtime.march import Clock, March, Method
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate

@@ -203,8 +203,20 @@ FAULTS = (
     ),
     Fault(
         "runtime/solve/predictor.py",
-        "(t - e) / (d - e) for e",
-        "(t - e) / (d + e) for e",
+        "(t - b) / (a - b) for b",
+        "(t - b) / (a + b) for b",
+        "tests/runtime/test_continuation.py",
+    ),
+    Fault(
+        "runtime/solve/ladder.py",
+        "failed.nearest if nearer else start",
+        "failed.nearest",
+        "tests/runtime/test_ladder.py",
+    ),
+    Fault(
+        "runtime/solve/record.py",
+        "before**2 / (now**2 - before**2)",
+        "before / (now - before)",
         "tests/runtime/test_continuation.py",
     ),
     Fault(
