@@ -23,7 +23,7 @@ from softehl.runtime.solve.homotopy import Trial, Way, walk
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.predictor import through
 from softehl.runtime.solve.record import End, Record
-from softehl.runtime.solve.solution import Point, Status
+from softehl.runtime.solve.solution import NotConverged, Point, Status
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import Step, System
@@ -152,7 +152,8 @@ class March:
             if checkpoint is not None:
                 way.clock.save(checkpoint, system.share, self.dt, marks)
             yield way.result
-        log.branch().raise_for_status()
+        if not log.branch().converged:
+            raise NotConverged(log.branch(), way.result)
 
     def posed(self, system: System, clock: Clock, dt: float) -> Step:
         """The step of length dt: du/dt = rate u + rest."""

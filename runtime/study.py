@@ -252,7 +252,7 @@ class Study:
         pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
         `engine` "petsc" on any number of processes; another `dt` than then is the next step.
         write: a .pvd file that names the results of all steps (with start or restart, it
-        goes on). progress: as in `solve`. Raises StudyError, NotConverged.
+        goes on). progress: as in `solve`. Raises StudyError, and NotConverged as `solve` does.
         """
         if method not in ("euler", "bdf2"):
             raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')

@@ -296,6 +296,8 @@ def test_a_march_that_cannot_go_on_says_when_and_why() -> None:
     with pytest.raises(NotConverged, match=r"turns back: at about t = (0\.97|1)") as error:
         reached.extend(result.t for result in study.march(dt=0.1, until=2.0))
     assert error.value.result.status is Status.TURNING_POINT
+    assert isinstance(error.value.reached, Result)
+    assert error.value.reached.t == reached[-1]
 
 
 def test_a_local_error_that_no_step_keeps_ends_a_march() -> None:
