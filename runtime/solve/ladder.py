@@ -28,7 +28,7 @@ class Ladder:
     rungs: correctors, the cheapest first. A rung begins with the best iterate of the one before it
     if the residual is smaller there than at the start, else at the start. guard: a solution that it
     refuses counts as a failure, and the next rung begins at the start. Rungs that are `Informed`
-    are told of the solution that a later rung found.
+    are told of a solution that another rung found.
     """
 
     rungs: tuple[Corrector, ...]
@@ -53,7 +53,7 @@ class Ladder:
             words.append(found.message)
             start = _warmer(problem, found, start)
         message = found.message if found.converged else "; then: ".join(words)
-        if found.converged and found.rung:
+        if found.converged:
             self._tell(problem, found.x, found.rung)
         return replace(found, message=message, factorisations=factorisations, iterations=iterations)
 

@@ -128,14 +128,14 @@ def test_a_guard_refuses_what_solves_the_equations() -> None:
     assert second.starts == [-1.0]
 
 
-def test_rungs_with_a_memory_learn_what_a_later_one_found() -> None:
+def test_rungs_with_a_memory_learn_what_another_one_found() -> None:
     first, last = Noted(Newton(max_iterations=1)), Noted(Newton())
     ladder = Ladder((first, last))
     solution = ladder.solve(Root(), np.array([3.0]))
     assert first.told == [solution.x[0]]
     assert last.told == []
     ladder.solve(Root(), solution.x)  # the first serves here
-    assert (len(first.told), last.told) == (1, [])
+    assert (len(first.told), last.told) == (1, [solution.x[0]])
 
 
 def test_an_empty_ladder_is_none() -> None:

@@ -65,3 +65,7 @@ class PressureNewton:
         if solution.converged:
             self.pressures = element_pressures(problem, self.solids, solution.x)
         return solution
+
+    def take_up(self, problem: Problem, x: Array) -> None:
+        """Go on from a solution (n,) that another corrector found; see `Informed`."""
+        self.pressures = element_pressures(problem, self.solids, x)
