@@ -16,7 +16,7 @@ from softehl.cases.seal.states.state import Observer, StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.continuation import Continuation
+from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.predictor import Guess, Predictor
 from softehl.runtime.solve.solution import Branch, Point
