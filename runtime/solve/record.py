@@ -66,9 +66,9 @@ class Record:
         """Note a failed attempt."""
         self.failures.append(Point(parameter, solution.forget()))
 
-    def branch(self) -> Branch:
-        """The path as it ended, or as it is so far."""
-        status, message = self.end or (Status.CONVERGED, "")
+    def branch(self, status: Status = Status.CONVERGED, message: str = "") -> Branch:
+        """The path as it ended; as it is so far, with this status, where it has no end yet."""
+        status, message = self.end or (status, message)
         return Branch(
             points=tuple(self.points),
             status=status,
