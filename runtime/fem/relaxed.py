@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -43,6 +44,11 @@ class Relaxed(Layered):
         r, parts = super().layer_linearise(x)
         return r + self._small @ self._away(x), replace(parts, shared=parts.shared + self._small)
 
+    @property
+    def term(self) -> csc_array[np.float64]:
+        """rate C, (n, n), without rows of prescribed unknowns."""
+        return self._free
+
     def _away(self, x: Array) -> Array:
         return np.asarray((x - self.state)[self.shared])
 
@@ -60,3 +66,33 @@ class Relaxed(Layered):
         """The term (m + k, m) of the layer."""
         numbers = self.layer.numbers[: self.layer.size]
         return self._free.tocsr()[numbers].tocsc()[:, self.shared].toarray()
+
+
+@dataclass(frozen=True, eq=False)
+class Anchored:
+    """R(x) + term (x - state) of any problem; satisfies the solvers' EvolvingProblem."""
+
+    problem: Any
+    term: csc_array[np.float64]
+    state: Array
+
+    def residual(self, x: Array) -> Array:
+        """See `NonlinearProblem`."""
+        return np.asarray(self.problem.residual(x) + self.term @ (x - self.state))
+
+    def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
+        """See `NonlinearProblem`."""
+        r, K = self.problem.linearise(x)
+        return r + self.term @ (x - self.state), csc_array(K + self.term)
+
+    def norm(self, r: Array) -> float:
+        """See `NonlinearProblem`."""
+        return float(self.problem.norm(r))
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """See `NonlinearProblem`."""
+        return float(self.problem.step_limit(x, dx))
+
+    def after(self, before: Array, x: Array) -> Anchored:
+        """See `EvolvingProblem`."""
+        return replace(self, problem=self.problem.after(before, x))

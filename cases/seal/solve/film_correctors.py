@@ -1,0 +1,149 @@
+"""Correctors of a film in time: modified Newton iterations, else Newton for all unknowns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
+from softehl.runtime.fem.layered import Layer, Layered
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.relaxed import Anchored, Relaxed
+from softehl.runtime.kernels import load_kernel
+from softehl.runtime.solve.ladder import Ladder
+from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.modified_newton import ModifiedNewton
+from softehl.runtime.solve.newton import Corrector, Newton
+from softehl.runtime.solve.schur import SchurCorrector
+from softehl.runtime.solve.solution import Solution
+
+LEAST, MOST, SHARE = 1e-5, 3e-4, 1e-2
+"""Residual of a step in time: this share of what it begins with, within these bounds. With the
+least everywhere steps take half as many iterations more, and films are the same; above 1e-3 some
+steps need no iteration, and nothing is squeezed out."""
+
+_NEAR = 0.3
+"""Residual at which the section is in equilibrium well enough to be condensed."""
+
+_CAVITIES = 40
+"""Inner iterations where oil ruptures and joins again node by node."""
+
+_MONOLITHIC = 30
+"""Iterations of Newton's method for all unknowns."""
+
+
+def film_corrector(p: ORing, linear: Condenser) -> SchurCorrector:
+    """Modified Newton iterations on the Schur complement of the section, for films of a case."""
+    inner = ModifiedNewton(max_inner=_CAVITIES) if p.conserving else ModifiedNewton()
+    finish = Newton(max_iterations=1, linear=linear)
+    return SchurCorrector(linear, inner, near=_NEAR, finish=finish)
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedSteps:
+    """Modified Newton iterations for steps in time; see `LEAST`."""
+
+    fast: SchurCorrector
+
+    def solve(self, problem: Relaxed, x0: Array) -> Solution:
+        """See `Corrector`."""
+        begun = problem.norm(problem.residual(problem.admissible(x0)))
+        return self.fast.with_tolerance(min(max(SHARE * begun, LEAST), MOST)).solve(problem, x0)
+
+    def take_up(self, problem: Relaxed, x: Array) -> None:
+        """See `Informed`."""
+        self.fast.take_up(problem, x)
+
+
+@dataclass(frozen=True, eq=False)
+class WholeSteps:
+    """Newton's method for all unknowns of a step, which holds on to the element pressures."""
+
+    system: SealSystem
+    newton: Newton
+
+    def solve(self, problem: Relaxed, x0: Array) -> Solution:
+        """See `Corrector`."""
+        pressures = element_pressures(problem.problem, self.system.solids, x0)
+        return self.begun(problem, x0, pressures)
+
+    def begun(self, problem: Relaxed, x0: Array, pressures: Array) -> Solution:
+        """The step from a state of another mesh with these element pressures (Q,)."""
+        lagged = self._lagged(problem.problem, pressures)
+        newton = replace(self.newton, tolerance=LEAST, stagnation=1.0, max_iterations=_MONOLITHIC)
+        return newton.solve(Anchored(lagged, problem.term, problem.state), problem.admissible(x0))
+
+    def steady(
+        self,
+        problem: Problem,
+        x0: Array,
+        pressures: Array | None = None,
+        iterations: int = _MONOLITHIC,
+    ) -> Solution:
+        """The steady film, from x0 (n,)."""
+        if pressures is None:
+            pressures = element_pressures(problem, self.system.solids, x0)
+        newton = replace(self.newton, max_iterations=iterations)
+        x0 = x0.copy()
+        x0[problem.fixed] = problem.values
+        return newton.solve(self._lagged(problem, pressures), x0)
+
+    def _lagged(self, problem: Problem, pressures: Array) -> LaggedPressure:
+        kernel = load_kernel("follower_pressure")
+        return LaggedPressure.of(
+            problem, self.system.solids, kernel, pressures, self.system.bulk_moduli
+        )
+
+
+@dataclass(eq=False)
+class CarriedSteps:
+    """Steps of which the first begins with the element pressures (Q,) of another mesh."""
+
+    ladder: Ladder
+    whole: WholeSteps
+    pressures: Array | None
+
+    def solve(self, problem: Relaxed, x0: Array) -> Solution:
+        """See `Corrector`."""
+        if self.pressures is None:
+            return self.ladder.solve(problem, x0)
+        found = self.whole.begun(problem, x0, self.pressures)
+        self.pressures = None if found.converged else self.pressures
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class FilmCorrectors:
+    """Correctors of one film; `fast` is None where condensing does not serve."""
+
+    whole: WholeSteps
+    fast: SchurCorrector | None
+
+    @classmethod
+    def of(cls, system: SealSystem, newton: Newton) -> FilmCorrectors:
+        """For films of a system; newton holds the linear solver."""
+        p, linear = system.parameters, newton.linear
+        quick = p.solver == "auto" and p.rotation == "fixed" and not p.rubs
+        fast = film_corrector(p, linear) if quick and isinstance(linear, Condenser) else None
+        return cls(WholeSteps(system, newton), fast)
+
+    def steps(self, pressures: Array | None = None) -> Corrector:
+        """Solves steps in time; pressures: (Q,) of a state that another mesh has left."""
+        fast = (CondensedSteps(self.fast),) if self.fast else ()
+        return CarriedSteps(Ladder((*fast, self.whole), self._refused), self.whole, pressures)
+
+    def steady(self, problem: Problem, layer: Layer, x: Array) -> Solution:
+        """The steady film from the last step in time, x (n,)."""
+        if self.fast:
+            end = self.fast.solve(Layered(problem, layer, (self.whole.system.film_guard(),)), x)
+            if end.converged:
+                return end
+        return self.whole.steady(problem, x)
+
+    def _refused(self, x: Array) -> str:
+        system = self.whole.system
+        if system.parameters.rough or system.arc_film(x)[1].min() > 0.0:
+            return ""
+        return "the film would be closed at a node"

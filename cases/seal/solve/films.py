@@ -1,0 +1,183 @@
+"""The steady film at a speed: from the dry contact, or from the same film on another mesh.
+
+Each step in time is solved by modified Newton iterations on the Schur complement of the section;
+where these fail, by Newton's method for all unknowns, which holds on to the pressures of the
+elements (`runtime.fem.lagged_pressure`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.layers import film_layer
+from softehl.cases.seal.equations.loads import FilmLoads, Stroke
+from softehl.cases.seal.solve.film_correctors import FilmCorrectors
+from softehl.cases.seal.solve.squeezing import InletScales, Squeezing, film_loads
+from softehl.cases.seal.states.results import film_numbers
+from softehl.cases.seal.states.state import Observer, StageRecord, place
+from softehl.cases.seal.states.verdict import FilmNumbers
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
+from softehl.runtime.solve.solution import Solution, Status
+
+_AGAIN = 0.01
+"""First step of a film that was carried to another mesh and is not found there at once, of T."""
+
+_AT_ONCE = 8
+"""Iterations in which it is found at once: it takes four, or does not come nearer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A steady film on a mesh, its unknowns x (n,)."""
+
+    system: SealSystem
+    loads: FilmLoads
+    scales: InletScales
+    x: Array
+    iterations: int
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The equations that it fulfils."""
+        return self.system.film_problem(self.loads).since(self.x)
+
+    @cached_property
+    def numbers(self) -> FilmNumbers:
+        """Its scalars."""
+        return film_numbers(self.system, self.problem, self.loads, self.x)
+
+
+@dataclass(frozen=True, eq=False)
+class NoFilm:
+    """Why there is no film at a speed.
+
+    squeezing, reached: how it was squeezed out, and how far, if it was begun.
+    """
+
+    stroke: Stroke
+    speed: float
+    status: Status
+    message: str
+    squeezing: Squeezing | None = None
+    reached: Moment | None = None
+
+
+@dataclass(eq=False)
+class FilmSolver:
+    """Films on the mesh of a system.
+
+    newton: finishes what the modified iterations do not, and holds the linear solver. offset: of
+    the rod in the contact state, mm. records: cost of each film; it grows.
+    """
+
+    system: SealSystem
+    newton: Newton
+    observer: Observer
+    offset: float
+    records: list[StageRecord] = field(default_factory=list)
+
+    def from_contact(self, stroke: Stroke, speed: float, x: Array) -> Film | NoFilm:
+        """The film at |U|, mm/s, squeezed out from the contact state x (n,)."""
+        scales = InletScales.of(self.system, stroke, speed, x)
+        if scales is None:
+            words = "too few nodes touch the rod to show the edge of the contact"
+            return NoFilm(stroke, speed, Status.DIVERGED, words)
+        film = film_loads(self.system, stroke, speed, x, self.offset)
+        squeezing = Squeezing(
+            self.system, film_layer(self.system, x), film, scales, self.system.moment(x)
+        )
+        start = Moment(squeezing.start(x), squeezing.first(x))
+        return self._followed(squeezing, start)
+
+    def from_film(self, carried: Squeezing, x: Array, pressures: Array) -> Film | NoFilm:
+        """The steady film of another mesh, carried to ours: x (n,), element pressures (Q,).
+
+        At once, else squeezed out from there.
+        """
+        correctors = FilmCorrectors.of(self.system, self.newton)
+        with self._told(carried.film) as told:
+            problem = self.system.film_problem(carried.film).since(x)
+            found = told(correctors.whole.steady(problem, x, pressures, _AT_ONCE))
+        if found.converged and carried.change(x, found.x) < inf:
+            return self._entered(carried, correctors, found)
+        return self.from_moment(carried, Moment(x, _AGAIN, 1.0), pressures)
+
+    def from_moment(self, carried: Squeezing, start: Moment, pressures: Array) -> Film | NoFilm:
+        """The film that another mesh has squeezed out as far as to a moment, carried to ours."""
+        return self._followed(carried, start, pressures)
+
+    def _followed(
+        self, squeezing: Squeezing, start: Moment, pressures: Array | None = None
+    ) -> Film | NoFilm:
+        film, correctors = squeezing.film, FilmCorrectors.of(self.system, self.newton)
+        steps = PseudoTransient(correctors.steps(pressures))
+        with self._told(film) as told:
+            branch, reached = steps.follow(squeezing, start, on_point=lambda p: told(p.solution))
+            if not branch.converged:
+                words = branch.message
+                return NoFilm(film.stroke, film.speed, branch.status, words, squeezing, reached)
+            problem = self.system.film_problem(film).since(reached.x)
+            end = told(correctors.steady(problem, squeezing.layer, reached.x))
+        if not end.converged:
+            words = f"steady film: {end.message}"
+            return NoFilm(film.stroke, film.speed, end.status, words, squeezing, reached)
+        return self._entered(squeezing, correctors, end)
+
+    def _entered(self, squeezing: Squeezing, correctors: FilmCorrectors, found: Solution) -> Film:
+        """The film, with the pressure of the wedge before its arc where it lacks much of it.
+
+        Without it where no such film is found.
+        """
+        loads, scales = squeezing.film, squeezing.scales
+        film = Film(self.system, loads, scales, found.x, found.iterations)
+        if not film.numbers.enters:
+            return film
+        more = replace(loads, entrance=film.numbers.entrance)
+        problem = self.system.film_problem(more).since(found.x)
+        end = correctors.steady(problem, squeezing.layer, found.x)
+        if not end.converged:
+            return film
+        return Film(self.system, more, scales, end.x, end.iterations)
+
+    @contextmanager
+    def _told(self, film: FilmLoads) -> Iterator[Callable[[Solution], Solution]]:
+        """Tell the observer of solutions, and keep a record of them."""
+        name, begin, found = f"film at {film.rod_speed:+g} mm/s", time.perf_counter(), []
+        p_s, stroke = film.sealed_pressure, film.stroke
+        self.observer.stage(name, sealed_pressure=p_s, stroke=stroke, steps=None)
+
+        def told(solution: Solution) -> Solution:
+            found.append(solution.forget())
+            self.observer.step(
+                label=name,
+                parameter=float(len(found)),
+                iterations=solution.iterations,
+                residuals=solution.residual_norms,
+                fraction=None,
+            )
+            return solution
+
+        try:
+            yield told
+        finally:
+            self.records.append(
+                StageRecord(
+                    name=name,
+                    seconds=time.perf_counter() - begin,
+                    factorisations=sum(s.factorisations for s in found),
+                    iterations=sum(s.iterations for s in found),
+                    residual_histories=tuple(s.residual_norms for s in found),
+                    parameters=tuple(float(n) for n in range(1, len(found) + 1)),
+                    where=place(p_s, stroke),
+                    method="pseudo-transient continuation",
+                )
+            )

@@ -1,0 +1,186 @@
+"""A film that is squeezed out from the dry contact: the time behind pseudo-transient continuation.
+
+The gap that contact leaves is a film that begins to be squeezed out, with the pressures of contact.
+An implicit step of length tau,
+
+    dq/dx + w (h - h_n) / tau = 0,
+
+is contact for tau -> 0 and the steady film for tau -> infinity; the section bears the same load all
+the way. The scales are those of the inlet (`solve.grading`): a length l, the time T = l / U in
+which the rod passes it, and a thickness h_r. The local weight w = min(1, (h_r / h_n)^a) lets the
+oil flow sooner where there is much more of it than the film needs, as in a groove.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf, pi
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.layers import film_layer
+from softehl.cases.seal.equations.loads import FilmLoads, Stroke
+from softehl.cases.seal.equations.system import DISPLACEMENT
+from softehl.cases.seal.solve.contact import held_moment, held_place
+from softehl.cases.seal.solve.grading import MULTIPLE, film_thickness, inlet_time
+from softehl.cases.seal.states.contacts import Edge, contact_edges
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.layered import Layer
+from softehl.runtime.fem.relaxed import Relaxed
+from softehl.runtime.fem.rules import content_rule, pressure_nodes
+
+EXPONENT = 1.5
+"""a of the local time steps. On X-rings at the slowest speed 1 found no film and 2 was as good."""
+
+FIRST = 1e-3
+"""First step, of T, where contact leaves a gap as thin as the film; a thicker one flows sooner."""
+
+ROUNDING = 1e-4
+"""Largest residual that rounding of the gap may leave in the first step."""
+
+_NO_WIDTH = 1e-6
+"""Of the widest part of the arc around a node, below which it is between segments on a wall."""
+
+
+@dataclass(frozen=True)
+class InletScales:
+    """Time T (s) and thickness h_r (mm) of a film at its inlet."""
+
+    time: float
+    thickness: float
+
+    @classmethod
+    def of(cls, system: SealSystem, stroke: Stroke, speed: float, x: Array) -> InletScales | None:
+        """By the edge of the contact x (n,) where a stroke draws its oil in; None without one."""
+        edges, p = contact_edges(system, x), system.parameters
+        edge: Edge | None = edges[0 if stroke == "out" else -1] if edges else None
+        if edge is None or not 0.0 < edge.rise < inf:
+            return None
+        return cls(inlet_time(p, edge, speed), MULTIPLE * film_thickness(p, [edge], speed))
+
+
+def film_loads(
+    system: SealSystem, stroke: Stroke, speed: float, x: Array, rod_offset: float
+) -> FilmLoads:
+    """The loads of a film at |U| (mm/s) from the contact state x (n,) with the rod at an offset."""
+    p = system.parameters
+    return FilmLoads(
+        p.sealed_pressure,
+        stroke,
+        speed,
+        multipliers=system.rod_multipliers(x).copy(),
+        gap=system.arc_film(x)[1],
+        shear=1.0 if p.shear_traction else 0.0,
+        rod_offset=rod_offset,
+        place=held_place(p),
+        moment=0.0 if p.rotation == "free" else held_moment(p),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Squeezing:
+    """A film that is squeezed out; satisfies `Transient`, its time in units of T.
+
+    film: loads of the steady film. moment: that holds the rotation of the section at the start,
+    N mm; it fades as the shear stress begins to act, where the section is free to roll.
+    """
+
+    system: SealSystem
+    layer: Layer
+    film: FilmLoads
+    scales: InletScales
+    moment: float = 0.0
+
+    @classmethod
+    def carried(
+        cls,
+        system: SealSystem,
+        x: Array,
+        film: FilmLoads,
+        scales: InletScales,
+        moment: float = 0.0,
+    ) -> Squeezing:
+        """The film of another mesh on that of a system; x: (n,) carried to it."""
+        film = replace(
+            film,
+            multipliers=system.rod_multipliers(x).copy(),
+            gap=system.arc_film(x)[1] + film.rod_offset,
+            entrance=0.0,
+        )
+        return cls(system, film_layer(system, x), film, scales, moment)
+
+    def step(self, before: Array, tau: float, load: float) -> Relaxed:
+        """See `Transient`; the load is the shear stress of the film."""
+        film = replace(self.film, shear=load * self.film.shear)
+        if self.system.parameters.rotation == "free":
+            film = replace(film, moment=(1.0 - load) * self.moment)
+        return Relaxed(
+            self.system.film_problem(film).since(before),
+            self.layer,
+            (self.system.film_guard(),),
+            hold=self._masses(before),
+            state=before,
+            rate=-1.0 / (tau * self.scales.time),
+        )
+
+    def change(self, before: Array, after: Array) -> float:
+        """Largest change of ln h along the arc; of h over its size between rough surfaces."""
+        (_, h), (_, k) = self.system.arc_film(before), self.system.arc_film(after)
+        if self.system.parameters.rough:
+            least = self.system.parameters.surfaces.sigma
+            return float(np.max(np.abs(k - h) / np.maximum(np.abs(h), least)))
+        return float(np.abs(np.log(k / h)).max()) if k.min() > 0.0 else inf
+
+    def first(self, x: Array) -> float:
+        """Length of the first step from the contact state x (n,); see `FIRST` and `ROUNDING`."""
+        thicker = self.scales.thickness / self.film.rod_offset if self.film.rod_offset else 1.0
+        rounding = self._masses(x) @ np.spacing(np.abs(x))
+        problem = self.system.film_problem(self.film)
+        rounding[problem.fixed] = 0.0
+        least = problem.norm(rounding) / (ROUNDING * self.scales.time)
+        return float(max(FIRST * min(1.0, thicker) ** EXPONENT, least))
+
+    def start(self, x: Array) -> Array:
+        """The contact state x (n,) with a film that has the pressures of the contact."""
+        system, y = self.system, x.copy()
+        z, r = system.deformed(x)[system.mesh.arc_nodes].T
+        dz = np.diff(z)
+        width = 0.5 * (np.append(dz, 0.0) + np.append(0.0, dz))
+        force = np.maximum(-system.rod_multipliers(x), 0.0) * system.rod_areas
+        low, sealed = system.dam, np.zeros(len(z))
+        sealed[:low] = self.film.sealed_pressure
+        if 0 < low < len(dz):
+            sealed[low] = self.film.sealed_pressure * dz[low - 1] / (dz[low - 1] + dz[low])
+        wide = width > _NO_WIDTH * width.max()
+        own = np.divide(force, 2.0 * pi * r * width, out=np.zeros_like(r), where=wide)
+        pressures, rows = own + sealed, system.pressure_dofs()
+        ends = np.stack([pressures[:-1], pressures[1:]], axis=1)
+        y[rows] = ends @ _shapes(rows.shape[1] - 1).T
+        return y
+
+    def _masses(self, x: Array) -> csc_array[np.float64]:
+        """Weighted rates (n, n) of what the film holds by the radial displacements of the arc, mm.
+
+        Rows are the pressures'; what a film holds is lumped where these stand.
+        """
+        system = self.system
+        rows, n = system.pressure_dofs(), system.layout.total
+        segments, order = system.mesh.arc_segments, rows.shape[1] - 1
+        z, h = system.deformed(x)[:, 0], system.arc_film(x)[1]
+        relative = self.scales.thickness / np.maximum(h, self.scales.thickness)
+        weights = np.stack([relative[:-1], relative[1:]], axis=1) ** EXPONENT
+        half = 0.5 * (z[segments[:, 1]] - z[segments[:, 0]])
+        shares = content_rule(order).weights[:, None] * _shapes(order)
+        values = half[:, None, None] * shares * weights[:, None, :]
+        radii = system.layout.part(DISPLACEMENT).start + 2 * segments + 1
+        places = np.broadcast_arrays(rows[..., None], radii[:, None])
+        at = tuple(part.ravel() for part in places)
+        return csc_array(coo_array((values.ravel(), at), shape=(n, n)))
+
+
+def _shapes(order: int) -> Array:
+    """Of both nodes of a segment, (order + 1, 2), where its pressures stand."""
+    xi = pressure_nodes(order)
+    return np.stack([0.5 * (1.0 - xi), 0.5 * (1.0 + xi)], axis=1)
