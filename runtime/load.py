@@ -107,7 +107,7 @@ class ArcSteps:
     on_step: Callable[[Result], object]
 
     def run(self, system: System, start: Beginning, until: Callable[[Result], bool]) -> LoadPath:
-        """What `Study.follow` says.  Raises NotConverged."""
+        """Path of `Study.follow`.  Raises NotConverged."""
         begin, x0, histories = start
         at, first_step = _Reached(system, x0, histories, self.on_step, True), FirstStep(self.newton)
         with np.errstate(all="ignore"):
