@@ -187,6 +187,6 @@ def _frames(
 
 
 def _wetted(x: Array, h: Array) -> tuple[float, float]:
-    """Where the film is ever thin enough to be shown, mm."""
+    """Both ends, mm, of the places whose film is thin enough at some time to be shown."""
     inside = np.flatnonzero(h.min(axis=0) < _THICKEST)
     return (float(x[inside[0]]), float(x[inside[-1]])) if len(inside) > 1 else (x[0], x[-1])

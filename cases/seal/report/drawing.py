@@ -43,7 +43,7 @@ def gland_figure(p: ORing) -> Figure:
 
 
 def fit_numbers(p: ORing) -> list[tuple[str, float, str]]:
-    """How the ring sits in its gland: name, value, unit."""
+    """Fit of the ring in its gland: name, value, unit."""
     fits = fit_percent(p)
     return [
         ("squeeze", fits["squeeze_percent"], "%"),

@@ -1,4 +1,4 @@
-"""What a report says of runs of a seal, part by part."""
+"""Parts of a report on runs of a seal."""
 
 from __future__ import annotations
 
@@ -124,12 +124,12 @@ def _friction(runs: Sequence[FinishedRun]) -> Part:
 
 
 def _several_speeds(runs: Sequence[FinishedRun]) -> bool:
-    """Whether there is anything to be drawn over the speed."""
+    """True if there are several speeds to draw over."""
     return len({abs(row.rod_speed_mm_s) for run in runs for row in run.rows}) > 1
 
 
 def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
-    """What leaves in a cycle, and for a stroke of 100 mm."""
+    """Leakage of a cycle, also for a stroke of 100 mm."""
     tables = []
     for run in runs:
         rows = net_leakage(run.rows)
@@ -166,7 +166,7 @@ _SURFACE = (
 
 
 def _tolerances(runs: Sequence[FinishedRun]) -> Part:
-    """What of the input is known how well."""
+    """Tolerances of the input."""
     rows: list[tuple[str, str, str]] = []
     for run in runs:
         p = run.parameters
@@ -194,7 +194,7 @@ def _tolerances(runs: Sequence[FinishedRun]) -> Part:
 
 
 def _bands(run: FinishedRun) -> list[Table]:
-    """What the tolerances make of the results, where the run has sensitivities."""
+    """Bands of the results by the tolerances, if the run has sensitivities."""
     try:
         cells = read_csv(run.folder / "tolerances.csv", ToleranceRow.header())
         rows = [ToleranceRow.parse(row).cells() for row in cells]

@@ -43,7 +43,7 @@ class View:
 
     @property
     def complete(self) -> bool:
-        """Whether the section has what is drawn of it (one of another version may lack some)."""
+        """True if the section has all fields to draw; one of another version may lack some."""
         return self.section.point_data.keys() >= _NEEDED
 
 
