@@ -116,10 +116,8 @@ class Layered:
         return self.problem.where_not_finite(x)
 
     def admissible(self, x: Array) -> Array:
-        """x with the prescribed values."""
-        y = x.copy()
-        y[self.problem.fixed] = self.problem.values
-        return y
+        """See `Problem`."""
+        return self.problem.admissible(x)
 
     def body(self, x: Array) -> csc_array[np.float64]:
         """Tangent (n, n) of the body; rows and columns of the layer's own unknowns are unity."""

@@ -268,6 +268,12 @@ class Problem:
         """The problem with these unknowns prescribed too."""
         return self.with_fixed([self.fixed, fixed], [self.values, value])
 
+    def admissible(self, x: Array) -> Array:
+        """x with the prescribed values."""
+        y = x.copy()
+        y[self.fixed] = self.values
+        return y
+
     def since(self, x: Array) -> Problem:
         """The problem of the step after x, for kernels that ask for unknowns of the step before."""
         assembler = self.assembler.since(x)

@@ -38,11 +38,18 @@ def carried_mesh(mesh: SectionMesh, old: Outline, new: Outline) -> SectionMesh:
     places = carried_places(mesh.places, old, new)
     moved = np.zeros_like(mesh.points)
     moved[mesh.boundary] = new.at(places) - mesh.points[mesh.boundary]
-    stiff = _laplacian(mesh)
-    inside = np.setdiff1d(np.arange(len(mesh.points)), mesh.boundary)
-    pulled = -(stiff @ moved)[inside]
-    moved[inside] = splu(csc_array(stiff[inside][:, inside])).solve(pulled)
+    moved = potential(mesh, moved)
     return replace(mesh, points=mesh.points + moved, places=places, length=new.length)
+
+
+def potential(mesh: SectionMesh, values: Array) -> Array:
+    """The values (V, k) of the boundary, and inside those of the potential that has them there."""
+    found, stiff = values.copy(), _laplacian(mesh)
+    inside = np.setdiff1d(np.arange(len(mesh.points)), mesh.boundary)
+    found[inside] = 0.0
+    pulled = -(stiff @ found)[inside]
+    found[inside] = splu(csc_array(stiff[inside][:, inside])).solve(pulled)
+    return found
 
 
 def _laplacian(mesh: SectionMesh) -> csc_array:

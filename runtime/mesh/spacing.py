@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -21,7 +22,7 @@ from scipy.optimize import brentq
 
 from softehl.runtime.arrays import Array
 
-_STATIONS = 20001  # points at which a size function is tabulated
+STATIONS = 20001  # points at which a size function is tabulated
 _STEPS = 27 * 64  # of the table of a map: nodes of every density up to 64 are entries of it
 
 
@@ -56,6 +57,13 @@ class Spacing:
         """The smallest of `count` segments, relative to the length of the line."""
         return float(np.diff(self(np.linspace(0.0, 1.0, count + 1))).min())
 
+    @classmethod
+    def of(cls, s: Array, index: Array) -> Self:
+        """Map of a line with so many segments (n,), rising, from its beginning to s (n,)."""
+        places = np.interp(np.linspace(0.0, index[-1], _STEPS + 1), index, s) / s[-1]
+        places[-1] = 1.0
+        return cls(places)
+
     @cached_property
     def _indices(self) -> Array:
         return np.arange(len(self.places)) / (len(self.places) - 1)
@@ -77,7 +85,7 @@ def graded(
             f"graded: {count} segments of at most {coarsest:g} mm do not fill {length:g} mm; "
             f"the coarsest size must be larger than {length / count:g} mm"
         )
-    s = np.linspace(0.0, length, _STATIONS)
+    s = np.linspace(0.0, length, STATIONS)
     away = [_growth(s - spot.place, *(spot.rates or (rate, rate))) for spot in spots]
 
     def segments(log_finest: float) -> Array:
@@ -90,9 +98,7 @@ def graded(
 
     bounds = np.log(1e-6 * coarsest), np.log(coarsest)
     index = segments(brentq(lambda finest: segments(finest)[-1] - count, *bounds))
-    places = np.interp(np.linspace(0.0, index[-1], _STEPS + 1), index, s) / length
-    places[-1] = 1.0
-    return Spacing(places)
+    return Spacing.of(s, index)
 
 
 def _growth(beyond: Array, before: float, behind: float) -> Array:

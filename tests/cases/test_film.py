@@ -11,7 +11,7 @@ import pytest
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.solve import film as seal_film
+from softehl.cases.seal.solve import film_correctors
 from softehl.cases.seal.solve.film import first_film
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.path import PathSettings
@@ -111,7 +111,7 @@ class VeryTired(Tired):
 def test_where_it_gives_up_newton_goes_on(
     monkeypatch: pytest.MonkeyPatch, corrector: type[Tired]
 ) -> None:
-    monkeypatch.setattr(seal_film, "SchurCorrector", corrector)
+    monkeypatch.setattr(film_correctors, "SchurCorrector", corrector)
     parameters = oring(density=1, sealed_pressure=1.0, stroke="out", speeds=SPEEDS)
     outcome = run(parameters, Recorder())
     assert outcome.converged, outcome.message

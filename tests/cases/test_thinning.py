@@ -22,14 +22,9 @@ from softehl.cases.seal.solve.film_path import FilmPath
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.nearing import NearRod, neared, nearing_stage, without_rounding
 from softehl.cases.seal.solve.path import Followed, PathDriver, PathSettings, Stage, StageFailed
+from softehl.cases.seal.solve.squeezing import gap_masses, pressed_film
 from softehl.cases.seal.solve.stroke_start import StrokeStart
-from softehl.cases.seal.solve.thinning import (
-    gap_masses,
-    pressed_film,
-    sooner,
-    thinned_film,
-    thinning_stage,
-)
+from softehl.cases.seal.solve.thinning import sooner, thinned_film, thinning_stage
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.propped import Propped

@@ -13,7 +13,6 @@ from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.carried import Carrier
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.placement import film_layout, misfit
-from softehl.cases.seal.solve.squeezing import Squeezing
 from softehl.cases.seal.states.estimate import coarser_density, system_at
 from softehl.cases.seal.states.state import Observer, StageRecord
 from softehl.cases.seal.states.verdict import FilmNumbers
@@ -59,40 +58,34 @@ class Adaptation:
 
         Where a mesh does not bear the film all the way, it goes on on one made for it there.
         """
-        film: Film | None = None
+        film, fits = None, False
         for _ in range(CYCLES):
             if isinstance(found, Film):
-                film = found
-                if self._fits(film):
-                    break
-            again = self._remeshed(found)
+                film, fits = found, self._fits(found)
+            again = None if fits else self._remeshed(found)
             if again is None:
                 break
             found = again
         if film is None:
             assert isinstance(found, NoFilm)
             return found
-        return Adapted(film, self._coarser(film), self._fits(film))
+        return Adapted(film, self._coarser(film), fits)
 
     def _fits(self, film: Film) -> bool:
         """Whether a mesh fits its film; a mesh that is given is as it is."""
-        p, thickness = film.system.parameters, film.scales.thickness
+        p, thickness = film.system.parameters, film.squeezing.scales.thickness
         return p.mesh != "graded" or misfit(film.system, film.x, thickness, p.density) <= FITS
 
     def _remeshed(self, found: Film | NoFilm) -> Film | NoFilm | None:
         """The film on the mesh that is made for it; None where there is none."""
-        if isinstance(found, Film):
-            system, x, scales = found.system, found.x, found.scales
-        elif found.squeezing and found.reached:
-            system, x = found.squeezing.system, found.reached.x
-            scales = found.squeezing.scales
-        else:
+        if found.begun is None:
             return None
+        squeezing, now = found.begun
+        layout = film_layout(squeezing.system, now.x, squeezing.scales.thickness)
         try:
-            new = build_system(self.p, film_layout(system, x, scales.thickness))
+            return self._carried(found, build_system(self.p, layout))
         except MeshError:
             return None
-        return self._carried(found, new)
 
     def _coarser(self, film: Film) -> FilmNumbers | None:
         """The numbers of a film on the coarser mesh of the estimate; None without one."""
@@ -107,16 +100,10 @@ class Adaptation:
         return found.numbers if isinstance(found, Film) else None
 
     def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm:
+        assert found.begun is not None
+        squeezing, now = found.begun
+        carrier = Carrier(squeezing.system, system)
+        start, pressures = replace(now, x=carrier.state(now.x)), carrier.pressures(now.x)
         solver = FilmSolver(system, self.newton, self.observer, self.offset, self.records)
-        if isinstance(found, Film):
-            carrier = Carrier(found.system, system)
-            x, pressures = carrier.state(found.x), carrier.pressures(found.x)
-            squeezing = Squeezing.carried(system, x, found.loads, found.scales)
-            return solver.from_film(squeezing, x, pressures)
-        assert found.squeezing
-        assert found.reached
-        before, now = found.squeezing, found.reached
-        carrier = Carrier(before.system, system)
-        x, pressures = carrier.state(now.x), carrier.pressures(now.x)
-        squeezing = Squeezing.carried(system, x, before.film, before.scales, before.moment)
-        return solver.from_moment(squeezing, replace(now, x=x), pressures)
+        go_on = solver.from_film if isinstance(found, Film) else solver.from_moment
+        return go_on(squeezing.carried(system, start.x), start, pressures)

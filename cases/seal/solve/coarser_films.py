@@ -20,16 +20,16 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.solve.carried import carry_pressures, modes_at
 from softehl.cases.seal.solve.contact import lies_in_corner
 from softehl.cases.seal.solve.path import Stage
-from softehl.cases.seal.solve.pressure_newton import patient
+from softehl.cases.seal.solve.pressure_newton import lagged, patient
 from softehl.cases.seal.solve.refinement import carried_elements, carried_unknowns
 from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
+from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.rules import lagrange, pressure_nodes
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.fem.rules import pressure_nodes
 from softehl.runtime.solve.newton import Newton
 
 _ITERATIONS, _PATIENT, _IN_CORNER = 8, 30, 80
@@ -81,18 +81,13 @@ class CoarserFilms:
         assert isinstance(problem, Problem)
         start = self.contact if before is None else self.films[before]
         change = _pressures(self.other, self.films[speed]) - _pressures(self.other, start)
-        lagged = LaggedPressure.of(
-            problem,
-            self.ours.solids,
-            load_kernel("follower_pressure"),
-            _pressures(self.ours, x) + carried_elements(self.other, self.ours, change),
-            self.ours.bulk_moduli,
-        )
+        carried = carried_elements(self.other, self.ours, change)
+        held = lagged(self.ours, problem, _pressures(self.ours, x) + carried)
         most = _IN_CORNER if lies_in_corner(self.ours) else _PATIENT
         stage = replace(
             stage,
             name="film of another mesh",
-            problem_at=lambda _: lagged,
+            problem_at=lambda _: held,
             stop=stage.start,
             waypoints=(),
             method="newton, carried from another mesh",
@@ -106,11 +101,7 @@ class CoarserFilms:
         y = carried_unknowns(self.other, self.ours, change)
         moved = self.other.displacements(change)[self.other.mesh.arc_nodes]
         self.ours.displacements(y)[self.ours.mesh.arc_nodes] = self._along_arc(moved)
-        for film in self.ours.film_fields():
-            rows = change[self.other.pressure_dofs(film.name)]
-            segment, weights = self._places
-            values = np.einsum("skm,skm->sk", weights, rows[segment])
-            y[self.ours.pressure_dofs(film.name)] = values
+        carry_pressures(self.other, self.ours, change, y, self._places)
         return y
 
     def _along_arc(self, values: Array) -> Array:
@@ -127,10 +118,7 @@ class CoarserFilms:
         nodes = pressure_nodes(self.ours.parameters.pressure_order)
         share = 0.5 * (1.0 + nodes)
         at = self._relative(after[:-1, None] + np.diff(after)[:, None] * share)
-        segment = np.clip(np.searchsorted(before, at, side="right") - 1, 0, len(before) - 2)
-        local = 2.0 * (at - before[segment]) / np.diff(before)[segment] - 1.0
-        modes = lagrange(nodes, np.clip(local.ravel(), -1.0, 1.0))[:, :, 0]
-        return segment, modes.reshape(*segment.shape, -1)
+        return modes_at(before, nodes, at)
 
     def _relative(self, places: Array) -> Array:
         """Places on the arc of the other mesh from those on that of ours, mm."""

@@ -20,28 +20,26 @@ from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.coarser_films import CoarserFilms
-from softehl.cases.seal.solve.contact import held_moment, held_place, stalls
+from softehl.cases.seal.solve.contact import held_moment, stalls
+from softehl.cases.seal.solve.film_correctors import film_corrector
 from softehl.cases.seal.solve.grading import film_thickness
 from softehl.cases.seal.solve.path import PathSettings, Stage
+from softehl.cases.seal.solve.squeezing import film_loads
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.solve.linear import Condenser
-from softehl.runtime.solve.modified_newton import ModifiedNewton
-from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Point
 from softehl.runtime.solve.steps import StepRule
 
 METHOD = "modified Newton on the Schur complement of the section"
 
-_NEAR = 0.3  # residual at which the section is in equilibrium well enough to be condensed
 _LOOSE = 1e-3  # between contact and film, whose states are not results
 _FIRM = 1e-6  # of the state from which speeds fall: a section is condensed there that is at rest
 _STALE = 0.1  # a condensation costs about three iterations, and many films follow each other
-_CAVITIES = 40  # inner iterations: where oil ruptures and joins again moves node by node
 _WEIGHT_STEPS = StepRule(0.04, 0.005, growth=2.5, target_iterations=8)
 _SHEAR_STEPS = StepRule(1.0, 0.005, target_iterations=8)
 _FROM_SPEED_TO_SPEED = StepRule(1e3, 1e3)
@@ -87,18 +85,8 @@ def stays(p: ORing) -> bool:
 
 def film_on(system: SealSystem, stroke: Stroke, x: Array, speed: float) -> FilmLoads:
     """A film without shear on the contact state x, under its rod forces, held as this is."""
-    p = system.parameters
-    _, gap = system.arc_film(x)
-    return FilmLoads(
-        p.sealed_pressure,
-        stroke,
-        speed,
-        multipliers=system.rod_multipliers(x).copy(),
-        gap=gap,
-        shear=0.0,
-        place=held_place(p),
-        moment=held_moment(p),
-    )
+    film = film_loads(system, stroke, speed, x, rod_offset=0.0)
+    return replace(film, shear=0.0, moment=held_moment(system.parameters))
 
 
 def first_film(system: SealSystem, settings: PathSettings, stroke: Stroke, x: Array) -> FilmLoads:
@@ -190,13 +178,7 @@ class FastFilm:
     @classmethod
     def of(cls, system: SealSystem, linear: Condenser, x: Array) -> FastFilm:
         """For a stroke begun at x (n,); factors of the section are kept from stage to stage."""
-        finish = Newton(max_iterations=1, linear=linear)
-        iteration = ModifiedNewton()
-        if system.parameters.conserving:
-            iteration = replace(iteration, max_inner=_CAVITIES)
-        corrector = SchurCorrector(
-            linear, iteration, near=_NEAR, finish=finish, stalled=stalls(system)
-        )
+        corrector = replace(film_corrector(system.parameters, linear), stalled=stalls(system))
         return cls(system, film_layer(system, x), corrector)
 
     def weight(self, stage: Stage) -> Stage:

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.pressure_newton import lagged
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
+from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.relaxed import Anchored, Relaxed
-from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.ladder import Ladder
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.modified_newton import ModifiedNewton
@@ -71,9 +71,9 @@ class WholeSteps:
 
     def begun(self, problem: Relaxed, x0: Array, pressures: Array) -> Solution:
         """The step from a state of another mesh with these element pressures (Q,)."""
-        lagged = self._lagged(problem.problem, pressures)
+        held = lagged(self.system, problem.problem, pressures)
         newton = replace(self.newton, tolerance=LEAST, stagnation=1.0, max_iterations=_MONOLITHIC)
-        return newton.solve(Anchored(lagged, problem.term, problem.state), problem.admissible(x0))
+        return newton.solve(Anchored(held, problem.term, problem.state), problem.admissible(x0))
 
     def steady(
         self,
@@ -86,15 +86,7 @@ class WholeSteps:
         if pressures is None:
             pressures = element_pressures(problem, self.system.solids, x0)
         newton = replace(self.newton, max_iterations=iterations)
-        x0 = x0.copy()
-        x0[problem.fixed] = problem.values
-        return newton.solve(self._lagged(problem, pressures), x0)
-
-    def _lagged(self, problem: Problem, pressures: Array) -> LaggedPressure:
-        kernel = load_kernel("follower_pressure")
-        return LaggedPressure.of(
-            problem, self.system.solids, kernel, pressures, self.system.bulk_moduli
-        )
+        return newton.solve(lagged(self.system, problem, pressures), problem.admissible(x0))
 
 
 @dataclass(eq=False)

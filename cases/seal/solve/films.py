@@ -18,7 +18,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.film_correctors import FilmCorrectors
-from softehl.cases.seal.solve.squeezing import InletScales, Squeezing, film_loads
+from softehl.cases.seal.solve.squeezing import InletScales, Squeezing, film_loads, pressed_film
 from softehl.cases.seal.states.results import film_numbers
 from softehl.cases.seal.states.state import Observer, StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
@@ -37,13 +37,26 @@ _AT_ONCE = 8
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """A steady film on a mesh, its unknowns x (n,)."""
+    """A steady film on a mesh, its unknowns x (n,). squeezing: how it was squeezed out."""
 
-    system: SealSystem
-    loads: FilmLoads
-    scales: InletScales
+    squeezing: Squeezing
     x: Array
     iterations: int
+
+    @property
+    def system(self) -> SealSystem:
+        """The system whose film it is."""
+        return self.squeezing.system
+
+    @property
+    def loads(self) -> FilmLoads:
+        """The loads that it bears."""
+        return self.squeezing.film
+
+    @property
+    def begun(self) -> tuple[Squeezing, Moment]:
+        """The moment from which it is squeezed out where it is not found at once."""
+        return self.squeezing, Moment(self.x, _AGAIN, 1.0)
 
     @cached_property
     def problem(self) -> Problem:
@@ -60,15 +73,14 @@ class Film:
 class NoFilm:
     """Why there is no film at a speed.
 
-    squeezing, reached: how it was squeezed out, and how far, if it was begun.
+    begun: how it was squeezed out, and how far, where it was begun.
     """
 
     stroke: Stroke
     speed: float
     status: Status
     message: str
-    squeezing: Squeezing | None = None
-    reached: Moment | None = None
+    begun: tuple[Squeezing, Moment] | None = None
 
 
 @dataclass(eq=False)
@@ -95,21 +107,21 @@ class FilmSolver:
         squeezing = Squeezing(
             self.system, film_layer(self.system, x), film, scales, self.system.moment(x)
         )
-        start = Moment(squeezing.start(x), squeezing.first(x))
-        return self._followed(squeezing, start)
+        pressed = pressed_film(self.system, x, film.sealed_pressure)
+        return self._followed(squeezing, Moment(pressed, squeezing.first(x)))
 
-    def from_film(self, carried: Squeezing, x: Array, pressures: Array) -> Film | NoFilm:
-        """The steady film of another mesh, carried to ours: x (n,), element pressures (Q,).
+    def from_film(self, carried: Squeezing, start: Moment, pressures: Array) -> Film | NoFilm:
+        """The steady film of another mesh, carried to ours: at once, else squeezed out from there.
 
-        At once, else squeezed out from there.
+        pressures: (Q,) of the elements.
         """
-        correctors = FilmCorrectors.of(self.system, self.newton)
+        correctors, x = FilmCorrectors.of(self.system, self.newton), start.x
         with self._told(carried.film) as told:
             problem = self.system.film_problem(carried.film).since(x)
             found = told(correctors.whole.steady(problem, x, pressures, _AT_ONCE))
         if found.converged and carried.change(x, found.x) < inf:
             return self._entered(carried, correctors, found)
-        return self.from_moment(carried, Moment(x, _AGAIN, 1.0), pressures)
+        return self.from_moment(carried, start, pressures)
 
     def from_moment(self, carried: Squeezing, start: Moment, pressures: Array) -> Film | NoFilm:
         """The film that another mesh has squeezed out as far as to a moment, carried to ours."""
@@ -124,12 +136,12 @@ class FilmSolver:
             branch, reached = steps.follow(squeezing, start, on_point=lambda p: told(p.solution))
             if not branch.converged:
                 words = branch.message
-                return NoFilm(film.stroke, film.speed, branch.status, words, squeezing, reached)
+                return NoFilm(film.stroke, film.speed, branch.status, words, (squeezing, reached))
             problem = self.system.film_problem(film).since(reached.x)
             end = told(correctors.steady(problem, squeezing.layer, reached.x))
         if not end.converged:
             words = f"steady film: {end.message}"
-            return NoFilm(film.stroke, film.speed, end.status, words, squeezing, reached)
+            return NoFilm(film.stroke, film.speed, end.status, words, (squeezing, reached))
         return self._entered(squeezing, correctors, end)
 
     def _entered(self, squeezing: Squeezing, correctors: FilmCorrectors, found: Solution) -> Film:
@@ -137,16 +149,13 @@ class FilmSolver:
 
         Without it where no such film is found.
         """
-        loads, scales = squeezing.film, squeezing.scales
-        film = Film(self.system, loads, scales, found.x, found.iterations)
+        film = Film(squeezing, found.x, found.iterations)
         if not film.numbers.enters:
             return film
-        more = replace(loads, entrance=film.numbers.entrance)
-        problem = self.system.film_problem(more).since(found.x)
-        end = correctors.steady(problem, squeezing.layer, found.x)
-        if not end.converged:
-            return film
-        return Film(self.system, more, scales, end.x, end.iterations)
+        more = replace(squeezing, film=replace(film.loads, entrance=film.numbers.entrance))
+        problem = self.system.film_problem(more.film).since(found.x)
+        end = correctors.steady(problem, more.layer, found.x)
+        return Film(more, end.x, end.iterations) if end.converged else film
 
     @contextmanager
     def _told(self, film: FilmLoads) -> Iterator[Callable[[Solution], Solution]]:

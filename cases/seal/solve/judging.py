@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from math import nan
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.adaptation import Adapted
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure, unsealed
@@ -61,7 +61,7 @@ class Judge:
         """The state of a film; faster: of the same stroke at the next higher speed, if there is."""
         film, other, p = adapted.film, adapted.other, adapted.film.system.parameters
         numbers = film.numbers
-        error, friction = _errors(p, numbers, other)
+        error, friction = errors(p.density, numbers, other, coarser_density(p.density))
         wanted = p.error_estimate and p.mesh == "graded"
         verdict = replace(self.contact, last=faster).after(numbers)
         verdict = replace(verdict, error=error if wanted else None)
@@ -77,12 +77,13 @@ class Judge:
         return state.settled
 
 
-def _errors(p: ORing, film: FilmNumbers, other: FilmNumbers | None) -> tuple[float, float]:
-    """Estimated errors of h* and of friction, %."""
+def errors(
+    density: int, film: FilmNumbers, other: FilmNumbers | None, at: Fraction
+) -> tuple[float, float]:
+    """Estimated errors of h* and of friction, %, from the film of a mesh of another density."""
     if other is None:
         return nan, nan
-    at = coarser_density(p.density)
     return (
-        estimated_error(p.density, film.h_star, other.h_star, at),
-        estimated_error(p.density, film.friction, other.friction, at),
+        estimated_error(density, film.h_star, other.h_star, at),
+        estimated_error(density, film.friction, other.friction, at),
     )

@@ -15,7 +15,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.states.section_view import film_pressure
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.spacing import Spacing
+from softehl.runtime.mesh.spacing import STATIONS, Spacing
 
 THINNING, RISE = 0.3, 0.05
 """Changes along a segment at density 2: of ln h where the film is thin, of p over its maximum."""
@@ -30,7 +30,6 @@ DEPTH = 2.5
 """Elements on the arc are nowhere thicker than so many of the shortest segments of the inlet."""
 
 _CLOSED = 1e-3  # of that thickness: rough surfaces may interpenetrate
-_STATIONS, _STEPS = 20001, 27 * 64
 _DENSITY, _THIRDS = 2, 3
 """Density that the sizes are for; segments at density 1 are a multiple of three, because meshes
 exist for thirds of a density."""
@@ -44,10 +43,8 @@ def film_layout(system: SealSystem, x: Array, thickness: float) -> Layout:
     s, size = sizes(system, x, thickness)
     index = _index(s, size)
     long = _THIRDS * ceil(index[-1] / (_DENSITY * _THIRDS))
-    places = np.interp(np.linspace(0.0, index[-1], _STEPS + 1), index, s) / s[-1]
-    places[-1] = 1.0
     layout = system.section.layout
-    return layout.graded(Spacing(places), long, DEPTH * float(size.min()))
+    return layout.graded(Spacing.of(s, index), long, DEPTH * float(size.min()))
 
 
 def misfit(system: SealSystem, x: Array, thickness: float, density: float) -> float:
@@ -73,10 +70,10 @@ def sizes(system: SealSystem, x: Array, thickness: float) -> tuple[Array, Array]
     wanted = np.maximum(slope_h / THINNING, slope_p / (RISE * np.abs(p).max()))
     longest = at[-1] / COARSEST
     segment = np.minimum(1.0 / np.maximum(wanted, 1e-12), longest)
-    s = np.linspace(0.0, at[-1], _STATIONS)
+    s = np.linspace(0.0, at[-1], STATIONS)
     there = segment[np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(dx) - 1)]
     step = GROWTH * (s[1] - s[0])
     for way in (slice(None), slice(None, None, -1)):  # no faster growth than GROWTH on either side
-        place = step * np.arange(_STATIONS)
+        place = step * np.arange(STATIONS)
         there[way] = np.minimum.accumulate(there[way] - place) + place
     return s, there

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from softehl.cases.seal.equations.equations import SealSystem
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.assembly import ElementKernel
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution
 
@@ -35,6 +37,12 @@ def patient(newton: Newton, iterations: int = _PATIENT) -> Newton:
     groove, and the edges of contact there lie elsewhere.
     """
     return replace(newton, max_iterations=iterations, line_search=True)
+
+
+def lagged(system: SealSystem, problem: Problem, pressures: Array) -> LaggedPressure:
+    """A problem of a seal with lagged pressures (Q,) of the elements of its section."""
+    kernel = load_kernel("follower_pressure")
+    return LaggedPressure.of(problem, system.solids, kernel, pressures, system.bulk_moduli)
 
 
 @dataclass(eq=False)

@@ -18,9 +18,9 @@ from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.section.round_layout import RoundLayout
 from softehl.cases.seal.solve.contact import contact_problem, contact_stage
 from softehl.cases.seal.solve.path import PathSettings, Stage
+from softehl.cases.seal.solve.pressure_newton import lagged
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.mesh.carrying import (
     carry_boundary,
     carry_chain,
@@ -147,13 +147,8 @@ def carried_contact(
     p_s = new.parameters.sealed_pressure if sealed_pressure is None else sealed_pressure
     pressures = element_pressures(contact_problem(old, settings, p_s), old.solids, x)
     y = _carried(old, new, carry, x)
-    problem = LaggedPressure.of(
-        contact_problem(new, settings, p_s).since(y),
-        new.solids,
-        load_kernel("follower_pressure"),
-        carry.elements(pressures),
-        new.bulk_moduli,
-    )
+    bare = contact_problem(new, settings, p_s).since(y)
+    problem = lagged(new, bare, carry.elements(pressures))
     stage = contact_stage(new, problem, method=f"newton, {carry.words}", name=name)
     return stage, y
 

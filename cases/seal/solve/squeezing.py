@@ -28,6 +28,7 @@ from softehl.cases.seal.solve.grading import MULTIPLE, film_thickness, inlet_tim
 from softehl.cases.seal.states.contacts import Edge, contact_edges
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer
+from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.fem.rules import content_rule, pressure_nodes
 
@@ -38,7 +39,8 @@ FIRST = 1e-3
 """First step, of T, where contact leaves a gap as thin as the film; a thicker one flows sooner."""
 
 ROUNDING = 1e-4
-"""Largest residual that rounding of the gap may leave in the first step."""
+"""Largest residual that rounding of the gap may leave: a film held for a time that is too short has
+no other state than the one it begins at, to all digits that the gap has."""
 
 _NO_WIDTH = 1e-6
 """Of the widest part of the arc around a node, below which it is between segments on a wall."""
@@ -54,9 +56,8 @@ class InletScales:
     @classmethod
     def of(cls, system: SealSystem, stroke: Stroke, speed: float, x: Array) -> InletScales | None:
         """By the edge of the contact x (n,) where a stroke draws its oil in; None without one."""
-        edges, p = contact_edges(system, x), system.parameters
-        edge: Edge | None = edges[0 if stroke == "out" else -1] if edges else None
-        if edge is None or not 0.0 < edge.rise < inf:
+        edge, p = inlet_edge(system, stroke, x), system.parameters
+        if edge is None:
             return None
         return cls(inlet_time(p, edge, speed), MULTIPLE * film_thickness(p, [edge], speed))
 
@@ -93,23 +94,15 @@ class Squeezing:
     scales: InletScales
     moment: float = 0.0
 
-    @classmethod
-    def carried(
-        cls,
-        system: SealSystem,
-        x: Array,
-        film: FilmLoads,
-        scales: InletScales,
-        moment: float = 0.0,
-    ) -> Squeezing:
-        """The film of another mesh on that of a system; x: (n,) carried to it."""
+    def carried(self, system: SealSystem, x: Array) -> Squeezing:
+        """The same film on the mesh of another system; x: (n,) carried to it."""
         film = replace(
-            film,
+            self.film,
             multipliers=system.rod_multipliers(x).copy(),
-            gap=system.arc_film(x)[1] + film.rod_offset,
+            gap=system.arc_film(x)[1] + self.film.rod_offset,
             entrance=0.0,
         )
-        return cls(system, film_layer(system, x), film, scales, moment)
+        return replace(self, system=system, layer=film_layer(system, x), film=film)
 
     def step(self, before: Array, tau: float, load: float) -> Relaxed:
         """See `Transient`; the load is the shear stress of the film."""
@@ -136,48 +129,66 @@ class Squeezing:
     def first(self, x: Array) -> float:
         """Length of the first step from the contact state x (n,); see `FIRST` and `ROUNDING`."""
         thicker = self.scales.thickness / self.film.rod_offset if self.film.rod_offset else 1.0
-        rounding = self._masses(x) @ np.spacing(np.abs(x))
         problem = self.system.film_problem(self.film)
-        rounding[problem.fixed] = 0.0
-        least = problem.norm(rounding) / (ROUNDING * self.scales.time)
+        least = least_time(problem, self._masses(x), x) / self.scales.time
         return float(max(FIRST * min(1.0, thicker) ** EXPONENT, least))
 
-    def start(self, x: Array) -> Array:
-        """The contact state x (n,) with a film that has the pressures of the contact."""
-        system, y = self.system, x.copy()
-        z, r = system.deformed(x)[system.mesh.arc_nodes].T
-        dz = np.diff(z)
-        width = 0.5 * (np.append(dz, 0.0) + np.append(0.0, dz))
-        force = np.maximum(-system.rod_multipliers(x), 0.0) * system.rod_areas
-        low, sealed = system.dam, np.zeros(len(z))
-        sealed[:low] = self.film.sealed_pressure
-        if 0 < low < len(dz):
-            sealed[low] = self.film.sealed_pressure * dz[low - 1] / (dz[low - 1] + dz[low])
-        wide = width > _NO_WIDTH * width.max()
-        own = np.divide(force, 2.0 * pi * r * width, out=np.zeros_like(r), where=wide)
-        pressures, rows = own + sealed, system.pressure_dofs()
-        ends = np.stack([pressures[:-1], pressures[1:]], axis=1)
-        y[rows] = ends @ _shapes(rows.shape[1] - 1).T
-        return y
-
     def _masses(self, x: Array) -> csc_array[np.float64]:
-        """Weighted rates (n, n) of what the film holds by the radial displacements of the arc, mm.
-
-        Rows are the pressures'; what a film holds is lumped where these stand.
-        """
-        system = self.system
-        rows, n = system.pressure_dofs(), system.layout.total
-        segments, order = system.mesh.arc_segments, rows.shape[1] - 1
-        z, h = system.deformed(x)[:, 0], system.arc_film(x)[1]
+        """Rates of what the film holds, by the local time steps; see `gap_masses`."""
+        h = self.system.arc_film(x)[1]
         relative = self.scales.thickness / np.maximum(h, self.scales.thickness)
-        weights = np.stack([relative[:-1], relative[1:]], axis=1) ** EXPONENT
-        half = 0.5 * (z[segments[:, 1]] - z[segments[:, 0]])
-        shares = content_rule(order).weights[:, None] * _shapes(order)
-        values = half[:, None, None] * shares * weights[:, None, :]
-        radii = system.layout.part(DISPLACEMENT).start + 2 * segments + 1
-        places = np.broadcast_arrays(rows[..., None], radii[:, None])
-        at = tuple(part.ravel() for part in places)
-        return csc_array(coo_array((values.ravel(), at), shape=(n, n)))
+        return gap_masses(self.system, x, relative**EXPONENT)
+
+
+def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
+    """The contact state x (n,) with a film that has the pressures of the contact."""
+    y, nodes = x.copy(), system.mesh.arc_nodes
+    z, r = system.deformed(x)[nodes].T
+    dz = np.diff(z)
+    width = 0.5 * (np.append(dz, 0.0) + np.append(0.0, dz))
+    force = np.maximum(-system.rod_multipliers(x), 0.0) * system.rod_areas
+    low, sealed = system.dam, np.zeros(len(nodes))
+    sealed[:low] = p_s
+    if 0 < low < len(dz):
+        sealed[low] = p_s * dz[low - 1] / (dz[low - 1] + dz[low])
+    wide = width > _NO_WIDTH * width.max()
+    pressures = np.divide(force, 2.0 * pi * r * width, out=np.zeros_like(r), where=wide) + sealed
+    rows = system.pressure_dofs()
+    y[rows] = np.stack([pressures[:-1], pressures[1:]], axis=1) @ _shapes(rows.shape[1] - 1).T
+    return y
+
+
+def gap_masses(system: SealSystem, x: Array, weights: Array | None = None) -> csc_array[np.float64]:
+    """Rates (n, n) of what the film holds by the radial displacements of the arc, mm.
+
+    Rows are the pressures'; what a film holds is lumped where these stand. weights: (arc nodes,) of
+    the displacements, 1 if left out.
+    """
+    pressures, n = system.pressure_dofs(), system.layout.total
+    segments, order = system.mesh.arc_segments, pressures.shape[1] - 1
+    z = system.deformed(x)[:, 0]
+    half = 0.5 * (z[segments[:, 1]] - z[segments[:, 0]])
+    radii = system.layout.part(DISPLACEMENT).start + 2 * segments + 1
+    masses = half[:, None, None] * (content_rule(order).weights[:, None] * _shapes(order))
+    if weights is not None:
+        masses = masses * np.stack([weights[:-1], weights[1:]], axis=1)[:, None, :]
+    at = np.broadcast_arrays(pressures[..., None], radii[:, None])
+    places = tuple(part.ravel() for part in at)
+    return csc_array(coo_array((masses.ravel(), places), shape=(n, n)))
+
+
+def least_time(problem: Problem, hold: csc_array[np.float64], x: Array) -> float:
+    """Least tau, s, by `ROUNDING`, from a state x (n,). hold: see `gap_masses`."""
+    rounding = hold @ np.spacing(np.abs(x))
+    rounding[problem.fixed] = 0.0
+    return problem.norm(rounding) / ROUNDING
+
+
+def inlet_edge(system: SealSystem, stroke: Stroke, x: Array) -> Edge | None:
+    """The edge of the contact x (n,) where a stroke draws its film in; None without one."""
+    edges = contact_edges(system, x)
+    found = edges[0 if stroke == "out" else -1] if edges else None
+    return found if found and 0.0 < found.rise < inf else None
 
 
 def _shapes(order: int) -> Array:

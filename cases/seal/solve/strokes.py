@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from math import nan
 from typing import TypeAlias
 
 from softehl.cases.seal.equations.equations import SealSystem
@@ -23,28 +21,23 @@ from softehl.cases.seal.solve.film_transfer import (
     film_on_finer,
     films_of,
 )
+from softehl.cases.seal.solve.judging import errors, verdict_of_contact
 from softehl.cases.seal.solve.order import REFERENCE_ORDER, OrderPair, transferred
 from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.solve.rough_path import RoughPath
 from softehl.cases.seal.solve.stroke_start import StrokeStart, emptied
 from softehl.cases.seal.solve.wanted import Found, Wanted
-from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure, unsealed
 from softehl.cases.seal.states.estimate import (
     coarser_density,
-    estimated_error,
     finer_density,
     reservation,
 )
-from softehl.cases.seal.states.overlap import overlap
 from softehl.cases.seal.states.results import film_numbers, film_state
 from softehl.cases.seal.states.sensitivity_table import resolved
 from softehl.cases.seal.states.state import COLLAPSED, UNDER_RESOLVED, FilmState
 from softehl.cases.seal.states.verdict import (
-    ANY_RATIO,
-    INLET_RATIO,
     FilmNumbers,
     Verdict,
-    fewest_inlet_segments,
 )
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
@@ -161,19 +154,9 @@ class SealRun:
     def stroke(self, stroke: Stroke, wanted: Wanted) -> StageFailed | None:
         """Second and third stage of one stroke; why it ended early, if it did."""
         p, path = self.system.parameters, self.path
-        reference = float(contact_pressure(self.system, p.sealed_pressure, self.x).max())
-        references = contact_peaks(self.system, p.sealed_pressure, self.x)
-        fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
-        ratios = ANY_RATIO if p.mesh == "uniform" else INLET_RATIO
         known = films_of(*self.coarser, stroke, self.system) if self.coarser else None
         coarser = wanted.begin(known.numbers if known else {})
-        verdict = Verdict(reference, fewest=fewest, ratios=ratios, rough=p.rough)
-        verdict = replace(
-            verdict,
-            unsealed=unsealed(self.system, self.x),
-            references=references,
-            overlap=overlap(self.system, self.x),
-        )
+        verdict = verdict_of_contact(self.system, self.x)
         progress = StrokeState(verdict, verdict, set(wanted.left))
 
         def on_speed(film: FilmLoads, point: Point) -> None:
@@ -241,7 +224,7 @@ class SealRun:
 
         def judged(other: FilmNumbers | None, *, finer: bool = False) -> FilmState:
             at = finer_density(p.density) if finer else coarser_density(p.density)
-            error, friction = _errors(p.density, last, other, at)
+            error, friction = errors(p.density, last, other, at)
             told = replace(verdict, last=last, error=error if wants_error else None)
             state = replace(
                 film_state(system, problem, film, x, told, iterations),
@@ -293,18 +276,6 @@ class SealRun:
             solution = driver.newton.solve(low.film_problem(at), pair.low_part(both))
             if solution.converged:
                 on_speed(at, Point(1.0, solution))
-
-
-def _errors(
-    density: int, film: FilmNumbers, other: FilmNumbers | None, at: Fraction
-) -> tuple[float, float]:
-    """Estimated errors of h* and of friction, %, from the film of a mesh of another density."""
-    if other is None:
-        return nan, nan
-    return (
-        estimated_error(density, film.h_star, other.h_star, at),
-        estimated_error(density, film.friction, other.friction, at),
-    )
 
 
 OtherMesh: TypeAlias = tuple[FilmPath, Array]
