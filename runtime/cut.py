@@ -1,94 +1,88 @@
 """A layer's tangent, cut between the unknowns that it shares and its own.
 
 The places of the entries are found once for a pattern. Its own unknowns are numbered along the
-layer, so that their matrix is a band.
+layer and known to few others, so that they are eliminated piece by piece.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.band import Groups
+from softehl.runtime.elimination import Elimination
 
 Small = NDArray[np.int32]
-Places = tuple[Integers, Integers]
-"""Where entries are in the data of a matrix, and where they go."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """Of a pattern of m shared unknowns, first, and k own ones.
+    """Of a csc pattern with m shared unknowns, first, and k own ones.
 
-    shared: of its first m columns, to (m + k, m). right: of the first m rows of the others, csr
-    with indices and indptr. own: of the rest, to the band (2 lower + upper + 1, k) of LAPACK.
+    inside: places of its entries in the data of a larger pattern. rows, columns: of each.
     """
 
     m: int
     k: int
-    shared: Places
-    right: tuple[Integers, Integers, Integers]
-    own: Places
-    lower: int
-    upper: int
-    groups: Groups | None = None
+    inside: Integers
+    rows: Integers
+    columns: Integers
 
     @classmethod
     def of(cls, indptr: Small, indices: Small, m: int, size: int) -> Cut:
         """Of a csc pattern whose first `size` = m + k rows and columns count."""
-        k = size - m
         columns = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
-        rows, inside = indices.astype(np.int64), (indices < size) & (columns < size)
-        first = np.flatnonzero(inside & (columns < m))
-        right = np.flatnonzero(inside & (columns >= m) & (rows < m))
-        right = right[np.lexsort((columns[right], rows[right]))]
-        counts = np.bincount(rows[right], minlength=m)
-        own = np.flatnonzero(inside & (columns >= m) & (rows >= m))
-        i, j = rows[own] - m, columns[own] - m
-        lower, upper = int((i - j).max(initial=0)), int((j - i).max(initial=0))
-        return cls(
-            m=m,
-            k=k,
-            shared=(first, rows[first] * m + columns[first]),
-            right=(right, columns[right] - m, np.concatenate([[0], np.cumsum(counts)])),
-            own=(own, (lower + upper + i - j) + j * (2 * lower + upper + 1)),
-            lower=lower,
-            upper=upper,
-            groups=Groups.of(i, j, k, (lower, upper)),
-        )
+        rows = indices.astype(np.int64)
+        inside = np.flatnonzero((rows < size) & (columns < size))
+        return cls(m, size - m, inside, rows[inside], columns[inside])
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """Of the own unknowns."""
+        return Elimination.of(self.rows, self.columns, self.m, self.m + self.k)
 
     def parts(self, data: Array) -> Parts:
-        """The tangent with these data (nnz,) of the pattern."""
-        shared, band = (np.zeros(shape) for shape in self._shapes)
-        shared.ravel()[self.shared[1]] = data[self.shared[0]]
-        band.ravel()[self.own[1]] = data[self.own[0]]
-        place, indices, indptr = self.right
-        entries = np.asarray(data[place], dtype=np.float64), indices, indptr
-        right = csr_array(entries, shape=(self.m, self.k), dtype=np.float64, copy=False)
-        return Parts(self, shared, right, band.T)
+        """The tangent with these data of the larger pattern."""
+        return Parts(self, data[self.inside])
 
-    @property
-    def _shapes(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Of the shared part, and of the band column by column."""
-        return (self.m + self.k, self.m), (self.k, 2 * self.lower + self.upper + 1)
+    def placed(self, rows: Integers, columns: Integers, values: Array) -> Array:
+        """Data of a tangent with these entries alone. Raises ValueError where it has none there."""
+        size = self.m + self.k
+        order = np.lexsort((self.rows, self.columns))
+        keys, wanted = self.columns[order] * size + self.rows[order], columns * size + rows
+        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        if not np.array_equal(keys[at], wanted):
+            lost = np.flatnonzero(keys[at] != wanted)[0]
+            raise ValueError(
+                f"the layer's tangent has no entry in row {rows[lost]}, column {columns[lost]}; "
+                "add an element that knows both unknowns to the layer"
+            )
+        return np.bincount(order[at], values, len(keys))
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """shared: (m + k, m) the first columns. right: (m, k) the first rows of the others. own: the
-    rest as a band (2 lower + upper + 1, k), with room for what LAPACK's factors need.
-    """
+    """data: of the entries of the cut pattern."""
 
     cut: Cut
-    shared: Array
-    right: csr_array[np.float64]
-    own: NDArray[np.float64]
+    data: Array
 
     @classmethod
     def of(cls, L: csc_array[np.float64], m: int) -> Parts:
         """Cut L (m + k, m + k), csc without entries that are given twice."""
         return Cut.of(L.indptr, L.indices, m, L.shape[0]).parts(L.data)
+
+    @property
+    def matrix(self) -> csc_array[np.float64]:
+        """The tangent (m + k, m + k)."""
+        cut, size = self.cut, self.cut.m + self.cut.k
+        return csc_array((self.data, (cut.rows, cut.columns)), shape=(size, size))
+
+    @property
+    def shared(self) -> csc_array[np.float64]:
+        """The first columns (m + k, m)."""
+        return self.matrix[:, : self.cut.m]

@@ -28,7 +28,7 @@ ORDER = {
     "runtime": (
         *(
             "arrays mpi names tuning",
-            "band",
+            "elimination",
             "cut library",
             "io",
             "calls",

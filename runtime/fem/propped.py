@@ -36,14 +36,17 @@ class Propped(Layered):
     def layer_linearise(self, x: Array) -> tuple[Array, Parts]:
         """See `LayeredProblem`."""
         r, parts = super().layer_linearise(x)
-        shared = parts.shared.copy()
-        shared[self._rows, self._rows] -= 1.0
-        return self._without_props(r, x), replace(parts, shared=shared)
+        return self._without_props(r, x), replace(parts, data=parts.data - self._props)
 
     def _without_props(self, r: Array, x: Array) -> Array:
         r = r.copy()
         r[self._rows] -= x[self.shared[self._rows]]
         return r
+
+    @cached_property
+    def _props(self) -> Array:
+        """Unity on their diagonal in the data of the layer's tangent."""
+        return self.layer.cut.placed(self._rows, self._rows, np.ones(len(self._rows)))
 
     @cached_property
     def _rows(self) -> Integers:

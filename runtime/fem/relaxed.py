@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, csr_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.cut import Parts
@@ -42,7 +42,7 @@ class Relaxed(Layered):
     def layer_linearise(self, x: Array) -> tuple[Array, Parts]:
         """See `LayeredProblem`."""
         r, parts = super().layer_linearise(x)
-        return r + self._small @ self._away(x), replace(parts, shared=parts.shared + self._small)
+        return r + self._small @ self._away(x), replace(parts, data=parts.data + self._entries)
 
     @property
     def term(self) -> csc_array[np.float64]:
@@ -62,10 +62,16 @@ class Relaxed(Layered):
         return C
 
     @cached_property
-    def _small(self) -> Array:
+    def _small(self) -> csr_array[np.float64]:
         """The term (m + k, m) of the layer."""
         numbers = self.layer.numbers[: self.layer.size]
-        return self._free.tocsr()[numbers].tocsc()[:, self.shared].toarray()
+        return csr_array(self._free.tocsr()[numbers].tocsc()[:, self.shared])
+
+    @cached_property
+    def _entries(self) -> Array:
+        """Those of the term in the data of the layer's tangent."""
+        term = self._small.tocoo()
+        return self.layer.cut.placed(term.row, term.col, term.data)
 
 
 @dataclass(frozen=True, eq=False)

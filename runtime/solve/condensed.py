@@ -6,7 +6,7 @@ some state, and the condensed residual g of the body at an iterate x, the conden
     S (a - a_x) + g(x) + L_shared(a, p) = 0,   L_own(a, p) = 0
 
 in the unknowns a that both share and the unknowns p that only the layer has; these are eliminated
-by a banded factorisation.
+piece by piece.
 """
 
 from __future__ import annotations
@@ -107,11 +107,11 @@ class CondensedSystem:
         return residual_size(self.problem, full)
 
     def step(self, r: Array, L: Parts) -> Array:
-        """Newton step (n,): the own unknowns by a banded solve, the shared by a dense one."""
-        shared, own = _solved(self.schur, L, r)
+        """Newton step (n,)."""
+        x, m = solved(self.schur, L, r), len(self.problem.shared)
         step = np.zeros_like(self.at.x)
-        step[self.problem.shared] = -shared
-        step[self.problem.own] = -own
+        step[self.problem.shared] = -x[:m]
+        step[self.problem.own] = -x[m:]
         if not np.isfinite(step).all():
             raise SingularMatrix("the condensed system has no finite solution")
         return step
@@ -120,37 +120,18 @@ class CondensedSystem:
         return self.problem.layer_limit(x, dx)
 
 
-def _solved(schur: Array, L: Parts, r: Array) -> tuple[Array, Array]:
-    """Shared (m,) and own unknowns (k,) of the layer's tangent with S (m, m) added, for r (m + k,).
+def solved(schur: Array, L: Parts, r: Array) -> Array:
+    """Unknowns (m + k,) of the layer's tangent with S (m, m) added, for r (m + k,).
 
     Raises SingularMatrix.
     """
-    m = L.cut.m
-    eliminated = eliminated_own(L, np.column_stack([L.shared[m:], r[m:]]))
-    through = np.asarray(L.right @ eliminated)
-    A, b = schur + L.shared[:m] - through[:, :m], r[:m] - through[:, m]
-    _, _, shared, info = lapack.dgesv(A, b, overwrite_a=True, overwrite_b=True)
-    if info:
-        raise SingularMatrix("the condensed system has no LU factors")
-    return shared, eliminated[:, m] - eliminated[:, :m] @ shared
-
-
-def eliminated_own(L: Parts, b: Array) -> Array:
-    """A^-1 b, (k, j), of the matrix A of the own unknowns, whose band is overwritten.
-
-    Raises SingularMatrix.
-    """
-    cut = L.cut
-    if not cut.k:
-        return b
-    found = cut.groups.solve(L.own, b) if cut.groups else None
-    if found is not None:
-        return found
-    _, _, x, info = lapack.dgbsv(
-        cut.lower, cut.upper, L.own, b, overwrite_ab=True, overwrite_b=True
-    )
-    if info:
-        raise SingularMatrix("the layer's own unknowns are not determined")
+    x = L.cut.elimination.solve(schur, L.data, r)
+    if x is None:  # a piece is singular, which the whole may not be
+        A, m = L.matrix.toarray(order="F"), L.cut.m
+        A[:m, :m] += schur
+        _, _, x, info = lapack.dgesv(A, r, overwrite_a=True)
+        if info:
+            raise SingularMatrix("the condensed system has no LU factors")
     return np.asarray(x)
 
 

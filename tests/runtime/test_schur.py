@@ -16,7 +16,6 @@ from scipy.sparse import csc_array
 from softehl.runtime.arrays import Array
 from softehl.runtime.cut import Cut, Parts
 from softehl.runtime.solve import pardiso
-from softehl.runtime.solve.condensed import eliminated_own
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.linear import Condenser, SingularMatrix
 from softehl.runtime.solve.modified_newton import ModifiedNewton
@@ -236,16 +235,6 @@ def test_a_start_that_is_not_finite_is_named() -> None:
     assert ModifiedNewton().solve(problem, c, np.full(N, 1e200)).status is Status.NOT_FINITE
 
 
-def test_banded_solve_against_a_dense_one(rng: np.random.Generator) -> None:
-    A = np.diag(rng.normal(size=8)) + np.diag(rng.normal(size=7), 1) + np.diag(np.ones(6), -2)
-    b = rng.normal(size=(8, 3))
-    assert eliminated_own(Parts.of(csc_array(A), 0), b) == pytest.approx(
-        np.linalg.solve(A, b), rel=1e-9
-    )
-    with pytest.raises(SingularMatrix):
-        eliminated_own(Parts.of(csc_array(np.zeros((3, 3))), 0), np.ones((3, 1)))
-
-
 # --- the corrector -----------------------------------------------------------------------------
 
 
@@ -434,22 +423,21 @@ def test_a_looser_view_shares_the_condensation() -> None:
     assert tight.x == pytest.approx(answer(0.5), abs=1e-9)
 
 
-def test_a_tangent_cut_between_shared_and_own_unknowns() -> None:
+def test_a_tangent_is_cut_from_a_larger_one() -> None:
     rng = np.random.default_rng(3)
-    A = np.where(rng.random((9, 9)) < 0.5, rng.random((9, 9)), 0.0)
-    parts = Parts.of(csc_array(A), 4)
-    cut = parts.cut
-    rows, columns = np.indices((5, 5))
-    own = parts.own[np.clip(cut.lower + cut.upper + rows - columns, 0, None), columns]
-    assert (parts.shared == A[:, :4]).all()
-    assert (parts.right.toarray() == A[:4, 4:]).all()
-    assert (own == A[4:, 4:]).all()
+    A = np.where(rng.random((9, 9)) < 0.7, rng.random((9, 9)), 0.0)
+    K = csc_array(A)
+    parts = Cut.of(K.indptr, K.indices, 4, 7).parts(K.data)
+    assert (parts.matrix.toarray() == A[:7, :7]).all()
+    assert (parts.shared.toarray() == A[:7, :4]).all()
 
 
-def test_a_cut_leaves_out_what_is_prescribed() -> None:
-    rng = np.random.default_rng(4)
-    A = csc_array(np.where(rng.random((9, 9)) < 0.7, rng.random((9, 9)), 0.0))
-    some, all_of_it = Cut.of(A.indptr, A.indices, 4, 7).parts(A.data), Parts.of(A[:7, :7], 4)
-    assert (some.shared == all_of_it.shared).all()
-    assert (some.right.toarray() == all_of_it.right.toarray()).all()
-    assert (some.own == all_of_it.own).all()
+def test_entries_are_added_where_the_tangent_has_some() -> None:
+    A = np.triu(np.ones((5, 5)))
+    parts = Parts.of(csc_array(A), 2)
+    rows, columns = np.array([1, 0, 1]), np.array([1, 4, 1])
+    more = parts.cut.placed(rows, columns, np.array([2.0, 3.0, 4.0]))
+    A[1, 1], A[0, 4] = 7.0, 4.0
+    assert (replace(parts, data=parts.data + more).matrix.toarray() == A).all()
+    with pytest.raises(ValueError, match="no entry in row 4, column 0"):
+        parts.cut.placed(rows + 3, columns - 1, np.ones(3))
