@@ -61,7 +61,7 @@ class Cut:
                 f"the layer's tangent has no entry in row {rows[lost]}, column {columns[lost]}; "
                 "add an element that knows both unknowns to the layer"
             )
-        return np.bincount(order[at], values, len(keys))
+        return np.asarray(np.bincount(order[at], values, len(keys)), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,7 +65,8 @@ class Elimination:
     @classmethod
     def of(cls, rows: Integers, columns: Integers, m: int, n: int) -> Elimination:
         """For a matrix (n, n) with entries at these rows and columns."""
-        pattern = _pattern(np.append(rows, columns), np.append(columns, rows), n)
+        entries = np.append(rows, columns), np.append(columns, rows)
+        pattern = _ones(csr_array((np.ones(2 * len(rows)), entries), (n, n)))
         chain, found = np.arange(m, n), []
         while True:
             pieces = _pieces(pattern, chain)
@@ -80,7 +81,7 @@ class Elimination:
             near = csr_array((chosen @ pattern).multiply(alive[None]))
             near.eliminate_zeros()
             found.append((_padded(chosen), _padded(near)))
-            pattern = _pattern(*(pattern + near.T @ near).nonzero(), n)
+            pattern = _ones(csr_array(pattern + near.T @ near))
         rest = np.append(np.arange(m), chain)
         number = np.full(n, -1)
         number[rest] = np.arange(len(rest))
@@ -120,7 +121,7 @@ class Elimination:
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """Where entries of a pattern (n, n) are in its order; n^2 + n + row of keys, rising."""
+    """Where entries of a pattern (n, n) are in its order. keys: row (n + 1) + column, rising."""
 
     keys: Integers
     n: int
@@ -152,9 +153,8 @@ class _Places:
         )
 
 
-def _pattern(rows: Integers, columns: Integers, n: int) -> csr_array:
-    """(n, n) with ones, in order."""
-    pattern = csr_array((np.ones(len(rows)), (rows, columns)), (n, n))
+def _ones(pattern: csr_array) -> csr_array:
+    """A pattern in order, with ones."""
     pattern.sum_duplicates()
     pattern.data[:] = 1.0
     return pattern
