@@ -71,7 +71,8 @@ class Relaxed(Layered):
     def _entries(self) -> Array:
         """Those of the term in the data of the layer's tangent."""
         term = self._small.tocoo()
-        return self.layer.cut.placed(term.row, term.col, term.data)
+        rows, columns = (number.astype(np.int64) for number in (term.row, term.col))
+        return self.layer.cut.placed(rows, columns, term.data)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ its neighbours in the mesh, not from what happens to be near.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -18,24 +19,34 @@ from softehl.runtime.mesh.sections import SectionMesh
 
 _LEFT = 0.2  # of the area at a corner of an element, in a state that is any good
 _PATCH = 32  # nodes of a local spline, at most
-_AT_ONCE = 2000  # points, to bound the memory
+_AT_ONCE = 64  # splines, whose matrices fit into a cache
 
 
 def carry_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
-    """Nodal values (V', k) on the new mesh from those, (V, k), on the old.
+    """Nodal values (V', k) on the new mesh from those, (V, k), on the old; see `node_weights`."""
+    return np.asarray(node_weights(old, new) @ values)
+
+
+@lru_cache(maxsize=4)
+def node_weights(old: SectionMesh, new: SectionMesh) -> csr_array[np.float64]:
+    """Weights (V', V) of the values at old nodes in that at each new one.
 
     By a cubic spline through the nodes of the cell that holds a point and of two rings around it:
     exact at the old nodes and for quadratic fields. Where both have the same regions none sees what
     is in another one: slopes jump between materials.
     """
     if len(old.regions) < 2 or set(old.regions) != set(new.regions):
-        return _carried(old, new.points, values)
-    result = np.empty((len(new.points), values.shape[1]))
-    for name in old.regions:
-        part, used = _region(old, name)
-        nodes = np.unique(new.quads[new.regions[name]])
-        result[nodes] = _carried(part, new.points[nodes], values[used])
-    return result
+        near, weights = _splines(old, new.points)
+    else:
+        shape = (len(new.points), _PATCH)
+        near, weights = np.zeros(shape, dtype=np.int64), np.zeros(shape)
+        for name in old.regions:
+            part, used = _region(old, name)
+            nodes = np.unique(new.quads[new.regions[name]])
+            there, weights[nodes] = _splines(part, new.points[nodes])
+            near[nodes] = used[there]
+    rows = np.arange(len(near) + 1) * _PATCH
+    return csr_array((weights.ravel(), near.ravel(), rows), (len(near), len(old.points)))
 
 
 def carry_displacements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
@@ -72,15 +83,25 @@ def _region(mesh: SectionMesh, name: str) -> tuple[SectionMesh, Integers]:
     return part, used
 
 
-def _carried(old: SectionMesh, at: Array, values: Array) -> Array:
-    """Values (n, k) at points (n, 2); see `carry_nodes`."""
+def _splines(old: SectionMesh, at: Array) -> tuple[Integers, Array]:
+    """Nodes (n, m) around points (n, 2), and the weights of each; see `node_weights`.
+
+    Points of a cell have one spline; cells of about as many points are solved together.
+    """
     cell, _ = located(old.points, old.quads, at)
-    near, known = _patches(old)
-    result = np.empty((len(at), values.shape[1]))
-    for some in np.array_split(np.arange(len(cell)), len(cell) // _AT_ONCE + 1):
-        nodes = near[cell[some]]
-        result[some] = _spline(old.points[nodes], values[nodes], known[cell[some]], at[some])
-    return result
+    nodes, known = _patches(old)
+    count = np.bincount(cell, minlength=len(old.quads))
+    order = np.lexsort((cell, count[cell]))  # point by point, cell by cell
+    first = np.flatnonzero(np.diff(cell[order], prepend=-1))
+    cells = cell[order[first]]
+    weights = np.empty((len(at), _PATCH))
+    for some in np.array_split(np.arange(len(cells)), len(cells) // _AT_ONCE + 1):
+        here, number = cells[some], np.arange(count[cells[some]].max(initial=0))
+        there = number < count[here][:, None]
+        points = order[np.where(there, first[some][:, None] + number, first[some][:, None])]
+        found = _spline(old.points[nodes[here]], known[here], at[points])
+        weights[points[there]] = found[there]
+    return nodes[cell], weights
 
 
 def carry_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
@@ -143,38 +164,39 @@ def places_of(mesh: SectionMesh, nodes: Integers) -> Array:
     return np.asarray(at + back * mesh.length)
 
 
-def _spline(points: Array, values: Array, known: Flags, at: Array) -> Array:
-    """Values (n, k) at points at (n, 2) of one cubic spline each, through those (n, m, k) known.
+def _spline(points: Array, known: Flags, at: Array) -> Array:
+    """Weights (n, j, m) of nodes points (n, m, 2) at points at (n, j, 2) of n cubic splines.
 
-    points: (n, m, 2). Thin-plate's cubic sister |x|^3 with quadratic polynomials; every patch in
-    its own units.
+    Thin-plate's cubic sister |x|^3 with quadratic polynomials; every spline in its own units.
     """
     middle = points.mean(axis=1, keepdims=True)
     scale = np.ptp(points, axis=1, keepdims=True).max(axis=2, keepdims=True)
-    x, y = (points - middle) / scale, (at[:, None] - middle) / scale
-    n, m = known.shape
-    both = known[:, :, None] & known[:, None]
-    matrix = np.zeros((n, m + 6, m + 6))
-    matrix[:, :m, :m] = np.where(both, _cubed(x[:, :, None] - x[:, None]), np.eye(m))
-    matrix[:, :m, m:] = _polynomials(x) * known[..., None]
-    matrix[:, m:, :m] = matrix[:, :m, m:].transpose(0, 2, 1)
-    given = np.zeros((n, m + 6, values.shape[2]))
-    given[:, :m] = values * known[..., None]
-    weights = np.linalg.solve(matrix, given)
-    row = np.concatenate([_cubed(y - x) * known, _polynomials(y)[:, 0]], axis=1)
-    return np.asarray(np.einsum("nm,nmk->nk", row, weights))
+    x, y = (points - middle) / scale, (at - middle) / scale
+    m, there = points.shape[1], known.astype(np.float64)[:, None]
+    matrix = np.zeros((len(x), m + 6, m + 6))
+    matrix[:, :m, :m] = _cubed(x, x) * there * there.transpose(0, 2, 1)
+    matrix[:, np.arange(m), np.arange(m)] += 1.0 - there[:, 0]
+    matrix[:, m:, :m] = _polynomials(x) * there
+    matrix[:, :m, m:] = matrix[:, m:, :m].transpose(0, 2, 1)
+    right = np.concatenate([_cubed(x, y) * there.transpose(0, 2, 1), _polynomials(y)], axis=1)
+    return np.asarray(np.linalg.solve(matrix, right)[:, :m].transpose(0, 2, 1))
 
 
-def _cubed(away: Array) -> Array:
-    return np.asarray(np.linalg.norm(away, axis=-1) ** 3)
+def _cubed(x: Array, y: Array) -> Array:
+    """Cubes (n, i, j) of the distances from x (n, i, 2) to y (n, j, 2)."""
+    away = np.square(x[:, :, None, 0] - y[:, None, :, 0])
+    away += np.square(x[:, :, None, 1] - y[:, None, :, 1])
+    away *= np.sqrt(away)
+    return np.asarray(away)
 
 
 def _polynomials(x: Array) -> Array:
-    """(..., 6): the monomials of (..., 2) up to the second degree."""
+    """(n, 6, j): the monomials of (n, j, 2) up to the second degree."""
     z, r = x[..., 0], x[..., 1]
-    return np.stack([np.ones_like(z), z, r, z * z, z * r, r * r], axis=-1)
+    return np.stack([np.ones_like(z), z, r, z * z, z * r, r * r], axis=1)
 
 
+@lru_cache(maxsize=4)
 def _patches(mesh: SectionMesh) -> tuple[Integers, Flags]:
     """Nodes (Q, m) of and around each cell, two rings of them, nearest first, and which there are.
 
@@ -184,14 +206,12 @@ def _patches(mesh: SectionMesh) -> tuple[Integers, Flags]:
     ones = np.ones(mesh.quads.size)
     of = csr_array((ones, (np.repeat(np.arange(cells), 4), mesh.quads.ravel())), (cells, count))
     rings = csr_array(of @ (of.T @ of) @ (of.T @ of))
-    sizes, nodes = np.diff(rings.indptr), rings.indices
-    cell = np.repeat(np.arange(cells), sizes)
-    away = np.linalg.norm(mesh.points[nodes] - mesh.points[mesh.quads].mean(axis=1)[cell], axis=1)
-    order = np.lexsort((away, cell))
-    slot = np.arange(len(nodes)) - np.repeat(rings.indptr[:-1], sizes)
-    kept = slot < _PATCH
-    near = np.repeat(mesh.quads[:, :1], _PATCH, axis=1)
-    known = np.zeros(near.shape, dtype=np.bool_)
-    near[cell[kept], slot[kept]] = nodes[order][kept]
-    known[cell[kept], slot[kept]] = True
-    return near, known
+    sizes = np.diff(rings.indptr)
+    there = np.arange(max(_PATCH, sizes.max())) < sizes[:, None]
+    nodes = np.broadcast_to(mesh.quads[:, :1], there.shape).copy()
+    nodes[there] = rings.indices
+    middle = mesh.points[mesh.quads].mean(axis=1)
+    z, r = (mesh.points[:, i][nodes] - middle[:, i : i + 1] for i in (0, 1))
+    away = np.where(there, np.sqrt(z * z + r * r), np.inf)
+    nearest = np.argsort(away, axis=1, kind="stable")[:, :_PATCH]
+    return np.take_along_axis(nodes, nearest, 1), np.take_along_axis(there, nearest, 1)

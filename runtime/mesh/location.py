@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Integers
 
-_NEIGHBOURS = (8, 32, 128)  # cells looked at, by their middles, until one holds the point
+_NEIGHBOURS = (8, 8, 32, 128)  # cells looked at, by their middles, until one holds the point
 _ITERATIONS = 8
 _WITHIN = 1e-12  # of the size of the mesh: a point so near to a cell is in it
 _FURTHEST = 4.0  # parent coordinates up to which values are extrapolated
@@ -17,7 +17,7 @@ CORNERS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 def shapes(at: Array) -> Array:
     """Bilinear shape functions (n, 4) at parent points (n, 2)."""
-    return np.asarray(0.25 * np.prod(1.0 + CORNERS[None] * at[:, None], axis=2))
+    return np.asarray(0.25 * (1.0 + CORNERS[:, 0] * at[:, :1]) * (1.0 + CORNERS[:, 1] * at[:, 1:]))
 
 
 def located(points: Array, quads: Integers, at: Array) -> tuple[Integers, Array]:
@@ -26,29 +26,36 @@ def located(points: Array, quads: Integers, at: Array) -> tuple[Integers, Array]
     A point outside belongs to the nearest one; its coordinates are beyond 1, by up to a cell and a
     half.
     """
-    tree = cKDTree(points[quads].mean(axis=1))
+    corners = points[quads]
+    tree, low, high = cKDTree(corners.mean(axis=1)), corners.min(axis=1), corners.max(axis=1)
     cell, parent = np.zeros(len(at), dtype=np.int64), np.zeros((len(at), 2))
     within = _WITHIN * float(np.ptp(points, axis=0).max())
     left, best = np.arange(len(at)), np.full(len(at), np.inf)
+    most = within  # at first only cells that hold a point
     for count in _NEIGHBOURS:
-        count = min(count, len(quads))
-        near = np.asarray(tree.query(at[left], k=count)[1]).reshape(len(left), -1)
-        x = points[quads[near]]  # (n, count, 4, 2)
-        xi = _inverse(x, at[left])
-        clipped = np.clip(xi, -1.0, 1.0).reshape(-1, 2)
-        feet = np.einsum("na,nad->nd", shapes(clipped), x.reshape(-1, 4, 2)).reshape(*xi.shape)
-        away = np.linalg.norm(feet - at[left][:, None], axis=2)
-        first = away.argmin(axis=1)
-        rows = np.arange(len(left))
-        better = away[rows, first] < best[left]
+        near = tree.query(at[left], k=min(count, len(quads)))[1].reshape(len(left), -1)
+        x = at[left][:, None]
+        beside = np.maximum(np.maximum(low[near] - x, x - high[near]), 0.0)  # of the box of a cell
+        row, slot = np.nonzero(_length(beside) <= np.minimum(best[left], most)[:, None])
+        corner, point = corners[near[row, slot]], at[left[row]]
+        away, xi = np.full(near.shape, np.inf), np.zeros((*near.shape, 2))
+        inside = _inverse(corner, point)
+        feet = np.einsum("na,nad->nd", shapes(np.clip(inside, -1.0, 1.0)), corner)
+        away[row, slot], xi[row, slot] = _length(feet - point), inside
+        rows, first = np.arange(len(left)), away.argmin(axis=1)
+        better = away[rows, first] < np.minimum(best[left], np.nextafter(most, np.inf))
         chosen = left[better]
         cell[chosen] = near[rows, first][better]
         parent[chosen] = xi[rows, first][better]
         best[chosen] = away[rows, first][better]
-        left = left[best[left] > within]
-        if not len(left) or count == len(quads):
+        left, most = left[best[left] > within], np.inf
+        if not len(left):
             break
     return cell, np.clip(parent, -_FURTHEST, _FURTHEST)
+
+
+def _length(x: Array) -> Array:
+    return np.asarray(np.sqrt(x[..., 0] ** 2 + x[..., 1] ** 2))
 
 
 def interpolated(
@@ -64,19 +71,19 @@ def interpolated(
 
 
 def _inverse(x: Array, at: Array) -> Array:
-    """Parent coordinates (n, m, 2) of points (n, 2) in cells with corners x (n, m, 4, 2)."""
-    a = x.mean(axis=2)
-    b = np.einsum("a,nmad->nmd", CORNERS[:, 0], x) / 4.0
-    c = np.einsum("a,nmad->nmd", CORNERS[:, 1], x) / 4.0
-    d = np.einsum("a,nmad->nmd", CORNERS.prod(axis=1), x) / 4.0
-    xi = np.zeros((*x.shape[:2], 2))
+    """Parent coordinates (n, 2) of points (n, 2) in cells with corners x (n, 4, 2)."""
+    a = x.mean(axis=1)
+    b, c, d = (
+        np.einsum("a,nad->nd", signs, x) / 4.0 for signs in (*CORNERS.T, CORNERS.prod(axis=1))
+    )
+    xi = np.zeros((len(x), 2))
     for _ in range(_ITERATIONS):
-        s, t = xi[..., :1], xi[..., 1:]
-        miss = at[:, None] - (a + b * s + c * t + d * s * t)
+        s, t = xi[:, :1], xi[:, 1:]
+        miss = at - (a + b * s + c * t + d * s * t)
         u, v = b + d * t, c + d * s
-        det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+        det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
         det = np.where(np.abs(det) > 1e-300, det, 1e-300)
-        step_s = (miss[..., 0] * v[..., 1] - miss[..., 1] * v[..., 0]) / det
-        step_t = (u[..., 0] * miss[..., 1] - u[..., 1] * miss[..., 0]) / det
+        step_s = (miss[:, 0] * v[:, 1] - miss[:, 1] * v[:, 0]) / det
+        step_t = (u[:, 0] * miss[:, 1] - u[:, 1] * miss[:, 0]) / det
         xi = np.clip(xi + np.stack([step_s, step_t], axis=-1), -1e3, 1e3)
     return xi
