@@ -36,27 +36,20 @@ HOUR = 3600.0
 PARTS = ("contact", "coarser films", "films", "files", "pictures", "else")
 
 
-def part_of(driver: Any, stage: Any, *_: Any) -> str:
-    """The part of a stage that a path driver follows."""
-    name = driver.prefix + stage.name
-    if any(word in name for word in ("contact to film", "shear", "falling", "release", "order")):
-        return "coarser films" if name.startswith("coarser") else "films"
-    return "contact"
-
-
 @contextmanager
 def watched(clock: Clock) -> Iterator[None]:
     """The parts of all runs within it."""
     from softehl.cases.harness.record import RunRecord
     from softehl.cases.harness.session import Reporter
     from softehl.cases.oring import ORingCase
+    from softehl.cases.seal.solve.adaptation import Adaptation
     from softehl.cases.seal.solve.contact_route import ContactRoute
-    from softehl.cases.seal.solve.path import PathDriver
+    from softehl.cases.seal.solve.method import DryContact
 
     watched = [
-        (PathDriver, "follow", part_of),
         (ContactRoute, "contact", lambda *_: "contact"),
-        (ContactRoute, "elsewhere", lambda *_: "contact"),
+        (DryContact, "adapted", lambda *_: "films"),
+        (Adaptation, "_coarser", lambda *_: "coarser films"),
         (Reporter, "state", lambda *_: "files"),
         (Reporter, "files", lambda *_: "files"),
         (RunRecord, "begin", lambda *_: "files"),

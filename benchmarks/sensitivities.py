@@ -19,7 +19,7 @@ from benchmarks.clock import Clock
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.sensitivity import sensitivity
 from softehl.cases.seal.sensitivity.quantities import QUANTITIES
-from softehl.cases.seal.solve import method, strokes
+from softehl.cases.seal.solve import method
 from softehl.cases.seal.states.state import Silent
 
 
@@ -33,8 +33,8 @@ def measured(p: ORing, wanted: Sequence[str]) -> tuple[float, float, int]:
     timed: dict[str, Any] = {
         name: clock.timed(work, lambda *_: "sensitivities") for name, work in works.items()
     }
-    with patch.multiple(strokes, **timed):
-        states = method.run(p, Silent()).states
+    with patch.multiple(sensitivity, **timed):
+        states = method.run(p, Silent(), differentiate=sensitivity.differentiation(p)).states
     clock.turn()
     return clock.seconds["solving"], clock.seconds["sensitivities"], len(states)
 

@@ -22,7 +22,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.solver_summary import difference, summary
+from benchmarks.solver_summary import FILM, difference, summary
 from softehl.cases.paper.states import PAPER
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.method import run
@@ -56,10 +56,9 @@ def measure(parameters: ORing) -> dict[str, Any]:
         "collapsed": [f"{s.rod_speed:g}" for s in outcome.states if s.verdict == COLLAPSED],
         "residual": max(
             (
-                h[-1]
+                s.residual_histories[-1][-1]
                 for s in outcome.stages
-                if s.name == "falling speed"
-                for h in s.residual_histories
+                if s.name.startswith(FILM) and s.residual_histories[-1]
             ),
             default=math.nan,
         ),

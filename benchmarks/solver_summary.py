@@ -9,11 +9,11 @@ from typing import Any
 Run = Mapping[str, Any]
 """A run as `benchmarks.solver.measure` describes it, with route, density, p_s and stroke."""
 
-PARTS = ("contact", "film", "speeds")
-"""Stages in three parts: up to contact, from contact to film with shear, falling speed."""
+PARTS = ("contact", "films")
 
-_FILM = ("contact to film", "release", "shear")
-_SPEEDS = "falling speed"
+FILM = "film at"
+"""Names of the stages of films begin so."""
+
 _HEADER = (
     *("p_s", "stroke", "density", "unknowns", "route", "part"),
     *("factorisations", "iterations", "CPU s", "peak MB", "h* differs by"),
@@ -22,10 +22,7 @@ _HEADER = (
 
 def part_of(stage: str) -> str:
     """The part of :data:`PARTS` that a stage belongs to, by its name."""
-    name = stage.rpartition(": ")[2]  # without the order it is walked for
-    if name == _SPEEDS:
-        return "speeds"
-    return "film" if name.startswith((*_FILM, "order ")) else "contact"
+    return "films" if stage.startswith(FILM) else "contact"
 
 
 def summary(runs: Sequence[Run]) -> str:

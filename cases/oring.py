@@ -45,9 +45,10 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def solve(self, parameters: ORing, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`; runs of one section share their contact states."""
+        from softehl.cases.seal.sensitivity.sensitivity import differentiation
         from softehl.cases.seal.solve.method import run
 
-        return run(parameters, Teller(observer), contacts=shared)
+        return run(parameters, Teller(observer), shared, differentiation(parameters))
 
     def requested(self, parameters: ORing) -> list[float]:
         """See :class:`Case`."""

@@ -55,11 +55,6 @@ ORDER = {
     ),
 }
 """Folders and files of a room, each of which imports only those before it; some are one level."""
-EXCEPTIONS: dict[str, dict[str, set[str]]] = {
-    # a stroke differentiates its films as it reports them
-    "cases/seal": {"cases/seal/solve/strokes.py": {"sensitivity"}},
-}
-"""Files of a room that import what comes after them."""
 PENDING: dict[str, str] = {}
 """Rooms that are still being put in order, and why."""
 SOLVERS = sorted(path.stem for path in (ROOT / "runtime" / "solve").glob("*.py"))
@@ -139,7 +134,7 @@ def test_folders_import_only_what_comes_before_them(room: str) -> None:
         if path.parent != ROOT / room or path.stem != "__init__"
     }
     late = {path: names for path, names in found.items() if names}
-    assert late == EXCEPTIONS.get(room, {})
+    assert late == {}
 
 
 @pytest.mark.parametrize("room", ORDER)
@@ -162,7 +157,7 @@ def test_every_folder_has_its_place(room: str) -> None:
         ("cases/seal", "gland/oils.py", "from softehl.cases.seal.section import layout"),
         ("cases/seal", "gland/sections/keys.py", "import softehl.cases.seal.states.state"),
         ("cases/seal", "states/verdict.py", "from softehl.cases.seal import solve"),
-        ("cases/seal", "solve/film.py", "def f():\n    from softehl.cases.seal import cycle"),
+        ("cases/seal", "solve/films.py", "def f():\n    from softehl.cases.seal import cycle"),
     ],
 )
 def test_an_import_out_of_order_is_seen(room: str, path: str, source: str) -> None:

@@ -23,9 +23,9 @@ def _straight(parts: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_pressure_of_the_entrance_is_at_the_end_where_oil_comes_in() -> None:
-    nothing = np.zeros(2)
+    gap = np.zeros(2)
     for stroke, ends in (("out", [3.5, 0.0]), ("in", [3.0, 0.5])):
-        film = FilmLoads(3.0, cast("Stroke", stroke), 400.0, nothing, nothing, entrance=0.5)
+        film = FilmLoads(3.0, cast("Stroke", stroke), 400.0, gap, entrance=0.5)
         assert film.ends.tolist() == ends
 
 

@@ -15,7 +15,6 @@ from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.cases.seal.solve.contact_route import ContactRoute
 from softehl.cases.seal.solve.grading import graded_layout
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.order import OrderPair
 from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.state import Outcome, Silent
@@ -106,12 +105,6 @@ def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
 def test_a_mesh_may_be_asked_for() -> None:
     assert ORing().mesh == "graded"
     assert _contact(1, "uniform")[0].section.layout.spacing is None
-
-
-def test_another_pressure_order_has_the_same_mesh() -> None:
-    system, _ = _contact(2)
-    low = build_system(oring(density=2, mesh="graded", pressure_order=2), system.section.layout)
-    assert OrderPair.of(low).high.mesh.points.tolist() == system.mesh.points.tolist()
 
 
 @pytest.mark.parametrize(("depth", "layers"), [(inf, 3), (5e-2, 3), (1e-2, 3), (1e-3, 6)])

@@ -157,7 +157,7 @@ def test_numbers_of_a_film_of_constant_thickness_and_pressure() -> None:
     # without pressure gradient the flux is U h / 2 and the friction that of Couette
     system = build_system(oring(density=1, pressure_viscosity=0.0))
     mesh = system.mesh
-    film = FilmLoads(2.0, "in", 400.0, np.zeros(mesh.arc + 1), np.zeros(mesh.arc + 1))
+    film = FilmLoads(2.0, "in", 400.0, np.zeros(mesh.arc + 1))
     problem = system.film_problem(film)
     x = system.at_rest()
     x[2 * mesh.arc_nodes + 1] = 25.005 - mesh.points[mesh.arc_nodes, 1]
@@ -243,7 +243,7 @@ def test_the_inlet_of_an_exact_film_has_the_ratio_one(speed: float) -> None:
     shear = slope[order] * h[order]
     at |= {"tau_rod": 0.5 * shear, "tau": -0.5 * shear}
     stroke: Stroke = "out" if speed > 0 else "in"
-    film = FilmLoads(1.0, stroke, abs(speed), np.empty(0), np.empty(0))
+    film = FilmLoads(1.0, stroke, abs(speed), np.empty(0))
     assert inlet_ratio(at, film, h_star) == pytest.approx(1.0, abs=1e-3)
 
 

@@ -16,7 +16,6 @@ from pydantic import ValidationError
 
 from softehl.__main__ import main
 from softehl.cases.oring import CASE
-from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
@@ -25,10 +24,9 @@ from softehl.cases.seal.gland.varied import LENGTHS
 from softehl.cases.seal.sensitivity.quantities import QUANTITIES
 from softehl.cases.seal.sensitivity.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
-from softehl.cases.seal.solve.contact_route import ContactRoute
-from softehl.cases.seal.solve.film_path import FilmPath
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.solve.stroke_start import StrokeStart
+from softehl.cases.seal.solve.films import Film
+from softehl.cases.seal.solve.method import DryContact
+from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.states.contacts import CONTACT_FILM
 from softehl.cases.seal.states.results import film_numbers
 from softehl.cases.seal.states.sensitivity_table import SensitivityRow, resolved
@@ -39,7 +37,6 @@ from softehl.runtime.fem.postprocess import interval_below
 from softehl.runtime.io import read_csv
 from softehl.runtime.solve.linear import Factorisation, SparseMatrix
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import Point
 from softehl.runtime.solve.superlu import SuperLU
 from tests.cases.oring_cases import film_values
 
@@ -77,19 +74,12 @@ def state(name: str) -> tuple[FilmCase, Array]:
     p = CASES[name]
     stroke = p.stroke
     assert stroke != "both"
-    newton, settings = Newton(max_iterations=10), PathSettings()
-    driver = PathDriver(Silent(), newton)
-    found = ContactRoute(settings, driver.follow, newton).contact(p)
-    assert not isinstance(found, StageFailed)
-    path, kept = FilmPath(found[0], settings, driver), list[tuple[FilmLoads, Array]]()
-
-    def keep(film: FilmLoads, point: Point) -> None:
-        if film.speed in p.speeds:
-            kept.append((film, point.solution.x))
-
-    assert StrokeStart(path, stroke, found[1]).begun(keep) is None
-    case = FilmCase(found[0], kept[0][0])
-    return case, solved(case, kept[0][1])
+    contact = DryContact.of(p, Silent())
+    assert not isinstance(contact, StageFailed)
+    film = contact.film(stroke, p.speeds[0])
+    assert isinstance(film, Film)
+    case = FilmCase(film.system, film.loads)
+    return case, solved(case, film.x)
 
 
 def solved(case: FilmCase, x: Array) -> Array:

@@ -117,7 +117,7 @@ def test_obstacles_touch_the_free_section_where_they_should() -> None:
 def test_tangent_of_the_whole_problem(solid: str, stroke: str, rng: np.random.Generator) -> None:
     system = build_system(oring(density=1, solid=solid))
     layout = system.layout
-    film = FilmLoads(1.0, stroke, 400.0, rng.uniform(-3, 0, 28), np.zeros(28), weight=0.6)  # type: ignore[arg-type]
+    film = FilmLoads(1.0, stroke, 400.0, np.zeros(28))  # type: ignore[arg-type]
     problem = system.film_problem(film)
     x = 1e-3 * rng.normal(size=layout.total)
     system.pressures(x)[:] = rng.uniform(0.5, 3.0, system.pressure_count)
@@ -141,7 +141,7 @@ def test_the_film_acts_on_a_held_section_or_on_one_with_a_given_moment(
     moment: float | None,
 ) -> None:
     system = build_system(oring(density=1))
-    film = FilmLoads(1.0, "out", 400.0, np.zeros(28), np.zeros(28), moment=moment)
+    film = FilmLoads(1.0, "out", 400.0, np.zeros(28), moment=moment)
     problem = system.film_problem(film)
     prescribed = dict(zip(problem.fixed.tolist(), problem.values.tolist(), strict=True))
     assert prescribed.get(int(system.layout.dofs("rotation")[0])) == moment
@@ -227,24 +227,11 @@ def test_columns_of_the_film_s_dof_maps(reynolds: str) -> None:
     assert np.flatnonzero(x).min() == system.film_ends[0] + 1
 
 
-def test_a_second_pressure_stands_beside_the_first() -> None:
-    low = build_system(oring(density=1, pressure_order=2, reynolds="dg", upwinding=1.0))
-    both = low.with_pressure("higher", 4)
-    before = low.layout.total
-    assert both.layout.total == before + 5 * 27
-    names = [block.name for block in both.problem.assembler.blocks]
-    assert names[-3:] == ["higher_film", "higher_upwind", "higher_facet"]
-    for own, other, count in (("film", "higher_film", 4), ("facet", "higher_facet", 6)):
-        a, b = (both.problem.assembler.block(name).dofs for name in (own, other))
-        assert np.array_equal(a[:, :count], b[:, :count])
-        assert a[:, count:].max() < before <= b[:, count:].min()
-
-
 def test_a_kernel_that_asks_for_what_nobody_gives_is_named() -> None:
     stranger = Block("stranger", "contact", "arc", (DISPLACEMENT, PRESSURE), "film")
     p = oring(density=1)
     system = SealSystem.of(p, build_system(p).section, blocks=(*BLOCKS, stranger))
-    film = FilmLoads(1.0, "out", 400.0, np.zeros(28), np.zeros(28))
+    film = FilmLoads(1.0, "out", 400.0, np.zeros(28))
     with pytest.raises(
         KeyError, match=r"'stranger' asks for offset; cases/seal/equations/system.py gives"
     ):

@@ -21,27 +21,28 @@ from softehl.cases.seal.cycle.restart import (
 )
 from softehl.cases.seal.cycle.transient import Instant, March, Reading, TimeSteps
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.solve.contact_route import ContactRoute
 from softehl.cases.seal.solve.failure import explained
-from softehl.cases.seal.solve.film import FastFilm
-from softehl.cases.seal.solve.film_path import BuiltFilm, FilmPath
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.solve.stroke_start import StrokeStart
+from softehl.cases.seal.solve.film_correctors import film_corrector
+from softehl.cases.seal.solve.films import NoFilm
+from softehl.cases.seal.solve.method import DryContact
+from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.states.telling import Teller
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.linear import Condenser
-from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.schur import StaleTangent
-from softehl.runtime.solve.solution import Branch, Point, Status
+from softehl.runtime.solve.solution import Branch, Status
 
 OUTLINES = 48
 """Outlines of the section that are kept of a cycle, at most."""
 
 BETWEEN_DRAFTS = 2.0
 """Seconds of work that are lost at most where a run is killed within a cycle."""
+
+
+_STALE = 0.1
+"""Reduction of the residual in an iteration below which the section is condensed anew: that costs
+about three iterations, and many films follow each other."""
 
 
 @dataclass
@@ -61,40 +62,23 @@ Log = Callable[[int, Films, Reading, Any], Any]
 """A row of the number of a cycle, what happened in it, the reading before it, the last row."""
 
 
-def steady_start(path: FilmPath, x: Array, speed: float) -> BuiltFilm | None:
-    """The steady film of the outstroke at a speed, from the contact state x."""
-    found: list[BuiltFilm] = []
-
-    def keep(film: FilmLoads, point: Point) -> None:
-        if film.speed == speed:
-            found[:] = [(film, point.solution.x)]
-
-    settled = path.settled(x)
-    if not isinstance(settled, StageFailed):
-        StrokeStart(path, "out", settled).films(keep)
-    return found[0] if found else None
-
-
 def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) -> Outcome:
     """All cycles of a case; log: makes a row of each.  Failure is in the outcome's status."""
     speed = motion.speed.at(0.0)
     changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}
     p: ORing = parameters.model_copy(update={**changes, "sealed_pressure": motion.pressure.at(0.0)})
-    newton = Newton(max_iterations=10, linear=choose(p.linear))
-    driver, settings = PathDriver(Teller(observer), newton), PathSettings()
-    contact = ContactRoute(settings, driver.follow, driver.newton).contact(p)
+    contact = DryContact.of(p, Teller(observer))
     if isinstance(contact, StageFailed):
         return _outcome(p, *explained(contact, "contact", p))
-    path = FilmPath(contact[0], settings, driver)
-    begun = steady_start(path, contact[1], speed)
-    if begun is None or not isinstance(newton.linear, Condenser):
+    begun, linear = contact.film("out", speed), contact.newton.linear
+    if isinstance(begun, NoFilm) or not isinstance(linear, Condenser):
         words = f"no steady film at U = {speed:g} mm/s to begin with; use a finer mesh (density)"
         return _outcome(p, Status.MAX_ITERATIONS, words)
-    corrector = FastFilm.of(path.system, newton.linear, contact[1]).eager
+    corrector = replace(film_corrector(p, linear), stale=_STALE)
     steps = TimeSteps(tolerance=parameters.time_tolerance, order=parameters.time_order)
     returned = parameters.supply == "returned"
-    march = March(path.system, motion, begun[0], corrector, steps, returned)
-    stuck = _cycles(march, begun[1], parameters.cycles, observer, log)
+    march = March(begun.system, motion, begun.loads, corrector, steps, returned)
+    stuck = _cycles(march, begun.x, parameters.cycles, observer, log)
     if stuck is not None:
         return _outcome(p, stuck.status, stuck.message)
     return _outcome(p, Status.CONVERGED, "all cycles")

@@ -16,7 +16,6 @@ from softehl.cases.seal.equations.system import (
     AXIAL,
     DISPLACEMENT,
     FIELDS,
-    FILM,
     PRESSURE,
     ROD,
     ROTATION,
@@ -25,10 +24,10 @@ from softehl.cases.seal.equations.system import (
     Values,
     blocks_of,
     contact_values,
-    faded_values,
     film_values,
     obstacles_of,
     values_at_rest,
+    without_contact,
 )
 from softehl.cases.seal.equations.unknowns import SealUnknowns
 from softehl.cases.seal.gland.parameters import ORing
@@ -51,14 +50,12 @@ class SealSystem(SealUnknowns):
 
     blocks: those that the case has. obstacles: by block name. problem: the contact problem at
     p_s = 0 with the film switched off and its pressures prescribed to be zero; mean rotation is
-    held in it, even if a later stage lets it go. groove: share of the sealed pressure that contact
-    has in the groove between two lobes.
+    held in it, even if a later stage lets it go.
     """
 
     blocks: tuple[Block, ...]
     obstacles: Mapping[str, Obstacle]
     problem: Problem
-    groove: float = 1.0
 
     @classmethod
     def of(
@@ -113,8 +110,7 @@ class SealSystem(SealUnknowns):
     @property
     def dam(self) -> int:
         """Index of the arc node at which the sealed pressure of the contact ends."""
-        section = self.section
-        return section.lowest if self.groove else section.layout.before_groove(section.mesh)
+        return self.section.lowest
 
     # --- blocks -----------------------------------------------------------------------------------
 
@@ -154,7 +150,7 @@ class SealSystem(SealUnknowns):
 
     def contact_problem(self, loads: ContactLoads) -> Problem:
         """Frictionless contact (9)-(10) under a sealed pressure (8)."""
-        values = self._present(contact_values(loads, self.groove))
+        values = self._present(contact_values(loads))
         problem = self.problem.with_parameters(**values)
         if loads.moment is not None:
             problem = problem.also_fixed(self.layout.dofs(ROTATION), loads.moment)
@@ -162,22 +158,14 @@ class SealSystem(SealUnknowns):
             return problem
         return problem.also_fixed(self.layout.dofs(AXIAL), -loads.axial_force)
 
-    def film_problem(self, film: FilmLoads, shares: Mapping[str, float] | None = None) -> Problem:
-        """Film forces (18) weighted by w, contact forces by 1 - w; Reynolds equation (25) in full.
-
-        The rod multipliers are frozen, so their contact elements are springs of stiffness rho about
-        the contact pressure: forces that fade without a constraint that would outlive them.
-        shares: of the film forces by pressure field, where there are several.
-        """
-        p_s, fields = film.sealed_pressure, shares or {PRESSURE: 1.0}
-        contact = self.contact_problem(ContactLoads(p_s, {ROD: film.rod_offset}, film.place))
+    def film_problem(self, film: FilmLoads) -> Problem:
+        """Film forces (18) and the Reynolds equation (25); the contact with the rod is without."""
+        contact = self.contact_problem(ContactLoads(film.sealed_pressure, place=film.place))
         problem = contact.with_parameters(
-            **self._present(faded_values(film, self.groove)),
-            **self._film_parameters(film, fields),
+            **self._present(without_contact()), **self._film_parameters(film)
         )
-        fixed = [*map(self._ends, fields), self.layout.dofs(ROD)]
-        values: list[Array | float] = [film.ends for _ in fields]
-        values.append(film.multipliers)
+        fixed = [self.film_ends, self.layout.dofs(ROD)]
+        values: list[Array | float] = [film.ends, 0.0]
         if self.parameters.conserving:
             fixed.append(self._ends(VOID))
             values.append(np.array(film.inflow))
@@ -187,22 +175,12 @@ class SealSystem(SealUnknowns):
         if film.moment is not None:
             fixed.append(self.layout.dofs(ROTATION))
             values.append(film.moment)
-        fluxes = {
-            name: self.flux_scales(max(film.speed, film.least_speed), film.gap, name)
-            for name in fields
-        }
+        fluxes = self.flux_scales(max(film.speed, film.least_speed), film.gap)
         return replace(
             problem.with_fixed(fixed, values),
-            scales={**problem.scales, **fluxes},
+            scales={**problem.scales, PRESSURE: fluxes},
             guards=(*problem.guards, self.film_guard()),
         )
-
-    def sheared(self, problem: Problem, film: FilmLoads) -> Problem:
-        """A contact problem with the shear stress of a film of the gap that there is, without its
-        pressure.
-        """
-        values = film_values(self.parameters, film, 1.0)
-        return problem.with_parameters(**{FILM: self._chosen(self._block(FILM), values)})
 
     def squeeze_values(self, rate: float) -> dict[str, Values]:
         """Parameters of the block of what the film holds; rate: coefficient of d/dt, 1/s."""
@@ -220,35 +198,17 @@ class SealSystem(SealUnknowns):
             return ChangesLittle(radii, gaps, _ROUGH_STEP, self.parameters.surfaces.sigma)
         return StaysPositive(radii, gaps, _STEP)
 
-    def flux_scales(self, speed: float, gap: Array, field: str = PRESSURE) -> Array:
-        """Reference fluxes (n,), mm^2/s, of the equations of a pressure field at |U| (mm/s).
+    def flux_scales(self, speed: float, gap: Array) -> Array:
+        """Reference fluxes (n,), mm^2/s, of the equations of the pressure at |U| (mm/s).
 
         gap: (arc nodes,) film thickness, mm, near enough.
         """
-        unknowns, arc = self.numbering.unknowns[field], self.mesh.points[self.mesh.arc_nodes]
+        unknowns, arc = self.numbering.unknowns[PRESSURE], self.mesh.points[self.mesh.arc_nodes]
         h, dx = np.maximum(gap[1:], gap[:-1]), np.linalg.norm(np.diff(arc, axis=0), axis=1)
         driven = scales.pressure_flux(h, dx, unknowns.order, self.parameters.viscosity)
         largest = np.zeros(unknowns.count)
         np.maximum.at(largest, unknowns.rows["arc"], driven[:, None])
         return scales.film_flux(speed) + largest
-
-    # --- other systems on the same section --------------------------------------------------------
-
-    def with_pressure(self, name: str, order: int) -> SealSystem:
-        """The system with another pressure of this order on the same film thickness, last of all
-        fields; its blocks are called after it.
-        """
-        film = [
-            replace(
-                block,
-                name=f"{name}_{block.name}",
-                fields=tuple(name if field == PRESSURE else field for field in block.fields),
-            )
-            for block in self._film_blocks
-        ]
-        (pressure,) = [field for field in self._fields if field.name == PRESSURE]
-        fields = (*self._fields, replace(pressure, name=name, order=order))
-        return SealSystem.of(self.parameters, self.section, fields, (*self.blocks, *film))
 
     # --- inside -----------------------------------------------------------------------------------
 
@@ -260,13 +220,10 @@ class SealSystem(SealUnknowns):
         pressures = [field.name for field in self.film_fields()]
         return problem.with_fixed([self.layout.dofs(n) for n in pressures], [0.0] * len(pressures))
 
-    def _film_parameters(self, film: FilmLoads, shares: Mapping[str, float]) -> dict[str, Values]:
-        """Parameters of every term of the film, each with the share of its pressure field."""
-        found = {}
-        for block in self._film_blocks:
-            (share,) = [shares[name] for name in block.fields if name in shares]
-            found[block.name] = self._chosen(block, film_values(self.parameters, film, share))
-        return found
+    def _film_parameters(self, film: FilmLoads) -> dict[str, Values]:
+        """Parameters of every term of the film."""
+        values = film_values(self.parameters, film)
+        return {block.name: self._chosen(block, values) for block in self._film_blocks}
 
     def _present(self, values: Mapping[str, Values | None]) -> dict[str, Values | None]:
         """Those of the values by block whose block there is."""

@@ -1,4 +1,4 @@
-"""Layers of the modified Newton iteration: the film, and the contact of the arc."""
+"""The film as the layer of the modified Newton iteration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import (
     AIR_WALL,
     DISPLACEMENT,
-    ROD,
     ROTATION,
     SEALED_WALL,
     WALLS,
@@ -39,15 +38,6 @@ def film_layer(system: SealSystem, x: Array) -> Layer:
     inner = inner[~np.isin(inner, system.film_ends)]
     names = [block.name for block in system.blocks if block.layer]
     return Layer.of(system.problem.assembler, names, shared, inner)
-
-
-def contact_layer(system: SealSystem, x: Array) -> Layer:
-    """The contact with the rod as the layer, near the state x: see `film_layer`."""
-    start, nodes = system.layout.part(DISPLACEMENT).start, system.mesh.arc_nodes
-    others = system.layout.dofs(ROTATION), system.layout.dofs(ROD), _walls_of_arc(system, x)
-    shared = np.concatenate([start + 2 * nodes, start + 2 * nodes + 1, *others])
-    loads = [block.name for block in system.blocks if block.group == "load" and block.layer]
-    return Layer.of(system.problem.assembler, [ROD, *loads], shared, np.empty(0, np.int64))
 
 
 def _walls_of_arc(system: SealSystem, x: Array) -> Integers:

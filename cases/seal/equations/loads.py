@@ -35,26 +35,21 @@ class ContactLoads:
 class FilmLoads:
     """Loads of a film.
 
-    sealed_pressure: p_s, MPa. speed: |U|, mm/s. weight: of the film forces, 1 - weight of the
-    contact forces. shear: weight of the shear stress. multipliers, gap: (arc nodes,) rod
-    multipliers, MPa, and distance of the rod, mm, of the contact state; rod_offset: the offset of
-    the rod in it, mm. moment: moment on the section (N mm) if it is free to roll, None if its
-    rotation is held. place: as of the contact state. rate: coefficient of time derivatives, 1/s, 0
-    where nothing changes. inflow: void fractions at the sealed and the air end, where oil comes in.
-    entrance: pressure that oil has built up before the arc, MPa. slip: speed at which the friction
-    of asperities has 0.7 of its value, mm/s. least_speed: that the sizes of fluxes are taken at,
-    mm/s.
+    sealed_pressure: p_s, MPa. speed: |U|, mm/s. gap: (arc nodes,) distance of the rod in the
+    contact state, mm. shear: weight of the shear stress. moment: moment on the section (N mm) if it
+    is free to roll, None if its rotation is held. place: as of the contact state. rate: coefficient
+    of time derivatives, 1/s, 0 where nothing changes. inflow: void fractions at the sealed and the
+    air end, where oil comes in. entrance: pressure that oil has built up before the arc, MPa. slip:
+    speed at which the friction of asperities has 0.7 of its value, mm/s. least_speed: that the
+    sizes of fluxes are taken at, mm/s.
     """
 
     sealed_pressure: float
     stroke: Stroke
     speed: float
-    multipliers: Array
     gap: Array
-    weight: float = 1.0
     shear: float = 1.0
     moment: float | None = None
-    rod_offset: float = 0.0
     place: float | None = None
     rate: float = 0.0
     inflow: tuple[float, float] = (0.0, 0.0)

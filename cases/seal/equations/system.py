@@ -52,9 +52,6 @@ BORE, SEALED_WALL, AIR_WALL = "housing", "sealed_wall", "air_wall"
 WALLS: dict[str, Place] = {BORE: "outer_nodes", SEALED_WALL: "wall_nodes", AIR_WALL: "wall_nodes"}
 """The other obstacles, and what may touch them; each has a field of multipliers of its own."""
 
-GROOVE = "sealed_groove"
-"""What the sealed pressure does to the groove between two lobes, where there is one."""
-
 FRICTION, CORNER = "contact_friction", "contact_corner"
 SHEAR = {name: f"{name}_shear" for name in WALLS}
 """Tangential stresses of the obstacles that have friction."""
@@ -99,11 +96,6 @@ BLOCKS = (
     Block(SOLID, "{solid}", BODY, (DISPLACEMENT,), "solid"),
     Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
     Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
-    Block(
-        *(GROOVE, "follower_pressure", GROOVE, (DISPLACEMENT,), "load"),
-        layer=True,
-        needed=lambda p: p.lobes > 1,
-    ),
     Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
     *_walls(),
     Block(
@@ -197,45 +189,35 @@ def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | Non
     return None
 
 
-def contact_values(loads: ContactLoads, groove: float) -> dict[str, Values | None]:
+def contact_values(loads: ContactLoads) -> dict[str, Values | None]:
     """What the loads of contact change, by block.
 
     The sealed pressure also acts on the arc up to its lowest node, as the film will carry it there;
-    the rod multipliers of that part are the contact pressure in excess of it. groove: share of it
-    between two lobes.
+    the rod multipliers of that part are the contact pressure in excess of it.
     """
     pressure = {"pressure": loads.sealed_pressure}
     return {
         "sealed_side": pressure,
         "sealed_arc": pressure,
-        GROOVE: {"pressure": groove * loads.sealed_pressure},
         **{name: {"offset": offset} for name, offset in loads.offsets.items()},
         "hold": {"place": loads.place or 0.0},
     }
 
 
-def faded_values(film: FilmLoads, groove: float) -> dict[str, Values | None]:
-    """What is left of the contact forces on the arc once a film has its weight, by block.
-
-    groove: as of `contact_values`.
-    """
-    left = 1.0 - film.weight
-    return {
-        ROD: {"force_weight": left} if left > 0.0 else None,
-        "sealed_arc": {"pressure": film.sealed_pressure * left},
-        GROOVE: {"pressure": film.sealed_pressure * left * groove},
-    }
+def without_contact() -> dict[str, Values | None]:
+    """What is left of the forces on the arc where a film bears them, by block."""
+    return {ROD: None, "sealed_arc": {"pressure": 0.0}}
 
 
-def film_values(p: ORing, film: FilmLoads, share: float) -> Values:
-    """What a term of the film may ask for that has this share of the forces."""
+def film_values(p: ORing, film: FilmLoads) -> Values:
+    """What a term of the film may ask for."""
     return {
         "rod_radius": 0.5 * p.rod_diameter,
         "rod_speed": film.rod_speed,
         "viscosity": p.viscosity,
         "pressure_viscosity": p.pressure_viscosity,
         "cavitation_penalty": p.cavitation_penalty,
-        "force_weight": film.weight * share,
+        "force_weight": 1.0,
         "shear_weight": film.shear,
         "shear_modulus": p.surface_modulus,
         "upwinding": p.upwinding * copysign(1.0, film.rod_speed),

@@ -44,9 +44,6 @@ class Layout(Protocol):
         or where the section was seen to touch it.
         """
 
-    def before_groove(self, mesh: SectionMesh) -> int:
-        """The arc node on the first of two lobes; that of `lowest` where there is no groove."""
-
     def pressed(self, mesh: SectionMesh) -> int:
         """The first outer segment that the sealed pressure acts on, which it does up to the arc."""
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.sections.files import finer as divided
-from softehl.cases.seal.gland.sections.keys import lobes
 from softehl.cases.seal.section.layout import Layout, dam_nodes, moved_dams
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.outline import Shape
@@ -68,11 +67,6 @@ class OutlineLayout:
         """
         place = self.dams[0]
         return self._node(mesh, self._lobes(mesh)[-1] if place is None else place)
-
-    def before_groove(self, mesh: SectionMesh) -> int:
-        """See `Layout`: as `lowest`, of the first lobe."""
-        last = self.lowest(mesh)
-        return last if lobes(self.shape) < 2 else min(self._node(mesh, self._lobes(mesh)[0]), last)
 
     def _node(self, mesh: SectionMesh, place: float) -> int:
         """The arc node nearest to a place, mm."""

@@ -65,10 +65,6 @@ class RoundLayout:
             return _closest(self._angles(mesh.points[mesh.arc_nodes]), self.dams[0])
         return int(np.argmin(mesh.points[mesh.arc_nodes, 1]))
 
-    def before_groove(self, mesh: SectionMesh) -> int:
-        """See `Layout`."""
-        return self.lowest(mesh)
-
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> RoundLayout:
         """See `Layout`: by its lowest point and its crown as long as these do."""
         nodes = dam_nodes(self, mesh, rod, housing, p_s)

@@ -42,19 +42,16 @@ class SealSection:
         """The sets of elements that blocks stand on, name -> node numbers (n, k).
 
         facets: the interior nodes of the arc, each between its two neighbours. arc_nodes and
-        outer_nodes: single nodes. sealed_arc: the part of the arc that p_s reaches without a film;
-        sealed_groove: the same between two lobes.
+        outer_nodes: single nodes. sealed_arc: the part of the arc that p_s reaches without a film.
         """
         mesh, arc = self.mesh, self.mesh.arc_nodes
-        groove = self.layout.before_groove(mesh)
         return {
             "cells": mesh.quads,
             **self._solids(),
             "arc": mesh.arc_segments,
             "facets": np.stack([arc[:-2], arc[1:-1], arc[2:]], axis=1),
             "sealed_side": self._sealed_side(),
-            "sealed_arc": mesh.arc_segments[:groove],
-            "sealed_groove": mesh.arc_segments[groove : self.lowest],
+            "sealed_arc": mesh.arc_segments[: self.lowest],
             "arc_nodes": arc[:, None],
             "outer_nodes": mesh.outer_nodes[:, None],
             "wall_nodes": self.chains["wall_nodes"][0][:, None],

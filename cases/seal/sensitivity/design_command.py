@@ -12,6 +12,7 @@ from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.varied import NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.design import Change, NoDesignError, Step, Target, designed
 from softehl.cases.seal.sensitivity.held import HeldFilm
+from softehl.cases.seal.sensitivity.sensitivity import differentiation
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.runtime.names import meant
@@ -69,7 +70,7 @@ def _reason(error: ValidationError) -> str:
 
 
 def _solve(p: ORing) -> FilmState | None:
-    states = run(p, Silent()).states
+    states = run(p, Silent(), differentiate=differentiation(p)).states
     return states[0] if states else None
 
 

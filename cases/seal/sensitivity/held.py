@@ -5,21 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.sensitivity.quantities import quantities
 from softehl.cases.seal.sensitivity.variation import FilmCase
-from softehl.cases.seal.solve.contact_route import ContactRoute
-from softehl.cases.seal.solve.film_path import FilmPath
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.solve.stroke_start import StrokeStart
+from softehl.cases.seal.solve.films import NoFilm
+from softehl.cases.seal.solve.method import DryContact
+from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Tangent
-from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.sensitivity import direct
-from softehl.runtime.solve.solution import Point
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,22 +30,14 @@ class HeldFilm:
     def of(cls, p: ORing) -> HeldFilm | None:
         """The film of a case; None where it is not reached."""
         assert p.stroke != "both"
-        newton = Newton(max_iterations=10, linear=choose(p.linear))
-        settings, driver = PathSettings(), PathDriver(Silent(), newton)
-        found = ContactRoute(settings, driver.follow, newton).contact(p)
-        if isinstance(found, StageFailed):
+        contact = DryContact.of(p, Silent())
+        if isinstance(contact, StageFailed):
             return None
-        path, kept = FilmPath(found[0], settings, driver), list[tuple[FilmLoads, Array]]()
-
-        def keep(film: FilmLoads, point: Point) -> None:
-            if film.speed == p.speeds[0]:
-                kept[:] = [(film, point.solution.x)]
-
-        x = path.settled(found[1])
-        if isinstance(x, StageFailed):
+        found = contact.adapted(p.stroke, p.speeds[0])
+        if isinstance(found, NoFilm):
             return None
-        StrokeStart(path, p.stroke, x).films(keep)
-        return cls(FilmCase(found[0], kept[0][0]), kept[0][1], newton) if kept else None
+        film = found.film
+        return cls(FilmCase(film.system, film.loads), film.x, contact.newton)
 
     def change(self, quantity: str, key: str, factor: float) -> float | None:
         """A quantity over its value here, where a key is `factor` times as large; None if that film

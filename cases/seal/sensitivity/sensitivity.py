@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.sensitivity.quantities import (
     QUANTITIES,
     along,
@@ -22,9 +24,12 @@ from softehl.cases.seal.sensitivity.quantities import (
     quantities,
 )
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
+from softehl.cases.seal.solve.films import Film
+from softehl.cases.seal.solve.judging import Differentiate
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs, Tangent
-from softehl.runtime.solve.linear import LinearSolver
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear import LinearSolver, SingularMatrix
 from softehl.runtime.solve.sensitivity import adjoints, direct
 
 
@@ -71,3 +76,24 @@ def sensitivities(
         for i, (name, q) in enumerate(found.items()):
             slopes[name][key] = float(through[i, j]) + along(problem, q, key, rate, moved)
     return slopes
+
+
+def differentiation(p: ORing) -> Differentiate | None:
+    """What differentiates the films of a run; None where a case does not ask for it.
+
+    Rates are kept for the films of the mesh that was last in use.
+    """
+    if not p.sensitivity:
+        return None
+    linear, last = choose(p.linear), dict[str, Any]()
+
+    def differentiate(film: Film) -> Mapping[str, Mapping[str, float]] | None:
+        known = last["rates"] if last.get("system") is film.system else {}
+        rates = rates_of(film.system, film.loads, known)
+        last.update(system=film.system, rates=rates)
+        try:
+            return sensitivities(film.system, film.loads, film.x, linear, rates)
+        except SingularMatrix:
+            return None
+
+    return differentiate

@@ -6,20 +6,23 @@ estimated from the same film on the last mesh with fewer segments (`states.estim
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.carried import Carrier
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
+from softehl.cases.seal.solve.loading import Loading
+from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.solve.placement import film_layout, misfit
 from softehl.cases.seal.states.estimate import coarser_density, system_at
 from softehl.cases.seal.states.state import Observer, StageRecord
-from softehl.cases.seal.states.verdict import FilmNumbers
+from softehl.cases.seal.states.verdict import FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.newton import Newton
 
-FITS = 3.0
+FITS = 2.5
 """Segments that a film may ask for in the place of one. Where it asked for at most three, h*
 changed by 0.5 % or less on the mesh that was made for it; where for nine, by 7 %."""
 
@@ -31,54 +34,66 @@ CYCLES = 6
 class Adapted:
     """A film on the mesh that was made for it.
 
-    other: its numbers on the coarser mesh, None where it was not asked for or not found. fits:
-    whether the mesh fits the film.
+    coarser: the same on the coarser mesh of the estimate, None where it was not asked for or not
+    found. fits: whether the mesh fits the film.
     """
 
     film: Film
-    other: FilmNumbers | None
+    coarser: Film | None
     fits: bool = True
+
+    @property
+    def other(self) -> FilmNumbers | None:
+        """The numbers of the coarser film."""
+        return self.coarser.numbers if self.coarser else None
 
 
 @dataclass(frozen=True, eq=False)
 class Adaptation:
     """Makes meshes for films.
 
-    p: the case, whose density they have. newton, observer, offset: as of `FilmSolver`.
+    p: the case, whose density they have. loading: carries contact to them. newton, observer,
+    offset: as of `FilmSolver`.
     """
 
     p: ORing
+    loading: Loading
     newton: Newton
     observer: Observer
     offset: float
     records: list[StageRecord] = field(default_factory=list)
 
-    def adapted(self, found: Film | NoFilm) -> Adapted | NoFilm:
-        """A film on a mesh that fits it, from that on the mesh made by contact.
+    def adapted(self, found: Film | NoFilm, last: Sequence[Adapted] = ()) -> Adapted | NoFilm:
+        """A film on a mesh that fits it, from that on another mesh.
+
+        last: films at other speeds.
 
         Where a mesh does not bear the film all the way, it goes on on one made for it there.
         """
-        film, fits = None, False
+        film = found if isinstance(found, Film) else None
         for _ in range(CYCLES):
-            if isinstance(found, Film):
-                film, fits = found, self._fits(found)
-            again = None if fits else self._remeshed(found)
-            if again is None:
+            again = None if film is found and self._fits(film) else self._remeshed(found)
+            if not isinstance(again, Film):
                 break
-            found = again
+            found = film = again
         if film is None:
             assert isinstance(found, NoFilm)
             return found
-        return Adapted(film, self._coarser(film), fits)
+        return Adapted(film, self._coarser(film, last), self._fits(film))
 
     def _fits(self, film: Film) -> bool:
         """Whether a mesh fits its film; a mesh that is given is as it is."""
-        p, thickness = film.system.parameters, film.squeezing.scales.thickness
-        return p.mesh != "graded" or misfit(film.system, film.x, thickness, p.density) <= FITS
+        p, numbers = film.system.parameters, film.numbers
+        if p.mesh != "graded":
+            return True
+        fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
+        thickness = film.squeezing.scales.thickness
+        shown = numbers.inlet_segments >= fewest or numbers.touching
+        return shown and misfit(film.system, film.x, thickness, p.density) <= FITS
 
     def _remeshed(self, found: Film | NoFilm) -> Film | NoFilm | None:
         """The film on the mesh that is made for it; None where there is none."""
-        if found.begun is None:
+        if found.begun is None or self.p.mesh != "graded":
             return None
         squeezing, now = found.begun
         layout = film_layout(squeezing.system, now.x, squeezing.scales.thickness)
@@ -87,23 +102,42 @@ class Adaptation:
         except MeshError:
             return None
 
-    def _coarser(self, film: Film) -> FilmNumbers | None:
-        """The numbers of a film on the coarser mesh of the estimate; None without one."""
+    def _coarser(self, film: Film, last: Sequence[Adapted]) -> Film | None:
+        """The film on the coarser mesh of the estimate; None without one."""
         p = film.system.parameters
         if not (p.error_estimate and p.mesh == "graded"):
             return None
+        before = [a.coarser for a in last if a.coarser and a.film.system is film.system]
+        if before:
+            near = self._solver(before[-1].system).from_neighbour(before, film.loads.speed)
+            if isinstance(near, Film):
+                return near
         try:
             system = system_at(film.system, coarser_density(p.density))
         except MeshError:
             return None  # too coarse for the corners of a section
         found = self._carried(film, system)
-        return found.numbers if isinstance(found, Film) else None
+        return found if isinstance(found, Film) else None
 
-    def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm:
+    def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:
+        """The film on the mesh of a system; None where there is no contact state on it.
+
+        Where none was found, or does not lead on, it is squeezed out anew.
+        """
         assert found.begun is not None
         squeezing, now = found.begun
-        carrier = Carrier(squeezing.system, system)
-        start, pressures = replace(now, x=carrier.state(now.x)), carrier.pressures(now.x)
-        solver = FilmSolver(system, self.newton, self.observer, self.offset, self.records)
-        go_on = solver.from_film if isinstance(found, Film) else solver.from_moment
-        return go_on(squeezing.carried(system, start.x), start, pressures)
+        dry = self.loading.carried(squeezing.system, squeezing.dry, system)
+        if isinstance(dry, StageFailed):
+            return None
+        solver, again = self._solver(system), None
+        if isinstance(found, Film):
+            carrier = Carrier(squeezing.system, system, (squeezing.dry, dry[1]))
+            start, pressures = replace(now, x=carrier.state(now.x)), carrier.pressures(now.x)
+            carried = squeezing.carried(system, start.x, dry[1])
+            again = solver.from_film(carried, start, pressures)
+        if isinstance(again, Film):
+            return again
+        return solver.from_contact(squeezing.film.stroke, squeezing.film.speed, dry[1])
+
+    def _solver(self, system: SealSystem) -> FilmSolver:
+        return FilmSolver(system, self.newton, self.observer, self.offset, self.records)

@@ -1,8 +1,10 @@
 """A film of one mesh of a section on another one: the start of its solution there.
 
-Displacements, multipliers, film pressures and element pressures are carried. A gap of a micrometre
-does not survive the interpolation of displacements of a millimetre, so the film thickness is
-carried by itself, ln h over the place on the arc, and what that changes is spread into the body.
+The contact state is known on both meshes. What is carried is the change from contact to film, of
+displacements, multipliers and element pressures: it is small and smooth where the state itself is
+not, as in the corners of a groove. A gap of a micrometre does not survive that, so the film
+thickness is carried by itself, ln h over the place on the arc, and what that changes is spread into
+the body.
 """
 
 from __future__ import annotations
@@ -23,14 +25,15 @@ from softehl.runtime.mesh.carried_mesh import potential
 
 @dataclass(frozen=True, eq=False)
 class Carrier:
-    """From a mesh to another one of the same section."""
+    """From a mesh to another one of the same section; dry: contact states (n,), (n',) on both."""
 
     old: SealSystem
     new: SealSystem
+    dry: tuple[Array, Array]
 
     def state(self, x: Array) -> Array:
         """All unknowns (n',) of the film x (n,)."""
-        y = carried_unknowns(self.old, self.new, x)
+        y = self.dry[1] + carried_unknowns(self.old, self.new, x - self.dry[0])
         self._film(x, y)
         inside, mesh = self._inside, self.new.mesh
         miss = np.zeros((len(mesh.points), 1))
@@ -41,9 +44,9 @@ class Carrier:
 
     def pressures(self, x: Array) -> Array:
         """Mean stresses (Q',) of the elements."""
-        return carried_elements(
-            self.old, self.new, element_pressures(self.old.problem, self.old.solids, x)
-        )
+        change = _pressures(self.old, x) - _pressures(self.old, self.dry[0])
+        there = _pressures(self.new, self.dry[1])
+        return np.asarray(there + carried_elements(self.old, self.new, change))
 
     def _thickness(self, x: Array, places: Array) -> Array:
         """Film thickness (n,) at places (n,) on the old arc."""
@@ -75,6 +78,11 @@ class Carrier:
     def _inside(self) -> Flags:
         first, last = self.old.section.places[[0, -1]]
         return np.asarray((self._places >= first) & (self._places <= last))
+
+
+def _pressures(system: SealSystem, x: Array) -> Array:
+    """Mean stress (Q,) of the elements of the section x (n,)."""
+    return element_pressures(system.problem, system.solids, x)
 
 
 def modes_at(before: Array, nodes: Array, at: Array) -> tuple[Integers, Array]:

@@ -9,8 +9,7 @@ Without a pressure it stays, as friction on the housing would, and its force is 
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import exp, log, pi
+from math import pi
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import ContactLoads
@@ -25,7 +24,6 @@ from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
 
 _CORNERED = 2.0  # shear moduli
-_STALLED = 1e-2
 
 WEDGED = 2
 """Nodes that touch each wall where the groove holds the section without help."""
@@ -200,62 +198,10 @@ def load_stage(
     )
 
 
-def emptying_stage(system: SealSystem, settings: PathSettings) -> Stage:
-    """Between contact and the film of an instroke: the pressure leaves the groove of two lobes.
-
-    The rod draws the oil out of it. The path parameter is the share that is gone.
-    """
-    p_s = system.parameters.sealed_pressure
-
-    def at(gone: float) -> Problem:
-        return contact_problem(replace(system, groove=1.0 - gone), settings, p_s)
-
-    return Stage(
-        name="groove emptied",
-        problem_at=at,
-        start=0.0,
-        stop=1.0,
-        steps=StepRule(0.25, 0.01),
-        sealed_pressure=p_s,
-        stroke="in",
-    )
-
-
-def approach_stage(system: SealSystem, settings: PathSettings, offset: float) -> Stage:
-    """Between contact and film: the rod moves from where contact holds it to another offset, mm.
-
-    The path parameter is the logarithm of the offset.
-    """
-    p_s = system.parameters.sealed_pressure
-
-    def at(t: float) -> Problem:
-        return contact_problem(system, replace(settings, offset=exp(t)), p_s)
-
-    way = max(abs(log(offset / settings.offset)), 1e-3)
-    return Stage(
-        name="rod to the film",
-        problem_at=at,
-        start=log(settings.offset),
-        stop=log(offset),
-        steps=StepRule(way, 0.05 * way),
-        sealed_pressure=p_s,
-        stroke="both",
-        shown=exp,
-    )
-
-
 def lies_in_corner(system: SealSystem) -> bool:
     """Whether the sealed pressure holds a round section in the corner between rod and wall."""
     p = system.parameters
     return not system.section.layout.flat and p.sealed_pressure > _CORNERED * p.shear_modulus
-
-
-def stalls(system: SealSystem) -> float:
-    """Residual from which Newton's method goes on where modified iterations do not.
-
-    In a corner nodes of the section touch and leave the walls from one iterate to the next.
-    """
-    return _STALLED if lies_in_corner(system) else 0.0
 
 
 def along(system: SealSystem, newton: Newton) -> Corrector | None:

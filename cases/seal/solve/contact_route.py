@@ -7,11 +7,10 @@ Where a route fails the next one begins on a finer mesh, the last of them on the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.solve.contact import (
@@ -24,15 +23,12 @@ from softehl.cases.seal.solve.contact import (
     wedged,
 )
 from softehl.cases.seal.solve.contact_store import ContactStore, stored_contact
-from softehl.cases.seal.solve.film_layouts import FilmLayouts
 from softehl.cases.seal.solve.grading import PASSES, graded_layout, placed_layout
 from softehl.cases.seal.solve.loading import Loading, State
-from softehl.cases.seal.solve.nearing import LastNear, NearRod
 from softehl.cases.seal.solve.path import Followed, PathSettings, Stage, StageFailed
 from softehl.cases.seal.solve.refinement import finer
 from softehl.cases.seal.solve.trail import Trail
 from softehl.cases.seal.states.contact_results import unsealed
-from softehl.cases.seal.states.contacts import Edge
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
 
@@ -47,20 +43,13 @@ SEALS = 3
 GUIDE = 2
 """Least density of a mesh whose contact shows where another one is to be fine."""
 
-MESH_OF_STROKE: Mapping[Stroke, int] = {"in": 9, "out": 10}
-"""Number of a graded mesh for a stroke alone, after all others."""
-
-NEARER = 2
-"""Meshes that are graded by a contact near the rod."""
-
 
 @dataclass(frozen=True)
 class ContactRoute:
     """Routes to a contact state.
 
     follow: solves a stage from a start. newton: corrector of stored states. contacts: states of
-    uniform meshes that runs leave for each other. trail: what is kept of the last path. near: and
-    of the last states with the rod near.
+    uniform meshes that runs leave for each other. trail: what is kept of the last path.
     """
 
     settings: PathSettings
@@ -68,7 +57,6 @@ class ContactRoute:
     newton: Newton = field(default_factory=Newton)
     contacts: ContactStore = field(default_factory=ContactStore)
     trail: Trail = field(default_factory=Trail)
-    near: LastNear = field(default_factory=LastNear)
 
     def contact(self, p: ORing) -> State | StageFailed:
         """The system of a case, uniform or graded, and its unknowns in contact under p_s."""
@@ -127,10 +115,11 @@ class ContactRoute:
             if isinstance(free, StageFailed):
                 return free
             x = free
-        return self._loading.followed(system, x, force=force)
+        return self.loading.followed(system, x, force=force)
 
     @property
-    def _loading(self) -> Loading:
+    def loading(self) -> Loading:
+        """Carries contact states from mesh to mesh."""
         return Loading(self.settings, self.follow, self.newton, self.trail)
 
     def _quicker(self, system: SealSystem, stage: Stage) -> Stage:
@@ -161,48 +150,10 @@ class ContactRoute:
             if not isinstance(state, StageFailed):
                 state = self._sealed(_at(p, density), state)
             if not isinstance(state, StageFailed):
-                state = self._slow(_at(p, density), state)
-            if not isinstance(state, StageFailed):
                 state = self._refined(*state, p.density)
             if not isinstance(state, StageFailed):
                 break
         return state
-
-    def _slow(self, p: ORing, state: State) -> State | StageFailed:
-        """The last mesh again where the inlet of the slowest film is short: by where that film is.
-
-        Contact holds the rod farther off than a slow film does, and its edges are elsewhere then.
-        """
-        found: State | StageFailed = state
-        for number in range(NEARER):
-            if isinstance(found, StageFailed):
-                break
-            layout = self._layouts.slow(*found, p)
-            if layout is None:
-                break
-            found = self._on(layout, p, found, PASSES + SEALS + number)
-        return found
-
-    def for_film(self, state: State, edges: Sequence[Edge]) -> State | StageFailed:
-        """A contact state on a mesh that is fine at the edges of a film, too."""
-        system, x = state
-        new = build_system(system.parameters, self._layouts.film(system, x, edges))
-        return self._loading.carried(system, x, new, "contact on the mesh of the film")
-
-    def for_stroke(self, stroke: Stroke, state: State) -> State | None:
-        """A contact state on a mesh for what films of a stroke move; None where they do not move
-        it far, or no such state is found. See `drag`.
-        """
-        layouts = self._layouts
-        layout = layouts.instroke(*state) if stroke == "in" else layouts.outstroke(*state)
-        if layout is None:
-            return None
-        found = self._on(layout, state[0].parameters, state, MESH_OF_STROKE[stroke])
-        return None if isinstance(found, StageFailed) else found
-
-    @property
-    def _layouts(self) -> FilmLayouts:
-        return FilmLayouts(NearRod(self.settings, self.follow, self.newton, self.near))
 
     def _sealed(self, p: ORing, state: State) -> State | StageFailed:
         """On the last of the graded meshes; on more where pressure ends outside the contact."""
@@ -237,7 +188,7 @@ class ContactRoute:
     def _on(self, layout: Layout, p: ORing, before: State, number: int) -> State | StageFailed:
         """On a graded mesh: carried to it, or else by the path from rest, coarse or as it is."""
         new = build_system(p, layout)
-        state = self._loading.carried(*before, new, f"contact on graded mesh {number}")
+        state = self.loading.carried(*before, new, f"contact on graded mesh {number}")
         for density in _doublings(COARSE, p.density):
             if isinstance(state, StageFailed):
                 coarse = build_system(_at(p, density), layout)
@@ -260,7 +211,7 @@ class ContactRoute:
                 break
             graded = build_system(p, graded_layout(*state))
             name = f"contact on graded mesh {number}"
-            state = self._loading.carried(*state, graded, name)
+            state = self.loading.carried(*state, graded, name)
         return state
 
     def _refined(
@@ -273,31 +224,12 @@ class ContactRoute:
         state = x if isinstance(x, StageFailed) else (system, x)
         while not isinstance(state, StageFailed) and state[0].parameters.density < density:
             coarse = state[0]
-            state = self._loading.carried(
+            state = self.loading.carried(
                 *state, build_system(finer(coarse.parameters), coarse.section.layout), alone=alone
             )
             if not isinstance(state, StageFailed) and coarse.parameters.mesh != "graded":
                 self.contacts.keep(*state)
         return state
-
-    def emptied(self, before: State, new: SealSystem) -> State | StageFailed:
-        """A contact state with an empty groove on another mesh, from that of one, at once."""
-        loading = replace(self._loading, trail=Trail())
-        return loading.carried(
-            *before, replace(new, groove=before[0].groove), "groove emptied before"
-        )
-
-    def elsewhere(
-        self, old: SealSystem, x: Array, new: SealSystem, *, from_rest: bool = True
-    ) -> Followed:
-        """Unknowns in contact on a mesh of its own, from the contact state x of another one.
-
-        from_rest: whether the path from rest is followed where that leads nowhere.
-        """
-        state = self._loading.carried(old, x, new, "contact")
-        if not isinstance(state, StageFailed):
-            return state[1]
-        return self._loaded(new) if from_rest else state
 
 
 def _doublings(first: int, last: int) -> Iterator[int]:

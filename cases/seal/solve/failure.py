@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.path import StageFailed
 from softehl.runtime.solve.solution import Status
 
@@ -31,6 +34,10 @@ _FILM = (
 _ARC = (
     "part of it may be beyond the given arc, {:g} to {:g} degrees; leave arc_start and arc_end out"
 )
+_FOLD = (
+    "the path ends or turns back there; use a finer mesh (larger density), a lower sealed_pressure "
+    "or a harder rubber"
+)
 _THICK = "try a finer mesh (larger density), or lower speeds or a thinner oil where films are thick"
 _HIGH = 1.5  # shear moduli
 
@@ -43,12 +50,20 @@ def explained(failed: StageFailed, where: str, p: ORing) -> tuple[Status, str]:
     if p.rotation == "free":
         text = f"{failed.message}; {ROLLING}"
     else:
-        text = _contact(failed, p) or f"{failed.message}; {_film_advice(failed, p)}"
+        text = _contact(failed, p) or f"{failed.message}; {_FOLD}"
     return failed.branch.status, f"{where}: {text}"
 
 
+def without_films(missed: Sequence[NoFilm], p: ORing) -> tuple[Status, str]:
+    """Status and message of a stroke that lacks the films of these speeds."""
+    first, speeds = missed[0], ", ".join(f"{film.speed:g}" for film in missed)
+    advice = ROLLING if p.rotation == "free" else _film_advice(p)
+    words = f"{first.stroke}stroke: no film was found at {speeds} mm/s: {first.message}; {advice}"
+    return first.status, words
+
+
 def _contact(failed: StageFailed, p: ORing) -> str:
-    """Of a stage that ends before there is a film; empty for others."""
+    """Of a stage that every contact path has; empty for others."""
     name = failed.stage.name.split(": ")[-1]
     points = failed.branch.points
     reached = points[-1].parameter if points else 0.0
@@ -64,7 +79,7 @@ def _contact(failed: StageFailed, p: ORing) -> str:
             f"sealed pressure {p.sealed_pressure:g} MPa was not reached, only {reached:.4g} MPa "
             f"({reached / p.shear_modulus:.2g} times the shear modulus, {_gland(p)}); {_corner(p)}"
         )
-    if name.startswith("contact") and name != "contact to film":
+    if name.startswith("contact"):
         return f"{name} was not found ({_gland(p)}, p_s = {p.sealed_pressure:g} MPa); {_corner(p)}"
     return ""
 
@@ -74,10 +89,8 @@ def _corner(p: ORing) -> str:
     return _EXTRUSION.format(p.extrusion_gap, p.corner_fillet) if p.opens else _PRESSURE
 
 
-def _film_advice(failed: StageFailed, p: ORing) -> str:
+def _film_advice(p: ORing) -> str:
     """What may help a film that was not found."""
-    if failed.stage.name.split(": ")[-1] not in ("contact to film", "shear", "speed"):
-        return failed.advice
     if p.given_arc:
         return _ARC.format(*p.given_arc)
     times = p.sealed_pressure / p.shear_modulus

@@ -30,7 +30,7 @@ _NEAR = 0.3
 _CAVITIES = 40
 """Inner iterations where oil ruptures and joins again node by node."""
 
-_MONOLITHIC = 30
+_MONOLITHIC = 12
 """Iterations of Newton's method for all unknowns."""
 
 
@@ -89,6 +89,17 @@ class WholeSteps:
         return newton.solve(lagged(self.system, problem, pressures), problem.admissible(x0))
 
 
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """Newton's method for all unknowns of a steady film."""
+
+    whole: WholeSteps
+
+    def solve(self, problem: Layered, x0: Array) -> Solution:
+        """See `Corrector`."""
+        return self.whole.steady(problem.problem, x0)
+
+
 @dataclass(eq=False)
 class CarriedSteps:
     """Steps of which the first begins with the element pressures (Q,) of another mesh."""
@@ -126,10 +137,19 @@ class FilmCorrectors:
         fast = (CondensedSteps(self.fast),) if self.fast else ()
         return CarriedSteps(Ladder((*fast, self.whole), self._refused), self.whole, pressures)
 
+    @property
+    def first(self) -> Corrector:
+        """Solves steady films that are `layered`, from others near by."""
+        return self.fast or Steady(self.whole)
+
+    def layered(self, problem: Problem, layer: Layer) -> Layered:
+        """A steady film as its correctors take it."""
+        return Layered(problem, layer, (self.whole.system.film_guard(),))
+
     def steady(self, problem: Problem, layer: Layer, x: Array) -> Solution:
         """The steady film from the last step in time, x (n,)."""
         if self.fast:
-            end = self.fast.solve(Layered(problem, layer, (self.whole.system.film_guard(),)), x)
+            end = self.fast.solve(self.layered(problem, layer), x)
             if end.converged:
                 return end
         return self.whole.steady(problem, x)

@@ -8,11 +8,11 @@ elements (`runtime.fem.lagged_pressure`).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf
+from math import exp, inf, log
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
@@ -24,12 +24,20 @@ from softehl.cases.seal.states.state import Observer, StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.newton import Newton, NonlinearProblem
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
-from softehl.runtime.solve.solution import Solution, Status
+from softehl.runtime.solve.solution import Point, Solution, Status
+from softehl.runtime.solve.steps import StepRule
 
 _AGAIN = 0.01
 """First step of a film that was carried to another mesh and is not found there at once, of T."""
+
+_LEAST = 0.3
+"""Least step in ln U on the way from the film at another speed."""
+
+_NEIGHBOUR = 0.1
+"""First step from the film at another speed, of T."""
 
 _AT_ONCE = 8
 """Iterations in which it is found at once: it takes four, or does not come nearer."""
@@ -37,11 +45,15 @@ _AT_ONCE = 8
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """A steady film on a mesh, its unknowns x (n,). squeezing: how it was squeezed out."""
+    """A steady film on a mesh, its unknowns x (n,).
+
+    squeezing: how it was squeezed out. correctors: what solved it, for films near by.
+    """
 
     squeezing: Squeezing
     x: Array
     iterations: int
+    correctors: FilmCorrectors
 
     @property
     def system(self) -> SealSystem:
@@ -58,6 +70,11 @@ class Film:
         """The moment from which it is squeezed out where it is not found at once."""
         return self.squeezing, Moment(self.x, _AGAIN, 1.0)
 
+    @property
+    def solution(self) -> Solution:
+        """The film as a point of a path."""
+        return Solution(self.x, Status.CONVERGED, "", (), 0, 0)
+
     @cached_property
     def problem(self) -> Problem:
         """The equations that it fulfils."""
@@ -73,7 +90,7 @@ class Film:
 class NoFilm:
     """Why there is no film at a speed.
 
-    begun: how it was squeezed out, and how far, where it was begun.
+    begun: how it was squeezed out, and how far, where it took a step.
     """
 
     stroke: Stroke
@@ -103,12 +120,40 @@ class FilmSolver:
         if scales is None:
             words = "too few nodes touch the rod to show the edge of the contact"
             return NoFilm(stroke, speed, Status.DIVERGED, words)
-        film = film_loads(self.system, stroke, speed, x, self.offset)
-        squeezing = Squeezing(
-            self.system, film_layer(self.system, x), film, scales, self.system.moment(x)
-        )
+        film = film_loads(self.system, stroke, speed, x)
+        layer, moment = film_layer(self.system, x), self.system.moment(x)
+        squeezing = Squeezing(self.system, layer, film, scales, x, self.offset, moment)
         pressed = pressed_film(self.system, x, film.sealed_pressure)
         return self._followed(squeezing, Moment(pressed, squeezing.first(x)))
+
+    def from_neighbour(self, last: Sequence[Film], speed: float) -> Film | NoFilm:
+        """The film at |U|, mm/s, along those at speeds between, from the last film on our mesh.
+
+        last: films at other speeds, the latest last.
+        """
+        film, correctors = last[-1], last[-1].correctors
+        squeezing, before = film.squeezing.at(speed), [film.x]
+        known = [Point(log(f.loads.speed), f.solution) for f in last if f.system is film.system]
+        start, stop = known[-1].parameter, log(speed)
+
+        def problem_at(t: float) -> NonlinearProblem:
+            loads = replace(squeezing.film, speed=speed if t == stop else exp(t))
+            problem = self.system.film_problem(loads).since(before[0])
+            return correctors.layered(problem, squeezing.layer)
+
+        with self._told(squeezing.film) as told:
+
+            def tell(point: Point) -> None:
+                before[0] = told(point.solution).x
+
+            rule = StepRule(abs(stop - start), min(_LEAST, abs(stop - start)))
+            path = Continuation(correctors.first, rule, name="ln U")
+            previous = known[-2] if len(known) > 1 else None
+            branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
+        if branch.converged and squeezing.change(film.x, branch.last.x) < inf:
+            return self._entered(squeezing, correctors, branch.last)
+        x = branch.last.x if branch.points else film.x
+        return self._followed(squeezing, Moment(x, _NEIGHBOUR, 1.0), correctors=correctors)
 
     def from_film(self, carried: Squeezing, start: Moment, pressures: Array) -> Film | NoFilm:
         """The steady film of another mesh, carried to ours: at once, else squeezed out from there.
@@ -121,22 +166,23 @@ class FilmSolver:
             found = told(correctors.whole.steady(problem, x, pressures, _AT_ONCE))
         if found.converged and carried.change(x, found.x) < inf:
             return self._entered(carried, correctors, found)
-        return self.from_moment(carried, start, pressures)
-
-    def from_moment(self, carried: Squeezing, start: Moment, pressures: Array) -> Film | NoFilm:
-        """The film that another mesh has squeezed out as far as to a moment, carried to ours."""
         return self._followed(carried, start, pressures)
 
     def _followed(
-        self, squeezing: Squeezing, start: Moment, pressures: Array | None = None
+        self,
+        squeezing: Squeezing,
+        start: Moment,
+        pressures: Array | None = None,
+        correctors: FilmCorrectors | None = None,
     ) -> Film | NoFilm:
-        film, correctors = squeezing.film, FilmCorrectors.of(self.system, self.newton)
+        film, correctors = squeezing.film, correctors or FilmCorrectors.of(self.system, self.newton)
         steps = PseudoTransient(correctors.steps(pressures))
         with self._told(film) as told:
             branch, reached = steps.follow(squeezing, start, on_point=lambda p: told(p.solution))
             if not branch.converged:
                 words = branch.message
-                return NoFilm(film.stroke, film.speed, branch.status, words, (squeezing, reached))
+                begun = None if reached is start else (squeezing, reached)
+                return NoFilm(film.stroke, film.speed, branch.status, words, begun)
             problem = self.system.film_problem(film).since(reached.x)
             end = told(correctors.steady(problem, squeezing.layer, reached.x))
         if not end.converged:
@@ -149,13 +195,13 @@ class FilmSolver:
 
         Without it where no such film is found.
         """
-        film = Film(squeezing, found.x, found.iterations)
+        film = Film(squeezing, found.x, found.iterations, correctors)
         if not film.numbers.enters:
             return film
         more = replace(squeezing, film=replace(film.loads, entrance=film.numbers.entrance))
         problem = self.system.film_problem(more.film).since(found.x)
         end = correctors.steady(problem, more.layer, found.x)
-        return Film(more, end.x, end.iterations) if end.converged else film
+        return Film(more, end.x, end.iterations, correctors) if end.converged else film
 
     @contextmanager
     def _told(self, film: FilmLoads) -> Iterator[Callable[[Solution], Solution]]:

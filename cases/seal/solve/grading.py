@@ -11,7 +11,6 @@ edges and are as K^(-6/5) at them resolve every speed, and one mesh serves both 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -64,11 +63,7 @@ narrower there than half of those films."""
 
 _UPRIGHT = 85.0
 """A surface as steep as this lies on a wall. The arc ends before it: a film that rises along it has
-no length, and on a finer mesh the section may touch the wall nearer to the rod. That of films that
-pull the section off the wall, or push it against it, goes on if its gap is less than _CLOSED of
-REACH there: a segment on a wall has an equation."""
-
-_CLOSED = 0.5
+no length, and on a finer mesh the section may touch the wall nearer to the rod."""
 
 _FAR_SHORT, _GENTLE = 0.8, 35.0
 """An arc that ends at a gap of less than so much of what it is to have is made longer, where its
@@ -85,18 +80,6 @@ was two per cent too small, with half as many as this it changes by 0.2 %."""
 MULTIPLE = 1.75
 """About h* in `film_thickness`, whatever the ring."""
 
-CLEAR = 1.25
-"""Room between an arc and the wall of the air side, in what the outstroke takes of it, below which
-the arc is one that goes up the wall."""
-
-SWEPT, COVERED = 4.0, 1.2
-"""Inlets by which the film moves its edge from which on what it sweeps has a mesh of its own, with
-segments of so many inlets of the film whose edge is there."""
-
-PASSED = 0.4
-"""Growth outside the sealed edge of such a mesh, as a share of that of other meshes: the exit dip
-of the instroke passes over these segments as the speed falls, and was one or two of them wide."""
-
 _THIRDS = 3  # of segments at density 1: meshes exist for thirds of a density
 _PLACED_COARSEST, _FLAT_COARSEST = 12, 24
 """As COARSEST, of an arc that the contact places: on a round section, on one that may have flats,
@@ -108,9 +91,6 @@ def placed_layout(
     x: Array,
     p: ORing,
     most: int = MOST_SEGMENTS,
-    also: Sequence[Edge] = (),
-    dragged: float = 0.0,
-    upward: bool = False,
 ) -> Layout:
     """The layout of a case whose arc reaches as far as a film may matter in the contact state x.
 
@@ -118,10 +98,7 @@ def placed_layout(
     0.3 min(1 / k, 1.5) inside: at the flatter edge the dip is as wide as the inlet of the other
     one, and lies outside. The exponents were fitted to states at p_s / mu = 0, 1 and 2.7.
     most: segments at density 1 that it may get; a state that shows the edges only roughly is no
-    reason for many. also: edges elsewhere that are to be fine too. dragged: how far the slowest
-    film of the instroke moves its edge outward, mm, where that matters: the arc gets twice as many
-    segments, to be as fine wherever faster films move it to, and where their exit dips are. upward:
-    whether an arc that ends at the wall of the air side goes on up that wall.
+    reason for many.
     """
     s, edges = system.section.places, contact_edges(system, x)
     most_ends = uniform_layout(p).bounds(system.section.layout)
@@ -129,8 +106,6 @@ def placed_layout(
         _way_out(system, x, s, 0, most_ends[0]),
         _way_out(system, x, s, 1, most_ends[1]),
     )
-    if upward:
-        ends = ends[0], min(_up_wall(system, x, ends[1]), max(most_ends[1], ends[1]))
     seen = system.section.layout.held(
         system.mesh, system.pressing(ROD, x), system.pressing(BORE, x), p.sealed_pressure
     )
@@ -139,18 +114,14 @@ def placed_layout(
         return layout
     length, steepest = ends[1] - ends[0], max(edge.rise for edge in edges)
     spots = []
-    for edge in (*edges, *also):
+    for edge in edges:
         k = min(edge.rise / steepest, 1.0) ** 0.5
-        outside = RATE * k**0.5 * (PASSED if dragged > 0.0 and edge.sealed else 1.0)
-        rates = outside, RATE * min(1.0 / k, 1.5)
+        rates = RATE * k**0.5, RATE * min(1.0 / k, 1.5)
         place = min(max(edge.place - ends[0], 0.0), length)
         spots.append(Spot(place, k**-0.3, rates if edge.sealed else rates[::-1]))
     if p.opens:
         spots.append(_edge_spot(system, x, p, ends))
     parts, inlet = len(edges) // 2, inlet_length(p, steepest)
-    if dragged > 0.0:
-        spots.append(_swept(p, edges[-1], spots[len(edges) - 1], dragged, length))
-        most *= 2
     coarsest = length / max(parts * _PLACED_COARSEST, _FLAT_COARSEST if layout.flat else 0)
     for long in range(layout.long, max(parts * most, layout.long) + 1, parts * _THIRDS):
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
@@ -158,32 +129,6 @@ def placed_layout(
             break
     first = 0.25 * p.corner_fillet if p.opens else None
     return layout.graded(spacing, long, DEPTH * inlet, first)
-
-
-def sweeps(system: SealSystem, x: Array, dragged: float) -> bool:
-    """Whether films of the instroke move their edge by many inlets; see `placed_layout`.
-
-    x: the contact state.
-    """
-    edges = contact_edges(system, x)
-    return bool(edges) and dragged > SWEPT * inlet_length(system.parameters, edges[-1].rise)
-
-
-def reaches_wall(system: SealSystem, x: Array, pushed: float) -> bool:
-    """Whether the outstroke takes the room between arc and wall; x: the contact state."""
-    p, (z, _) = system.parameters, system.arc_film(x)
-    return bool(p.air_wall - z[-1] < CLEAR * pushed)
-
-
-def _swept(p: ORing, edge: Edge, spot: Spot, dragged: float, length: float) -> Spot:
-    """Where the slowest film of the instroke has its edge, which contact has at a spot.
-
-    Faster ones have it farther outside, by as much as their inlets are longer.
-    """
-    assert spot.rates is not None
-    most = COVERED * inlet_length(p, edge.rise) / dragged
-    place = min(spot.place + dragged, length)
-    return replace(spot, place=place, rates=(min(spot.rates[0], most), min(spot.rates[1], most)))
 
 
 def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:
@@ -219,22 +164,6 @@ def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
     return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
 
 
-def slowest_films(system: SealSystem, x: Array) -> tuple[float, ...]:
-    """About the least h* (mm) of a case whose contact state is x, thinnest first.
-
-    That of each stroke where they are far apart; of a round section the thicker one serves both.
-    """
-    p, edges = system.parameters, contact_edges(system, x)
-    inlets = (edges[:1], edges[-1:]) if system.section.layout.flat else (edges,)
-    films = sorted(MULTIPLE * film_thickness(p, some, min(p.speeds)) for some in inlets)
-    return tuple(films[:1] if films[-1] < _APART * films[0] else films)
-
-
-_APART = 2.0
-"""Ratio of the slowest films of both strokes from which contact under one says little of the other:
-its edges are elsewhere, far away where the surface lies nearly along the rod."""
-
-
 def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) -> float:
     """Where on the arc (mm) an end of the film is to be: side 0 the sealed, 1 the air end.
 
@@ -267,19 +196,6 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) ->
     wanted = (reach - h[-1]) / np.sin(steep[-1])
     longer = min(wanted, abs(bound - s[-1]), _free(system, x, side))
     return float(s[-1] + np.copysign(longer, bound - s[-1]))
-
-
-def _up_wall(system: SealSystem, x: Array, end: float) -> float:
-    """Where on the outline (mm) the gap is REACH, beyond the air end of an arc that is too narrow
-    there; else that `end`.
-    """
-    mesh, s = system.mesh, system.section.places
-    outline = system.deformed(x)[mesh.boundary, 1] - system.rod_radius
-    places = np.append(s, s[-1] + mesh.places[mesh.arc + 1 :] - mesh.places[mesh.arc])
-    if np.interp(end, places, outline) >= _CLOSED * REACH:
-        return end
-    wide = int(np.argmax((outline >= REACH) & (places > end)))
-    return float(np.interp(REACH, outline[wide - 1 : wide + 1], places[wide - 1 : wide + 1]))
 
 
 def _free(system: SealSystem, x: Array, side: int) -> float:

@@ -49,12 +49,8 @@ def verdict_of_contact(system: SealSystem, x: Array) -> Verdict:
 
 @dataclass(frozen=True)
 class Judge:
-    """Makes states of films.
+    """Makes states of films; differentiate: makes sensitivities, None where none are asked."""
 
-    contact: verdict before any film. differentiate: makes sensitivities, None where none are asked.
-    """
-
-    contact: Verdict
     differentiate: Differentiate | None = None
 
     def state(self, adapted: Adapted, faster: FilmNumbers | None) -> FilmState:
@@ -63,7 +59,8 @@ class Judge:
         numbers = film.numbers
         error, friction = errors(p.density, numbers, other, coarser_density(p.density))
         wanted = p.error_estimate and p.mesh == "graded"
-        verdict = replace(self.contact, last=faster).after(numbers)
+        verdict = verdict_of_contact(film.system, film.squeezing.dry)
+        verdict = replace(verdict, last=faster).after(numbers)
         verdict = replace(verdict, error=error if wanted else None)
         state = film_state(film.system, film.problem, film.loads, film.x, verdict, film.iterations)
         state = replace(

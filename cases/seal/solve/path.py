@@ -1,4 +1,4 @@
-"""Following a solution path stage by stage (section 4 of the paper): contact, film, falling speed.
+"""Following a path of contact states stage by stage (section 4 of the paper).
 
 A stage is a family of problems in one parameter. A stage that does not reach its end is a value,
 `StageFailed`, that says how far it came and what may help.
@@ -6,14 +6,12 @@ A stage is a family of problems in one parameter. A stage that does not reach it
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from softehl.cases.seal.states.state import Observer, StageRecord, place
-from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.homotopy import Continuation
@@ -21,19 +19,6 @@ from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.predictor import Guess, Predictor
 from softehl.runtime.solve.solution import Branch, Point
 from softehl.runtime.solve.steps import StepRule
-
-FOLD = (
-    "the path ends or turns back there, as it does when the film collapses on a mesh that is too "
-    "coarse: use a finer mesh (larger density)"
-)
-
-CLOSED = 0.05
-"""Least film thickness, in h*, below which a path ends because the film closes."""
-
-CLOSING = (
-    "the film closes: at a node it is only {:.2g} um thick there, and would be negative beyond; "
-    "use a finer mesh (larger density) or a higher pressure_order"
-)
 
 
 @dataclass(frozen=True)
@@ -44,8 +29,6 @@ class PathSettings:
     at density 1, 0 = just touching and 1 = all the way; it falls with density^2, so that the first
     contact is as many nodes wide. first_way: the same in section diameters of way. lean: how far
     the section is pushed against its wall before the pressure does it, in section diameters.
-    start_speed: least |U| at which the film is built up, mm/s. placed_start_speed: the same on an
-    arc that the contact has placed, where the rod is put as far off as that film will be thick.
     load_steps, reload_steps: in shear moduli, from rest and from a loaded state that was carried to
     another mesh. The rest: step rules.
     """
@@ -54,18 +37,10 @@ class PathSettings:
     first_contact: float = 0.2
     first_way: float = 0.004
     lean: float = 0.01
-    start_speed: float = 6400.0
-    placed_start_speed: float = 1600.0
     longest_squeeze: float = 0.3
     load_steps: StepRule = field(default_factory=lambda: StepRule(0.055, 3e-4, 0.3))
     reload_steps: StepRule = field(default_factory=lambda: StepRule(0.15, 3e-4, 0.3))
-    weight_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-5))
-    shear_steps: StepRule = field(default_factory=lambda: StepRule(1.0, 1e-3))
-    order_steps: StepRule = field(default_factory=lambda: StepRule(0.02, 1e-4))
     release_steps: StepRule = field(default_factory=lambda: StepRule(0.1, 1e-3))
-    speed_steps: StepRule = field(
-        default_factory=lambda: StepRule(math.log(2.0), 4e-3, math.log(2.0) + 1e-9)
-    )
 
 
 def _nothing(point: Point) -> None:
@@ -112,11 +87,11 @@ def laborious(stage: Stage, corrector: Corrector | None) -> Stage:
 
 @dataclass(frozen=True, eq=False)
 class StageFailed:
-    """A stage that did not reach its end. last: the last film that was solved, if there was one."""
+    """A stage that did not reach its end. records: what all stages so far have cost."""
 
     stage: Stage
     branch: Branch
-    last: FilmNumbers | None = None
+    records: tuple[StageRecord, ...] = ()
 
     @property
     def message(self) -> str:
@@ -132,13 +107,6 @@ class StageFailed:
         """Parameter of the last state; of the beginning, if there is none."""
         points = self.branch.points
         return points[-1].parameter if points else self.stage.start
-
-    @property
-    def advice(self) -> str:
-        """Why a path ends on the way, and what may help."""
-        if self.last is not None and self.last.h_min < CLOSED * self.last.h_star:
-            return CLOSING.format(1e3 * self.last.h_min)
-        return FOLD
 
 
 Followed: TypeAlias = Array | StageFailed

@@ -14,7 +14,7 @@ from scipy.integrate import cumulative_trapezoid
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.states.section_view import film_pressure
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.spacing import STATIONS, Spacing
 
 THINNING, RISE = 0.3, 0.05
@@ -38,9 +38,13 @@ exist for thirds of a density."""
 def film_layout(system: SealSystem, x: Array, thickness: float) -> Layout:
     """The layout of a mesh for a film x (n,), also of one that is not steady yet.
 
+    Its mesh is nowhere coarser: what is carried from one to the next then hardly changes.
     thickness: of the film at its inlet, mm, near enough.
     """
     s, size = sizes(system, x, thickness)
+    at, long_before = system.section.places, system.section.layout.long
+    before = np.diff(at) * system.mesh.arc / (long_before * _DENSITY)
+    size = np.minimum(size, before[_segments(at, s)])
     index = _index(s, size)
     long = _THIRDS * ceil(index[-1] / (_DENSITY * _THIRDS))
     layout = system.section.layout
@@ -71,9 +75,14 @@ def sizes(system: SealSystem, x: Array, thickness: float) -> tuple[Array, Array]
     longest = at[-1] / COARSEST
     segment = np.minimum(1.0 / np.maximum(wanted, 1e-12), longest)
     s = np.linspace(0.0, at[-1], STATIONS)
-    there = segment[np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(dx) - 1)]
+    there = segment[_segments(at, s)]
     step = GROWTH * (s[1] - s[0])
     for way in (slice(None), slice(None, None, -1)):  # no faster growth than GROWTH on either side
         place = step * np.arange(STATIONS)
         there[way] = np.minimum.accumulate(there[way] - place) + place
     return s, there
+
+
+def _segments(at: Array, s: Array) -> Integers:
+    """Numbers (n,) of the segments between nodes at places (m,) that hold the places s (n,)."""
+    return np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(at) - 2)

@@ -61,20 +61,20 @@ class InletScales:
             return None
         return cls(inlet_time(p, edge, speed), MULTIPLE * film_thickness(p, [edge], speed))
 
+    def at(self, ratio: float) -> InletScales:
+        """Those at another speed, which is so many times ours: l is as U^0.4, h as U^0.6."""
+        return InletScales(self.time * ratio**-0.6, self.thickness * ratio**0.6)
 
-def film_loads(
-    system: SealSystem, stroke: Stroke, speed: float, x: Array, rod_offset: float
-) -> FilmLoads:
-    """The loads of a film at |U| (mm/s) from the contact state x (n,) with the rod at an offset."""
+
+def film_loads(system: SealSystem, stroke: Stroke, speed: float, x: Array) -> FilmLoads:
+    """The loads of a film at |U| (mm/s) from the contact state x (n,)."""
     p = system.parameters
     return FilmLoads(
         p.sealed_pressure,
         stroke,
         speed,
-        multipliers=system.rod_multipliers(x).copy(),
         gap=system.arc_film(x)[1],
         shear=1.0 if p.shear_traction else 0.0,
-        rod_offset=rod_offset,
         place=held_place(p),
         moment=0.0 if p.rotation == "free" else held_moment(p),
     )
@@ -84,25 +84,32 @@ def film_loads(
 class Squeezing:
     """A film that is squeezed out; satisfies `Transient`, its time in units of T.
 
-    film: loads of the steady film. moment: that holds the rotation of the section at the start,
-    N mm; it fades as the shear stress begins to act, where the section is free to roll.
+    film: loads of the steady film. dry: (n,) the contact state on its mesh. offset: of the rod in
+    that, mm. moment: that holds the rotation of the section at the start, N mm; it fades as the
+    shear stress begins to act, where the section is free to roll.
     """
 
     system: SealSystem
     layer: Layer
     film: FilmLoads
     scales: InletScales
+    dry: Array
+    offset: float
     moment: float = 0.0
 
-    def carried(self, system: SealSystem, x: Array) -> Squeezing:
-        """The same film on the mesh of another system; x: (n,) carried to it."""
+    def at(self, speed: float) -> Squeezing:
+        """The same at another |U|, mm/s."""
+        film = replace(self.film, speed=speed, entrance=0.0)
+        return replace(self, film=film, scales=self.scales.at(speed / self.film.speed))
+
+    def carried(self, system: SealSystem, x: Array, dry: Array) -> Squeezing:
+        """The same film on the mesh of another system; x: (n,) carried to it, dry: contact."""
         film = replace(
             self.film,
-            multipliers=system.rod_multipliers(x).copy(),
-            gap=system.arc_film(x)[1] + self.film.rod_offset,
+            gap=system.arc_film(x)[1] + self.offset,
             entrance=0.0,
         )
-        return replace(self, system=system, layer=film_layer(system, x), film=film)
+        return replace(self, system=system, layer=film_layer(system, x), film=film, dry=dry)
 
     def step(self, before: Array, tau: float, load: float) -> Relaxed:
         """See `Transient`; the load is the shear stress of the film."""
@@ -128,7 +135,7 @@ class Squeezing:
 
     def first(self, x: Array) -> float:
         """Length of the first step from the contact state x (n,); see `FIRST` and `ROUNDING`."""
-        thicker = self.scales.thickness / self.film.rod_offset if self.film.rod_offset else 1.0
+        thicker = self.scales.thickness / self.offset if self.offset else 1.0
         problem = self.system.film_problem(self.film)
         least = least_time(problem, self._masses(x), x) / self.scales.time
         return float(max(FIRST * min(1.0, thicker) ** EXPONENT, least))
