@@ -1,0 +1,180 @@
+"""A film is the same whatever it is found from: contact, another speed, another mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from softehl.cases.harness.row import OK
+from softehl.cases.seal.equations.equations import build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.adaptation import FITS, Adaptation, Adapted
+from softehl.cases.seal.solve.carried import Carrier
+from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
+from softehl.cases.seal.solve.method import DryContact, run
+from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.placement import film_layout, misfit
+from softehl.cases.seal.states.state import Silent
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.solution import Status
+
+RING: dict[str, Any] = {"ring": "AS568-210", "rod": 19.0, "error_estimate": False}
+P = ORing(**RING, density=1, sealed_pressure=3.0, mu_1=1.5)
+THIN = ORing(
+    inner_diameter=9.525,
+    section_diameter=1.78,
+    rod_diameter=9.525,
+    housing_diameter=12.6222,
+    speeds=(2.0,),
+    stroke="out",
+    error_estimate=False,
+)
+"""A film of 0.0403 um at density 4, much thinner than what holds the rod off in contact."""
+
+
+def contact_of(p: ORing) -> DryContact:
+    found = DryContact.of(p, Silent())
+    assert not isinstance(found, StageFailed)
+    return found
+
+
+@pytest.fixture(scope="module")
+def dry() -> DryContact:
+    """AS568-210 under 3 MPa on a coarse mesh."""
+    return contact_of(P)
+
+
+@pytest.fixture(scope="module")
+def films(dry: DryContact) -> dict[float, Film]:
+    """Films from the contact, by speed."""
+    return {speed: a_film(dry.film("out", speed)) for speed in (800.0, 400.0, 100.0)}
+
+
+def a_film(found: Film | NoFilm) -> Film:
+    assert isinstance(found, Film), found.message
+    return found
+
+
+def solver(dry: DryContact, system: Any = None) -> FilmSolver:
+    return FilmSolver(system or dry.system, dry.newton, dry.observer, dry.offset)
+
+
+def adaptation(p: ORing, dry: DryContact) -> Adaptation:
+    return Adaptation(p, dry.loading, dry.newton, dry.observer, dry.offset)
+
+
+def gap(film: Film) -> Array:
+    return film.system.arc_film(film.x)[1]
+
+
+# ---------------------------------------------------------------------------------- on one mesh
+
+
+@pytest.mark.parametrize("last", [(800.0,), (800.0, 400.0), (100.0,)], ids=str)
+def test_a_film_from_a_neighbour_is_that_from_the_contact(
+    dry: DryContact, films: dict[float, Film], last: Sequence[float]
+) -> None:
+    speed = 400.0 if last == (100.0,) else 100.0  # also towards faster films
+    found = a_film(solver(dry).from_neighbour([films[u] for u in last], speed))
+    assert found.loads.speed == speed
+    assert gap(found) == pytest.approx(gap(films[speed]), rel=1e-6)
+    assert found.numbers.friction == pytest.approx(films[speed].numbers.friction, rel=1e-6)
+    assert gap(found) != pytest.approx(gap(films[last[-1]]), rel=1e-2)
+
+
+@pytest.mark.parametrize("moment", ["begun", "steady"])
+def test_a_film_that_goes_on_from_a_moment_is_the_same(
+    dry: DryContact, films: dict[float, Film], moment: str
+) -> None:
+    """From its steady state, and from that of another speed."""
+    film = films[100.0 if moment == "steady" else 800.0]
+    squeezing, start = film.begun
+    carrier = Carrier(film.system, film.system, (dry.x, dry.x))
+    at = squeezing if moment == "steady" else squeezing.at(100.0)
+    found = a_film(solver(dry).from_film(at, start, carrier.pressures(film.x)))
+    assert gap(found) == pytest.approx(gap(films[100.0]), rel=1e-6)
+
+
+# ------------------------------------------------------------------------------- on another mesh
+
+
+def test_a_film_that_is_carried_is_that_from_the_contact_of_its_mesh(
+    dry: DryContact, films: dict[float, Film]
+) -> None:
+    film = films[400.0]
+    new = build_system(P, film_layout(film.system, film.x, film.squeezing.scales.thickness))
+    carried = adaptation(P, dry)._carried(film, new)
+    assert isinstance(carried, Film)
+    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+    contact = route.loading.carried(dry.system, dry.x, new)
+    assert not isinstance(contact, StageFailed)
+    own = a_film(solver(dry, new).from_contact("out", 400.0, contact[1]))
+    assert gap(carried) == pytest.approx(gap(own), rel=1e-6)
+    assert carried.numbers.h_star != pytest.approx(film.numbers.h_star, rel=1e-5)
+
+
+def test_a_film_that_is_carried_to_its_own_mesh_stays(
+    dry: DryContact, films: dict[float, Film]
+) -> None:
+    film = films[400.0]
+    carrier = Carrier(film.system, film.system, (dry.x, dry.x))
+    x = carrier.state(film.x)
+    assert film.system.arc_film(x)[1] == pytest.approx(gap(film), rel=1e-6)
+    assert film.system.pressures(x) == pytest.approx(film.system.pressures(film.x), abs=1e-9)
+
+
+def test_a_mesh_that_does_not_fit_is_made_anew_and_h_star_moves_to_its_limit() -> None:
+    contact = contact_of(THIN)
+    film = a_film(contact.film("out", 2.0))
+    found = adaptation(THIN, contact).adapted(film)
+    assert isinstance(found, Adapted)
+    assert found.fits
+    for one, fits in ((film, False), (found.film, True)):
+        asked = misfit(one.system, one.x, one.squeezing.scales.thickness, 2)
+        assert (asked <= FITS) is fits
+    assert 1e3 * found.film.numbers.h_star == pytest.approx(0.0403, rel=5e-3)
+    assert 1e3 * film.numbers.h_star != pytest.approx(0.0403, rel=5e-3)
+
+
+def test_a_mesh_that_is_given_is_not_made_anew(dry: DryContact, films: dict[float, Film]) -> None:
+    """Neither for a film that is not found, nor for one that asks for more."""
+    film = films[400.0]
+    uniform = P.model_copy(update={"mesh": "uniform"})
+    system = dry.system.moved(uniform, dry.system.section)
+    squeezing, now = film.begun
+    begun = squeezing.carried(system, film.x, dry.x), now
+    no = NoFilm("out", 400.0, Status.DIVERGED, "no film", begun)
+    assert adaptation(uniform, dry).adapted(no) is no
+    found = adaptation(uniform, dry).adapted(replace(film, squeezing=begun[0]))
+    assert isinstance(found, Adapted)
+    assert found.fits
+    assert found.film.system is system
+
+
+# --------------------------------------------------------------------------------- of whole runs
+
+
+def test_films_do_not_depend_on_the_speeds_that_were_asked_for_before() -> None:
+    """But for their meshes, which films of several speeds share where these fit them."""
+    given: dict[str, Any] = {**RING, "density": 2, "stroke": "out"}
+    many, few = (
+        run(ORing(**given, speeds=speeds), Silent()).states
+        for speeds in ((800.0, 200.0, 50.0), (50.0,))
+    )
+    assert many[-1].rod_speed == few[-1].rod_speed == 50.0
+    assert many[-1].verdict == few[-1].verdict == OK
+    assert many[-1].h_star_um == pytest.approx(few[-1].h_star_um, rel=2e-3)
+
+
+def test_a_film_that_is_not_found_ends_soon_and_with_a_reason() -> None:
+    """No more meshes are made once one has led no further."""
+    given: dict[str, Any] = {"section": "rectangular", "groove_width": 4.6, "density": 1}
+    p = ORing(**given, sealed_pressure=2.0, stroke="out", speeds=(1.0,), error_estimate=False)
+    outcome = run(p, Silent())
+    assert not outcome.states
+    assert outcome.message.startswith("outstroke: no film was found at 1 mm/s: ")
+    assert sum(stage.name.startswith("film at") for stage in outcome.stages) <= 3
