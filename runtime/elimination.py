@@ -121,7 +121,7 @@ class Elimination:
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """Where entries of a pattern (n, n) are in its order. keys: row (n + 1) + column, rising."""
+    """Places of the entries of a pattern (n, n), in order. keys: row (n + 1) + column, rising."""
 
     keys: Integers
     n: int

@@ -69,7 +69,7 @@ class Relaxed(Layered):
 
     @cached_property
     def _entries(self) -> Array:
-        """Those of the term in the data of the layer's tangent."""
+        """Entries of the term in the data of the layer's tangent."""
         term = self._small.tocoo()
         rows, columns = (number.astype(np.int64) for number in (term.row, term.col))
         return self.layer.cut.placed(rows, columns, term.data)

@@ -15,7 +15,6 @@ from softehl.cases.seal.states.estimate import (
     ORDER,
     coarser_density,
     estimated_error,
-    finer_density,
     reservation,
 )
 from softehl.cases.seal.states.state import (
@@ -149,14 +148,3 @@ def test_a_small_error_of_the_thickness_is_not_enough(
     said = reservation(ORing(), replace(NUMBERS, **film), replace(NUMBERS, **other))
     assert said.startswith(words) if words.startswith("friction") else words in said
     assert bool(said) == bool(words)
-
-
-@pytest.mark.parametrize("value", [0.997, 1.004])
-def test_a_finer_mesh_gives_the_error_of_ours(value: float) -> None:
-    """Of a curve that converges with the order that is assumed; not of another one."""
-    density, limit = 2, 0.7
-    slope = (value - 1.0) * limit * density**ORDER
-    ours, finer = (limit + slope / float(d) ** ORDER for d in (density, finer_density(density)))
-    estimate = estimated_error(density, ours, finer, finer_density(density))
-    assert estimate == pytest.approx(100.0 * (1.0 - limit / ours), rel=1e-2)
-    assert abs(estimated_error(density, ours, finer)) < 0.9 * abs(estimate)

@@ -124,7 +124,7 @@ class FilmSolver:
         layer, moment = film_layer(self.system, x), self.system.moment(x)
         squeezing = Squeezing(self.system, layer, film, scales, x, self.offset, moment)
         pressed = pressed_film(self.system, x, film.sealed_pressure)
-        return self._followed(squeezing, Moment(pressed, squeezing.first(x)))
+        return self._followed(squeezing, Moment(pressed, squeezing.first))
 
     def from_neighbour(self, last: Sequence[Film], speed: float) -> Film | NoFilm:
         """The film at |U|, mm/s, along those at speeds between, from the last film on our mesh.

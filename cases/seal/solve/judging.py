@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from math import nan
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.solve.adaptation import Adapted
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure, unsealed
-from softehl.cases.seal.states.estimate import coarser_density, estimated_error, reservation
+from softehl.cases.seal.states.estimate import estimated_error, reservation
 from softehl.cases.seal.states.overlap import overlap
 from softehl.cases.seal.states.results import film_state
 from softehl.cases.seal.states.sensitivity_table import resolved
@@ -57,7 +56,7 @@ class Judge:
         """The state of a film; faster: of the same stroke at the next higher speed, if there is."""
         film, other, p = adapted.film, adapted.other, adapted.film.system.parameters
         numbers = film.numbers
-        error, friction = errors(p.density, numbers, other, coarser_density(p.density))
+        error, friction = errors(p.density, numbers, other)
         wanted = p.error_estimate and p.mesh == "graded"
         verdict = verdict_of_contact(film.system, film.squeezing.dry)
         verdict = replace(verdict, last=faster).after(numbers)
@@ -74,13 +73,11 @@ class Judge:
         return state.settled
 
 
-def errors(
-    density: int, film: FilmNumbers, other: FilmNumbers | None, at: Fraction
-) -> tuple[float, float]:
-    """Estimated errors of h* and of friction, %, from the film of a mesh of another density."""
+def errors(density: int, film: FilmNumbers, other: FilmNumbers | None) -> tuple[float, float]:
+    """Estimated errors of h* and of friction, %, from the film of the coarser mesh."""
     if other is None:
         return nan, nan
     return (
-        estimated_error(density, film.h_star, other.h_star, at),
-        estimated_error(density, film.friction, other.friction, at),
+        estimated_error(density, film.h_star, other.h_star),
+        estimated_error(density, film.friction, other.friction),
     )

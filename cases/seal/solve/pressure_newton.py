@@ -14,20 +14,16 @@ from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution
 
 _ROUGH = 1e-3
-_THICK = 1e-3  # mm: fluxes are measured by that of 10 um, of which a film k times thinner has a kth
 _PATIENT = 30
 
 
-def roughly(newton: Newton, thinnest: float = _THICK) -> Newton:
+def roughly(newton: Newton) -> Newton:
     """Newton's method for states on the way, which are no results.
-
-    thinnest: of a film, mm, 0 if unknown: its flux, too, is to be right to a per cent.
 
     On a fine mesh half of the iterations go from there to what rounding leaves. A residual that is
     above that and does not fall is no rounding.
     """
-    share = min(thinnest / _THICK, 1.0) if thinnest > 0.0 else 1.0
-    return replace(newton, tolerance=max(share * _ROUGH, newton.tolerance), stagnation=1.0)
+    return replace(newton, tolerance=max(_ROUGH, newton.tolerance), stagnation=1.0)
 
 
 def patient(newton: Newton, iterations: int = _PATIENT) -> Newton:

@@ -28,7 +28,6 @@ from softehl.cases.seal.solve.grading import MULTIPLE, film_thickness, inlet_tim
 from softehl.cases.seal.states.contacts import Edge, contact_edges
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.fem.rules import content_rule, pressure_nodes
 
@@ -37,10 +36,6 @@ EXPONENT = 1.5
 
 FIRST = 1e-3
 """First step, of T, where contact leaves a gap as thin as the film; a thicker one flows sooner."""
-
-ROUNDING = 1e-4
-"""Largest residual that rounding of the gap may leave: a film held for a time that is too short has
-no other state than the one it begins at, to all digits that the gap has."""
 
 _NO_WIDTH = 1e-6
 """Of the widest part of the arc around a node, below which it is between segments on a wall."""
@@ -133,12 +128,11 @@ class Squeezing:
             return float(np.max(np.abs(k - h) / np.maximum(np.abs(h), least)))
         return float(np.abs(np.log(k / h)).max()) if k.min() > 0.0 else inf
 
-    def first(self, x: Array) -> float:
-        """Length of the first step from the contact state x (n,); see `FIRST` and `ROUNDING`."""
+    @property
+    def first(self) -> float:
+        """Length of the first step from the contact state; see `FIRST`."""
         thicker = self.scales.thickness / self.offset if self.offset else 1.0
-        problem = self.system.film_problem(self.film)
-        least = least_time(problem, self._masses(x), x) / self.scales.time
-        return float(max(FIRST * min(1.0, thicker) ** EXPONENT, least))
+        return float(FIRST * min(1.0, thicker) ** EXPONENT)
 
     def _masses(self, x: Array) -> csc_array[np.float64]:
         """Rates of what the film holds, by the local time steps; see `gap_masses`."""
@@ -182,13 +176,6 @@ def gap_masses(system: SealSystem, x: Array, weights: Array | None = None) -> cs
     at = np.broadcast_arrays(pressures[..., None], radii[:, None])
     places = tuple(part.ravel() for part in at)
     return csc_array(coo_array((masses.ravel(), places), shape=(n, n)))
-
-
-def least_time(problem: Problem, hold: csc_array[np.float64], x: Array) -> float:
-    """Least tau, s, by `ROUNDING`, from a state x (n,). hold: see `gap_masses`."""
-    rounding = hold @ np.spacing(np.abs(x))
-    rounding[problem.fixed] = 0.0
-    return problem.norm(rounding) / ROUNDING
 
 
 def inlet_edge(system: SealSystem, stroke: Stroke, x: Array) -> Edge | None:

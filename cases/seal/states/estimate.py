@@ -7,9 +7,6 @@ density; below that this would be too coarse to be wrong in the same way, and it
 Leakage is h* times what is exactly known, and has its relative error. Friction is what slides and
 what the slope of the pressure does: where these cancel, both may be far off and their sum be right
 on two meshes by chance, so that their errors are added up.
-
-Slow films that ours shows collapse on a coarser mesh that is not much coarser. A finer one of four
-thirds has them: the same difference is 1 - r^p times the error of ours.
 """
 
 from __future__ import annotations
@@ -48,27 +45,22 @@ def coarser_density(density: int) -> Fraction:
     return Fraction(density, 2) if density >= 4 else Fraction(5 * density // 2, 3)
 
 
-def finer_density(density: int) -> Fraction:
-    """Density of the finer mesh."""
-    return Fraction(4 * density, 3)
-
-
 def system_at(system: SealSystem, density: Fraction) -> SealSystem:
     """The system on a mesh of the same spacing and another density."""
     return build_system(system.parameters, system.section.layout, density)
 
 
-def estimated_error(density: int, value: float, other: float, at: Fraction | None = None) -> float:
+def estimated_error(density: int, value: float, other: float) -> float:
     """Estimated error of h* or of friction in per cent of it, + where it is too large.
 
-    value: at `density`; other: at another one, coarser_density(density) if that is None.
+    value: at `density`; other: at `coarser_density`.
     """
-    return _percent(density, at) * (other / value - 1.0)
+    return _percent(density) * (other / value - 1.0)
 
 
-def _percent(density: int, at: Fraction | None) -> float:
-    """Error of a value at `density`, %, of a relative difference to that of another one."""
-    ratio = density / float(at or coarser_density(density))
+def _percent(density: int) -> float:
+    """Error of a value at `density`, %, of a relative difference to that of the coarser mesh."""
+    ratio = density / float(coarser_density(density))
     return 100.0 / (math.pow(ratio, ORDER) - 1.0)
 
 
@@ -94,21 +86,17 @@ def unseen(p: ORing) -> str:
     return ""
 
 
-def friction_bound(
-    density: int, film: FilmNumbers, other: FilmNumbers, at: Fraction | None = None
-) -> float:
+def friction_bound(density: int, film: FilmNumbers, other: FilmNumbers) -> float:
     """Largest error of friction, %, by its two parts on two meshes; see `estimated_error`."""
     parts = [(k.drag, k.friction - k.drag) for k in (film, other)]
     apart = math.fsum(abs(a - b) for a, b in zip(*parts, strict=True))
-    return abs(_percent(density, at)) * apart / abs(film.friction)
+    return abs(_percent(density)) * apart / abs(film.friction)
 
 
-def reservation(
-    p: ORing, film: FilmNumbers, other: FilmNumbers | None, at: Fraction | None = None
-) -> str:
+def reservation(p: ORing, film: FilmNumbers, other: FilmNumbers | None) -> str:
     """Why a state whose estimated error of h* is small is not `ok` all the same; empty if it is.
 
-    other: the film on a mesh of density `at`, see `estimated_error`. Where no estimate is wanted
+    other: the film on the coarser mesh. Where no estimate is wanted
     nothing is said.
     """
     if not p.error_estimate or (words := unseen(p)) or other is None:
@@ -117,7 +105,7 @@ def reservation(
     short = other.inlet_segments < fewest and not other.touching
     if short or not INLET_RATIO[0] <= other.inlet_ratio <= INLET_RATIO[1]:
         return f"the mesh of the estimate does not show the inlet; {_FINER}"
-    error = friction_bound(p.density, film, other, at)
+    error = friction_bound(p.density, film, other)
     if not error <= LARGEST_ERROR:
         return f"friction may be off by {error:.2g} %, h* is not; {_FINER}"
     if not error + 100.0 * film.beyond <= LARGEST_ERROR:

@@ -228,7 +228,7 @@ def place(sealed_pressure: float, stroke: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class StageRecord(harness.StageRecord):
-    """What one stage of the path cost; its parameter is a load, a weighting factor or a speed."""
+    """What one stage of the path cost; its parameter is a load, or counts the steps of a film."""
 
     @property
     def stroke(self) -> str:
@@ -276,14 +276,6 @@ class Observer(Protocol):
     def film_draft(self, state: FilmState) -> None:
         """The same, where another mesh may better it: keep it for a run that is cut short."""
         return None
-
-
-_DOUBTS = (OK, OSCILLATING, CLIPPED, UNCERTAIN, UNDER_RESOLVED, COLLAPSED)
-
-
-def doubt(state: FilmRow) -> tuple[int, float]:
-    """How little a state is to be believed beside another one of the same film."""
-    return _DOUBTS.index(state.verdict), state.oscillation_index
 
 
 class Silent(Observer):
