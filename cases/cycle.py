@@ -22,7 +22,9 @@ from softehl.cases.seal.gland.headings import CYCLE
 from softehl.cases.seal.gland.idle import idle
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.reach import beyond_reach, reach
+from softehl.cases.seal.gland.rubbers.rubber import outside
 from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
+from softehl.cases.seal.gland.trade.said import understood
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.states.answer import leaks
 from softehl.runtime.arrays import Array
@@ -213,6 +215,7 @@ class CycleCase(Case[Cycle, CycleRow]):
         """See :class:`Case`."""
         highest = parameters.path.pressure.largest
         words = [*beyond_reach(parameters, highest), *idle(parameters), *unused(parameters)]
+        words += outside(parameters.compound, parameters.temperature)
         if parameters.rough:
             return words
         return [
@@ -244,7 +247,7 @@ class CycleCase(Case[Cycle, CycleRow]):
 
     def foreword(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
-        return reach(parameters, parameters.path.pressure.largest)
+        return [*understood(parameters.said), *reach(parameters, parameters.path.pressure.largest)]
 
     def requested(self, parameters: Cycle) -> list[float]:
         """See :class:`Case`."""

@@ -14,8 +14,9 @@ from softehl.cases.seal.gland.assumed import assumed
 from softehl.cases.seal.gland.idle import idle
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.reach import beyond_reach, reach
-from softehl.cases.seal.gland.rubbers.rubber import soft
+from softehl.cases.seal.gland.rubbers.rubber import outside, soft
 from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
+from softehl.cases.seal.gland.trade.said import understood
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.states import plan
@@ -96,7 +97,8 @@ class ORingCase(Case[ORing, FilmRow]):
         p = parameters
         gland = p.rod_diameter, p.housing_diameter, p.groove_width
         advised = catalogue.warnings(p.free_ring, *gland)
-        return [*beyond_reach(p, p.sealed_pressure), *idle(p), *soft(p), *advised]
+        unusual = [*soft(p), *outside(p.compound, p.temperature), *advised]
+        return [*beyond_reach(p, p.sealed_pressure), *idle(p), *unusual]
 
     def answer(self, parameters: ORing, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
@@ -108,7 +110,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def foreword(self, parameters: ORing) -> list[str]:
         """See :class:`Case`."""
-        return reach(parameters, parameters.sealed_pressure)
+        return [*understood(parameters.said), *reach(parameters, parameters.sealed_pressure)]
 
     def notes(
         self, rows: Sequence[FilmRow], advice: Mapping[float, str] = MappingProxyType({})

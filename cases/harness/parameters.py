@@ -50,9 +50,15 @@ class Parameters(BaseModel):
     def _without_units(cls, given: Any) -> Any:
         if not isinstance(given, dict):
             return given
+        worded = cls.worded(given)
         return cls.completed(
-            {name: without_unit(cls, name, _listed(cls, name, v)) for name, v in given.items()}
+            {name: without_unit(cls, name, _listed(cls, name, v)) for name, v in worded.items()}
         )
+
+    @classmethod
+    def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """The values without words of a trade, before units are read.  Raises ValueError."""
+        return given
 
     @classmethod
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def test_what_is_used_can_be_given_again() -> None:
         ({"rod": 51, "rod_diameter": "wide"}, "rod_diameter"),
         ({"roelands": 0.6, "pressure_viscosity": "thick"}, "pressure_viscosity"),
         ({"ring": "AS568-299", "rod": 19}, 'nearest: "AS568-284" and "AS568-309"'),
-        ({"ring": "ISO 3601 50x2.2", "rod": 51}, "give squeeze and groove_width"),
+        ({"ring": "ISO 3601 50x1.2", "rod": 51}, "give squeeze and groove_width"),
         ({"ring": "AS568-210", "rod": 30}, "stretches inner_diameter"),
         ({"gland": "rotary"}, "gland"),
         ({"backup": False}, "add extrusion_gap"),

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import (
     MATERIALS,
     nominal_stress,
@@ -18,7 +19,6 @@ from softehl.cases.seal.gland.rubbers.materials import (
     strains,
     unstable_at,
 )
-from softehl.cases.seal.gland.rubbers.rubber import shore_band, youngs_modulus
 from softehl.cases.seal.gland.rubbers.rubber_data import Fit, fit, read_data
 
 TRELOAR = Path(__file__).parents[2] / "docs" / "treloar.csv"

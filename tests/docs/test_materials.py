@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from softehl.cases.seal.gland.grooves import gland
 from softehl.cases.seal.gland.oils import GRADES
 from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import MATERIALS, shear_modulus
-from softehl.cases.seal.gland.rubbers.rubber import shore_band, youngs_modulus
 from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
+from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import Silent
 
@@ -44,6 +46,26 @@ def test_fits_of_treloars_rubber() -> None:
         assert float(error) == pytest.approx(found.error, abs=6e-4)
         mine = shear_modulus(MATERIALS[found.material], found.values)
         assert float(modulus) == pytest.approx(mine, abs=6e-4)
+
+
+def test_polymers() -> None:
+    known = {f"`{name}`": ends for name, ends in RANGES.items() if ends}
+    table = rows("materials.md", "polymers")
+    assert {name: degC for name, _, degC in table} == {
+        name: f"{low:g} to {high:g}" for name, (low, high) in known.items()
+    }
+    for name, also, _ in table:
+        for word in filter(None, also.split(", ")):
+            read = read_rubber("material", f"{word} 70")
+            assert read is not None
+            assert f"`{read.polymer}`" == name
+
+
+def test_glands() -> None:
+    for section, *sizes in rows("glands.md", "glands")[1:]:
+        hydraulic, pneumatic = (gland(float(section), kind) for kind in ("dynamic", "pneumatic"))
+        found = [getattr(g, k).middle for g in (hydraulic, pneumatic) for k in ("depth", "width")]
+        assert list(map(float, sizes)) == found
 
 
 def test_grades() -> None:

@@ -16,7 +16,7 @@ from softehl.__main__ import _commands as program
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.gland.rubbers.rubber import youngs_modulus
+from softehl.cases.seal.gland.rubbers.hardness import youngs_modulus
 from softehl.cases.seal.states import verdict
 from softehl.cases.shipped import SHIPPED
 from tests.docs.test_site import PAGES, ROOT, is_named

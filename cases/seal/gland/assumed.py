@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
+from softehl.cases.seal.gland.grooves import UnknownGlandError, gland
+from softehl.cases.seal.gland.oils import is_improved
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.rubbers import materials
-from softehl.cases.seal.gland.rubbers.rubber import shore_band
+from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.sections.keys import ROUND, dimensions
+from softehl.cases.seal.gland.trade.oil_names import IMPROVED
 
 _RUBBER = {"fit", "shore_A"}.union(*(m.keys for m in materials.MATERIALS.values()))
 
@@ -27,7 +30,7 @@ def _ring(p: ORing, said: frozenset[str]) -> Iterator[str]:
     if not said & {"ring", "inner_diameter"}:
         yield f"inner diameter {p.inner_diameter:g} mm"
     if p.shore_A is not None:
-        low, high = shore_band(p.shore_A)
+        low, high = shore_band(p.shore_A, p.polymer)
         yield (
             f"a shear modulus of {p.shear_modulus:.3g} MPa by hardness, known to {low:+.0f} and "
             f"{high:+.0f} %"
@@ -41,19 +44,34 @@ def _gland(p: ORing, said: frozenset[str]) -> Iterator[str]:
     if not said & {"rod", "rod_diameter"}:
         yield f"a rod of {p.rod_diameter:g} mm"
     sizes = {
-        "housing_diameter": (p.housing_diameter, {"squeeze", "gland"}),
-        "groove_width": (p.groove_width, {"gland"}),
+        "housing_diameter": (p.housing_diameter, {"squeeze", "groove_depth", "gland"}),
+        "groove_width": (p.groove_width, {"fill", "gland"}),
     }
     unsaid = [k for k, (_, others) in sizes.items() if not said & {k, *others}]
-    if p.gland and not p.round:
+    kind, charted = _kind(p)
+    if not charted:
         unsaid = [k for k in sizes if k not in said]  # also where the gland was asked for by name
     if unsaid:
-        kind = "its standard gland" if p.gland else "a gland"
-        if not p.round:
-            kind = f"the gland of an O-ring, as none is known for this {p.named}"
         yield f"{kind} ({', '.join(f'{k} = {sizes[k][0]:g} mm' for k in unsaid)})"
     if not said & {"backup", "extrusion_gap"}:
         yield "a back-up ring"
+
+
+def _kind(p: ORing) -> tuple[str, bool]:
+    """A gland in words, and whether it is one of a chart or was given."""
+    if not p.gland:
+        return "a gland", True
+    if p.section == "u_cup":
+        return "the gland of a U-cup by rule, its ground half way between heel and lips", False
+    if p.section not in (ROUND, "x_ring") or p.outline:
+        return f"the gland of an O-ring, as none is known for this {p.named}", False
+    try:
+        by_rule = gland(p.section_diameter, p.gland, p.section).by_rule
+    except UnknownGlandError:
+        return "a gland", True
+    if by_rule:
+        return "a gland in proportions between those of the neighbouring sections", False
+    return "its standard gland", True
 
 
 def _fluids(p: ORing, said: frozenset[str]) -> Iterator[str]:
@@ -62,3 +80,5 @@ def _fluids(p: ORing, said: frozenset[str]) -> Iterator[str]:
         yield f"a sealed pressure of {p.sealed_pressure:g} MPa"
     if not said & {"viscosity", "oil"}:
         yield f"an oil of {1e9 * p.viscosity:.3g} mPa s"
+    if p.oil and is_improved(p.oil):
+        yield f"a viscosity index of {IMPROVED:g}, the least that HVLP oils have (DIN 51524-3)"

@@ -161,7 +161,8 @@ def _seal_is_squeezed(p: ORing) -> None:
         raise ValueError(
             f"the gap between rod and housing is {gap:g} mm (rod_diameter, housing_diameter); "
             f"to squeeze the seal it must be between a half and one section_diameter, "
-            f"{0.5 * p.section_diameter:g} to {p.section_diameter:g} mm"
+            f"{0.5 * p.section_diameter:g} to {p.section_diameter:g} mm; give groove_depth or "
+            'squeeze, or gland = "dynamic" gives a groove'
         )
 
 

@@ -1,7 +1,7 @@
-"""From the names of catalogues to the measures of a case: ring, rod, squeeze and gland.
+"""From the names of catalogues to the measures of a case: ring, rod, gland, depth and fill.
 
-A ring gives two diameters; the rod, and either the squeeze, the housing or a gland of the
-catalogue the rest. What is given twice must agree.
+A ring gives two diameters; the rod, and either the depth, the squeeze, the housing or a standard
+gland the rest. What is given twice must agree.
 """
 
 from __future__ import annotations
@@ -11,8 +11,17 @@ from typing import Any
 
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.given import number, put
+from softehl.cases.seal.gland.grooves import Gland, cup_gland, gland
+from softehl.cases.seal.gland.sections.base import parts_of
+from softehl.cases.seal.gland.sections.keys import SectionKeys
+from softehl.cases.seal.gland.sections.u_cup import UCup
+from softehl.cases.seal.gland.trade.ring_names import read_ring
 
 _SAME = 1e-9
+_GLAND = ("squeeze", "groove_depth", "fill")
+
+UCUP = parts_of(UCup)
+"""Proportions of a U-cup."""
 
 
 def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -28,12 +37,22 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
         _follow(values, "rod_diameter", float(values["rod"]), "rod")
     if isinstance(values.get("ring"), str):
         _with_ring(values)
-    if isinstance(values.get("gland"), str) or number(values.get("squeeze")):
+    if isinstance(values.get("gland"), str) or any(number(values.get(k)) for k in _GLAND):
         _with_gland(values)
     return values
 
 
 def _with_ring(values: dict[str, Any]) -> None:
+    said = read_ring(values["ring"])
+    if said.kind not in (None, "round"):
+        section = values.setdefault("section", said.kind)
+        if section != said.kind:
+            raise ValueError(
+                f'section = "{section}" and ring = "{values["ring"]}" contradict: leave one out'
+            )
+    if said.outer is not None:
+        _with_cup(values, said.inner, said.outer, said.width or 0.0)
+        return
     ring = catalogue.ring(values["ring"])
     if values.get("rod_diameter") is None:
         rod = round(1.02 * ring.inner_diameter, 1)
@@ -42,9 +61,24 @@ def _with_ring(values: dict[str, Any]) -> None:
         )
     _follow(values, "inner_diameter", ring.inner_diameter, "ring")
     _follow(values, "section_diameter", ring.section_diameter, "ring")
-    known = [values.get(k) is not None for k in ("housing_diameter", "squeeze", "gland")]
-    if not any(known) or values.get("groove_width") is None:
+    depths = ("housing_diameter", "squeeze", "gland", "groove_depth")
+    widths = ("groove_width", "fill")
+    if not any(map(values.get, depths)) or not any(map(values.get, widths)):
         values["gland"] = values.get("gland") or "dynamic"
+
+
+def _with_cup(values: dict[str, Any], rod: float, groove: float, width: float) -> None:
+    """A U-cup by its groove: the height over its free lips is such that its gland has this depth.
+
+    The lips are squeezed alike on the rod and in the housing.
+    """
+    values.setdefault("rod_diameter", rod)
+    values.setdefault("housing_diameter", groove)
+    values.setdefault("groove_width", width)
+    depth, heel = 0.5 * (groove - rod), UCUP["heel_height"]
+    height = values.setdefault("section_diameter", round(depth / (0.5 * (1.0 + heel)), 3))
+    if number(height):
+        values.setdefault("inner_diameter", rod - (height - depth))
 
 
 def _with_gland(values: dict[str, Any]) -> None:
@@ -54,12 +88,39 @@ def _with_gland(values: dict[str, Any]) -> None:
     if number(values.get("squeeze")):
         depth = section * (1.0 - values["squeeze"] / 100.0)
         _follow(values, "housing_diameter", rod + 2.0 * depth, "squeeze")
+    if number(values.get("groove_depth")):
+        _follow(values, "housing_diameter", rod + 2.0 * values["groove_depth"], "groove_depth")
     if isinstance(values.get("gland"), str):
-        gland = catalogue.gland(section, values["gland"])
+        gland = _gland(values, section)
         if values.get("housing_diameter") is None:
             values["housing_diameter"] = round(rod + 2.0 * gland.depth.middle, 4)
-        if values.get("groove_width") is None:
+        if values.get("groove_width") is None and values.get("fill") is None:
             values["groove_width"] = round(gland.width.middle, 4)
+    if number(values.get("fill")):
+        _follow(values, "groove_width", _filled(values, section, rod), "fill")
+
+
+def _gland(values: Mapping[str, Any], section: float) -> Gland:
+    """The standard gland of a section."""
+    if values.get("section") != "u_cup":
+        return gland(section, values["gland"], values.get("section", "round"))
+    sizes = {
+        key: values.get(key) or part * section
+        for key, part in (("heel_height", UCUP["heel_height"]), ("section_width", UCUP["width"]))
+    }
+    return cup_gland(section, sizes["heel_height"], sizes["section_width"])
+
+
+def _filled(values: Mapping[str, Any], section: float, rod: float) -> float:
+    """Width of the groove that a ring fills to its share, mm."""
+    keys = SectionKeys(**{k: values[k] for k in SectionKeys.model_fields if k in values})
+    inner, housing = values.get("inner_diameter", 50.39), values.get("housing_diameter", 56.30)
+    if keys.round:
+        ring = catalogue.Ring("", inner, section)
+    else:
+        outline = keys.free(section, inner).outline
+        ring = catalogue.Ring("", inner, section, area=outline.area, middle=outline.centroid[1])
+    return catalogue.fill(ring, rod, housing, 1.0) / float(values["fill"])
 
 
 def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None:

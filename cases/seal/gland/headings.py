@@ -6,16 +6,22 @@ from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
 from softehl.cases.seal.gland.sections.keys import SectionKeys
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
 
+_HARDNESS = ("compound", "shore_A")
 _SURFACES = ("roughness", "asperity_stiffness", "boundary_friction")
 _CAVITATION = ("cavitation", "cavitation_pressure", "cavitation_penalty")
 
 SEAL = {
     "ring": ("ring", "inner_diameter", "section_diameter", *SectionKeys.model_fields),
     "gland": (
-        *("rod", "rod_diameter", "gland", "squeeze", "housing_diameter", "groove_width"),
+        *("rod", "rod_diameter", "gland", "groove_depth", "squeeze", "housing_diameter"),
+        *("fill", "groove_width"),
         *("groove_centre", "backup", "extrusion_gap", "corner_fillet", "housing_friction"),
     ),
-    "rubber": ("shore_A", *(k for k in RubberKeys.model_fields if k != "shore_A"), "materials"),
+    "rubber": (
+        *_HARDNESS,
+        *(k for k in RubberKeys.model_fields if k not in _HARDNESS),
+        "materials",
+    ),
     "oil": (
         *("oil", "temperature", "viscosity", "pressure_viscosity", "roelands", "oil_density"),
         *ThinningKeys.model_fields,
@@ -25,7 +31,7 @@ SEAL = {
     "mesh": ("density", "tolerance", "error_estimate", "mesh"),
     "numerics": (
         *("sensitivity", "tolerances", "pressure_order", "reynolds", "quadrature"),
-        *("quadrature_points", "upwinding", "solid", "rotation", "solver", "linear"),
+        *("quadrature_points", "upwinding", "solid", "rotation", "solver", "linear", "said"),
     ),
 }
 """Heading -> keys."""

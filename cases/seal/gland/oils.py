@@ -6,15 +6,14 @@ dynamic viscosity in MPa s and the pressure-viscosity coefficient in 1/MPa.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from math import isclose, log, log10
 from typing import Any
 
-from softehl.cases.harness.units import read_quantity
 from softehl.cases.seal.gland.given import number, put
+from softehl.cases.seal.gland.trade.oil_names import read_oil_name
+from softehl.cases.seal.gland.viscosity_index import at_100_of_index
 
 GRADES = {
     **{10: 2.6, 15: 3.4, 22: 4.3, 32: 5.4, 46: 6.8, 68: 8.6},
@@ -64,61 +63,38 @@ class Walther:
 
 def is_grade(text: str) -> bool:
     """Whether an oil is given by its ISO grade, which says its viscosity to +-10 %."""
-    return _GRADE.fullmatch(text.strip()) is not None
+    return read_oil_name(text).grade is not None
+
+
+def is_improved(text: str) -> bool:
+    """Whether a name says that an oil has a viscosity improver, but not its index."""
+    return read_oil_name(text).improved
 
 
 def read_oil(text: str) -> Walther:
-    """An oil from "ISO VG 46" or "46 cSt at 40 degC, 6.8 cSt at 100 degC".  Raises ValueError.
+    """An oil from its name (trade.oil_names).  Raises ValueError.
 
-    "HL 46", "HLP 46" (DIN 51524) and "HM 46" (ISO 6743) are mineral oils of that grade, too.
+    A grade is one of a mineral oil, or has a viscosity index, given or the least of HVLP oils.
     """
-    if found := _GRADE.fullmatch(text.strip()):
-        grade = int(found["grade"])
-        if grade not in GRADES:
-            near = sorted(GRADES, key=lambda g: abs(log(g / grade)) if grade else g)[:2]
-            raise ValueError(
-                f'oil = "{text}": there is no grade {grade}; nearest: '
-                f"{' and '.join(f'ISO VG {g}' for g in sorted(near))}"
-            )
-        return Walther.through((float(grade), 40.0), (GRADES[grade], 100.0))
-    points = [_POINT.fullmatch(part.strip()) for part in text.split(",")]
-    if len(points) != 2 or not all(points):
-        raise ValueError(f'oil = "{text}" {_not_understood(text)}')
-    first, second = ((float(p["nu"]), float(p["at"])) for p in points if p)
-    for nu, at in (first, second):
-        if not (0.7 < nu < 1e6 and -60.0 <= at <= 300.0):
-            raise ValueError(f'oil = "{text}": {nu:g} cSt at {at:g} degC is out of range')
-    return Walther.through(first, second)
-
-
-_GRADE = re.compile(
-    r"((ISO[\s-]*)?VG|(HLP|HL|HM)([\s-]+(ISO[\s-]*)?VG)?)[\s-]*(?P<grade>\d{1,5})", re.IGNORECASE
-)
-_IMPROVED = re.compile(r"(HVLP|HV)[\s-]*((ISO[\s-]*)?VG)?[\s-]*(?P<grade>\d{1,5})", re.IGNORECASE)
-_POINT = re.compile(
-    r"(?P<nu>\d+\.?\d*)\s*(cSt|mm2/s|mm\^2/s|mm²/s)\s*(at|@)\s*(?P<at>-?\d+\.?\d*)\s*(degC|°C|C)",
-    re.IGNORECASE,
-)
-
-
-def _not_understood(text: str) -> str:
-    """Why a text is no oil, and what to write."""
-    two = '"46 cSt at 40 degC, 6.8 cSt at 100 degC"'
-    if found := _IMPROVED.fullmatch(text.strip()):
-        return (
-            f"has a viscosity improver, and is no ISO VG {found['grade']} at other temperatures "
-            f"than 40 degC; write both viscosities of its data sheet, as {two}"
+    name = read_oil_name(text)
+    if name.grade is None:
+        return Walther.through(*name.points)
+    if name.grade not in GRADES:
+        near = sorted(GRADES, key=lambda g: abs(log(g / name.grade)) if name.grade else g)[:2]
+        raise ValueError(
+            f'oil = "{text}": there is no grade {name.grade}; nearest: '
+            f"{' and '.join(f'ISO VG {g}' for g in sorted(near))}"
         )
-    with suppress(ValueError):
-        eta = 1e9 * read_quantity(text, "MPa s")
-        return f'is a dynamic viscosity; leave oil out and write viscosity = "{eta:g} mPa s"'
-    if "," not in text and any(unit in text for unit in ("cSt", "mm2/s", "mm²/s")):
-        why = "is not understood (one viscosity says nothing of another temperature)"
-    else:
-        why = "is not understood"
-    numbers = [int(n) for n in re.findall(r"\d+", text)]
-    grade = next((n for n in numbers if n in GRADES), 46)
-    return f'{why}; allowed: "ISO VG {grade}", or two viscosities, {two}'
+    at_40 = float(name.grade)
+    at_100 = GRADES[name.grade] if name.index is None else _of_index(text, at_40, name.index)
+    return Walther.through((at_40, 40.0), (at_100, 100.0))
+
+
+def _of_index(text: str, at_40: float, index: float) -> float:
+    try:
+        return at_100_of_index(at_40, index)
+    except ValueError as error:
+        raise ValueError(f'oil = "{text}": {error}') from None
 
 
 def density(temperature: float, at_15: float = DENSITY) -> float:
@@ -168,7 +144,10 @@ def with_oil(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _with_grade(values: dict[str, Any], oil: str, heat: Any) -> None:
-    law = read_oil(oil)
+    law, named = read_oil(oil), read_oil_name(oil).temperature
+    if named is not None:
+        put(values, "temperature", named, f'oil = "{oil}"')
+        heat = values["temperature"]
     if heat is None:
         raise ValueError(f'oil = "{oil}" needs its temperature, as in temperature = "40 degC"')
     if not number(heat) or not -60.0 <= heat <= 200.0:

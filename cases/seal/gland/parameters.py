@@ -12,6 +12,7 @@ from softehl.cases.harness.parameters import key
 from softehl.cases.seal.gland.catalogue import Ring
 from softehl.cases.seal.gland.contradictions import require_consistent
 from softehl.cases.seal.gland.fitting import fitted
+from softehl.cases.seal.gland.grooves import Kind
 from softehl.cases.seal.gland.headings import SEAL
 from softehl.cases.seal.gland.oils import with_oil
 from softehl.cases.seal.gland.rubbers.regions import MATERIALS, Region, with_regions
@@ -26,6 +27,7 @@ from softehl.cases.seal.gland.sections.keys import (
 )
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
 from softehl.cases.seal.gland.surfaces import ROUGHNESS, Roughness, Surfaces
+from softehl.cases.seal.gland.trade.said import SaidKeys, with_limits
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.parted_mesh import CAP
 from softehl.runtime.mesh.sections import SectionMesh
@@ -37,15 +39,16 @@ DENSITIES = (1, 2, 4, 8, 16)
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 
 
-class ORing(SectionKeys, RubberKeys, ThinningKeys):
+class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
     """Everything that defines one run of the O-ring case, or of a seal of another section.
 
     Raises pydantic.ValidationError also for a geometry in which the seal is not squeezed.
     """
 
     names = (
-        *("ring", "rod", "squeeze", "gland", "backup", "shore_A", "fit"),
-        *("oil", "oil_density", "roelands"),
+        *("ring", "rod", "squeeze", "groove_depth", "fill", "gland", "backup"),
+        *("compound", "shore_A", "fit"),
+        *("oil", "oil_density", "roelands", "said"),
     )
     headings = SEAL
 
@@ -140,9 +143,12 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
     ring: str | None = key(
         None,
         "a ring by its name, for inner_diameter and section_diameter",
-        bounds='"AS568-226", "36x4", "ISO 3601 50.4x3.55", left out = by its diameters',
+        bounds='"AS568-226", "36x4", "ISO 3601 50.4x3.55", "X-ring 36x4", "U-cup 25x35x8", left '
+        "out = by its diameters (docs/trade.md)",
     )
-    rod: float | None = key(None, "the same as rod_diameter", unit="mm", gt=0)
+    rod: float | None = key(
+        None, "the same as rod_diameter", unit="mm", bounds='> 0, or "36 f7"', gt=0
+    )
     squeeze: float | None = key(
         None,
         "part of section_diameter that the gland takes away, for housing_diameter",
@@ -151,10 +157,26 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
         gt=0,
         le=50,
     )
-    gland: Literal["dynamic"] | None = key(
+    groove_depth: float | None = key(
+        None,
+        "radial depth of the gland, from the rod to its ground, for housing_diameter",
+        unit="mm",
+        bounds="> 0, left out = by housing_diameter",
+        gt=0,
+    )
+    fill: float | None = key(
+        None,
+        "part of the gland that the free seal fills, for groove_width",
+        unit="%",
+        bounds="30 to 100, left out = by groove_width",
+        ge=30,
+        le=100,
+    )
+    gland: Kind | None = key(
         None,
         "a standard gland, for housing_diameter and groove_width where they are not given",
-        bounds='"dynamic" (reciprocating rod), left out = none, or "dynamic" with a ring',
+        bounds='"dynamic" or "hydraulic" (the same), "pneumatic", left out = none, or "dynamic" '
+        "with a ring (docs/glands.md)",
     )
     backup: bool | None = key(
         None,
@@ -200,7 +222,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
     oil: str | None = key(
         None,
         "an oil by its grade or two viscosities, for viscosity and pressure_viscosity",
-        bounds='"ISO VG 46", "HLP 46", "46 cSt at 40 degC, 6.8 cSt at 100 degC"',
+        bounds='"ISO VG 46", "HLP 46", "HVLP 46", "46 cSt at 40 degC, 6.8 cSt at 100 degC"',
     )
     temperature: float | None = key(
         None, "temperature of oil and rubber, where they depend on it", unit="degC", ge=-60, le=200
@@ -273,7 +295,8 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys):
     @classmethod
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
         """Diameters and width from ring, rod, squeeze and gland; rubber and oil.  ValueError."""
-        return with_oil(with_rubber(with_regions(fitted(with_outline(dict(given))))))
+        values = fitted(with_outline(with_limits(dict(given))))
+        return with_oil(with_rubber(with_regions(values)))
 
     @property
     def air_wall(self) -> float:

@@ -12,7 +12,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from softehl.cases.seal.gland.trade import no_height
+from softehl.cases.seal.gland.trade.finish_names import read_finish
 
 MICROMETRE = 1e-3  # mm
 
@@ -25,11 +25,17 @@ MIXED, FULL = 1.0, 3.0
 
 def _pair(given: object) -> object:
     """A single number is that of the surface that rests, over a smooth one that moves."""
-    for item in given if isinstance(given, (list, tuple)) else [given]:
-        if isinstance(item, str):
-            raise ValueError(no_height(item))
-    single = isinstance(given, (int, float)) and not isinstance(given, bool)
-    return (0.0, float(given)) if single else given  # type: ignore[arg-type]
+    if isinstance(given, (list, tuple)):
+        return [_height(item) for item in given]
+    height = _height(given)
+    single = isinstance(height, (int, float)) and not isinstance(height, bool)
+    return (0.0, height) if single else height
+
+
+def _height(item: object) -> object:
+    """An rms height, also of a finish, "Ra 0.2"."""
+    found = read_finish(item) if isinstance(item, str) else None
+    return item if found is None else found
 
 
 def _some(rms: float) -> float:
@@ -49,7 +55,9 @@ Roughness = Annotated[tuple[Rms, Rms], Field(strict=False), BeforeValidator(_pai
 SLIP = 1e-3
 """Speed at which the friction of asperities has 0.7 of its value where nothing moves, mm/s."""
 
-ROUGHNESS = "[moving, resting] or one number for the resting one alone; each 0 or 0.001 to 20"
+ROUGHNESS = (
+    '[moving, resting] or one number for the resting one alone; each 0 or 0.001 to 20, or "Ra 0.2"'
+)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 from softehl.cases.harness.row import Record, column
 from softehl.cases.seal.gland.catalogue import UnknownRingError, ring
+from softehl.cases.seal.gland.trade.said import LENGTHS as LIMITED
+from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.gland.varied import LENGTHS, MEASURES, NUMBERS, PRESSURE_KEY
 
 _ALIASES = {"modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"), "rod": ("rod_diameter",)}
@@ -21,6 +23,9 @@ _ALIASES = {"modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"), "rod": ("
 
 _IN_MM = frozenset((*LENGTHS, *MEASURES))
 _VARIED = _IN_MM.union(NUMBERS, [PRESSURE_KEY])
+
+_OF_THE_GLAND = {"groove_depth": ("mm", "", "%"), "squeeze": ("%",), "fill": ("%",)}
+"""Keys that follow from others -> units of their tolerances; per cent of squeeze, fill: points."""
 
 _ITEM = re.compile(
     r"(?P<name>\w+)\s+(?:\+-\s*)?(?P<size>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(?P<unit>%|mm|)"
@@ -47,7 +52,7 @@ Shares = Mapping[str, tuple[float, tuple[str, ...]]]
 def read_tolerances(
     given: Sequence[str], values: Mapping[str, object], ring_name: str | None
 ) -> Shares:
-    """The tolerances of a case: those of its ring in the catalogue, and those given.
+    """The tolerances of a case: those of its ring in the catalogue, of limits, and those given.
 
     given: texts such as "viscosity 10 %" or "rod_diameter 0.05 mm". values: those of the case's
     keys. Raises ValueError.
@@ -56,12 +61,22 @@ def read_tolerances(
     twice = [name for name, times in Counter(name for name, _ in typed).items() if times > 1]
     if twice:
         raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
-    return dict([*(_share(text, values) for text in _of_ring(ring_name)), *typed])
+    known = [*_of_ring(ring_name), *_of_limits(values)]
+    return dict([*(_share(text, values) for text in known), *typed])
+
+
+def _of_limits(values: Mapping[str, object]) -> list[str]:
+    """Tolerances of what was given with its limits, "36 f7", +- mm."""
+    said = values.get("said", ())
+    assert isinstance(said, tuple)
+    return [f"{LIMITED[name]} {found.half:.9f} mm" for name, found in bands(said)]
 
 
 def _share(text: str, values: Mapping[str, object]) -> tuple[str, tuple[float, tuple[str, ...]]]:
     """The name of a tolerance, its relative size and the parameters that it moves.  ValueError."""
     found = _ITEM.fullmatch(text.strip())
+    if found and found["name"] in _OF_THE_GLAND:
+        return found["name"], _of_the_gland(found, values)
     names = _moved(found["name"], values) if found else ()
     known = [value for value in map(values.get, names) if isinstance(value, float)]
     metric = found is None or found["unit"] != "mm" or _IN_MM.issuperset(names)
@@ -73,6 +88,33 @@ def _share(text: str, values: Mapping[str, object]) -> tuple[str, tuple[float, t
         )
     size = float(found["size"])
     return found["name"], (0.01 * size if found["unit"] == "%" else size / abs(known[0]), names)
+
+
+def _of_the_gland(
+    found: re.Match[str], values: Mapping[str, object]
+) -> tuple[float, tuple[str, ...]]:
+    """The share by which a depth, squeeze (points) or fill (points) moves diameter or width."""
+    name, size, unit = found["name"], float(found["size"]), found["unit"]
+    rod, housing, section, fill = (
+        float(str(values.get(key) or 0.0))
+        for key in ("rod_diameter", "housing_diameter", "section_diameter", "fill")
+    )
+    if unit not in _OF_THE_GLAND[name]:
+        unit, usual = _OF_THE_GLAND[name][0], 0.05 if name == "groove_depth" else 2
+        raise ValueError(
+            f'tolerances: "{found[0]}" is not understood; write "{name} {usual} {unit}"'
+        )
+    if name == "fill":
+        if not fill:
+            raise ValueError(
+                f'tolerances: "{found[0]}" needs fill; write "groove_width 0.2 mm", or give fill'
+            )
+        return size / fill, ("groove_width",)
+    depth = 0.5 * (housing - rod)
+    wrong = 0.01 * size * section if name == "squeeze" else size
+    if name == "groove_depth" and unit == "%":
+        wrong = 0.01 * size * depth
+    return 2.0 * wrong / housing, ("housing_diameter",)
 
 
 def _moved(name: str, values: Mapping[str, object]) -> tuple[str, ...]:

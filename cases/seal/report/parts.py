@@ -11,8 +11,9 @@ from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.oils import is_grade
-from softehl.cases.seal.gland.rubbers.rubber import shore_band
+from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.tolerances import ToleranceRow
+from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure
 from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
@@ -180,8 +181,12 @@ def _tolerances(runs: Sequence[FinishedRun]) -> Part:
                 )
                 if tolerance is not None
             ]
+        rows += [
+            (run.name, f"{name} = {found.nominal:g} mm", f"{found.low:g} to {found.high:g} mm")
+            for name, found in bands(p.said)
+        ]
         if p.shore_A is not None:
-            low, high = shore_band(p.shore_A)
+            low, high = shore_band(p.shore_A, p.polymer)
             rows.append(
                 (run.name, f"shore_A = {p.shore_A:g}", f"+- 5: modulus {low:+.0f} to {high:+.0f} %")
             )

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softehl.cases.seal.gland.given import number, put, shown
+from softehl.cases.seal.gland.rubbers.hardness import limits, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import (
     KEYS,
     MATERIALS,
@@ -19,33 +20,13 @@ from softehl.cases.seal.gland.rubbers.materials import (
     unstable_at,
 )
 from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
-from softehl.cases.seal.gland.trade import hardness
+from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
+from softehl.cases.seal.gland.trade.text import refused
 
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
 
-SHORE = (20.0, 90.0)
-"""Hardness Shore A between which Gent's rule is taken."""
-
 _PAPER = {"mu_1": 3.04, "mu_2": 0.62}
-
-
-def youngs_modulus(shore_A: float) -> float:
-    """Young's modulus by Gent's rule from a hardness Shore A, MPa.
-
-    A. N. Gent, Rubber Chem. Technol. 31 (1958) 896: the durometer's pin as a punch on a half-space
-    of linear elasticity, E = 0.0981 (56 + 7.62336 S) / (0.137505 (254 - 2.54 S)).
-    """
-    return 0.0981 * (56.0 + 7.62336 * shore_A) / (0.137505 * (254.0 - 2.54 * shore_A))
-
-
-def shore_band(shore_A: float, tolerance: float = 5.0) -> tuple[float, float]:
-    """How far the modulus is off at most, in per cent, below and above, by +- 5 Shore A.
-
-    That is how rubbers are sold; the rule itself is no better.
-    """
-    low, middle, high = (youngs_modulus(shore_A + d) for d in (-tolerance, 0.0, tolerance))
-    return 100.0 * (low / middle - 1.0), 100.0 * (high / middle - 1.0)
 
 
 def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -78,23 +59,43 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
 
 def _with_hardness(values: dict[str, Any]) -> None:
     """The hardness of a rubber that is given by its name, "NBR 70", and whether it can be used."""
-    text, shore = values.get("material"), values.get("shore_A")
-    if isinstance(shore, str):
-        values["shore_A"] = hardness(shore)
-        if values["shore_A"] is None:
-            raise ValueError(
-                f'shore_A = "{shore}" is not understood; write shore_A = 70 or "NBR 70"'
-            )
-    if isinstance(text, str) and (found := hardness(text)) is not None:
-        del values["material"]
-        put(values, "shore_A", found, f'material = "{text}"')
+    text, shore = values.get("compound"), values.get("shore_A")
+    polymer = None
+    if isinstance(text, str):
+        found = read_rubber("compound", text)
+        if found is None:
+            raise refused("compound", text, "is not understood", "NBR 70", "PU 95", "70 Shore A")
+        values["compound"], polymer = found.text, found.polymer
+        put(values, "shore_A", found.shore_A, f'compound = "{found.text}"')
     shore = values.get("shore_A")
-    if number(shore) and not SHORE[0] <= shore <= SHORE[1]:
+    if isinstance(shore, str):
+        raise ValueError(f'shore_A = "{shore}" is not understood; write shore_A = 70 or "NBR 70"')
+    low, high = limits(polymer)
+    if number(shore) and not low <= shore <= high:
+        named = f"of {polymer} " if polymer else ""
         raise ValueError(
-            f"shore_A = {shore:g}: a hardness gives a modulus from {SHORE[0]:g} to {SHORE[1]:g} "
-            "Shore A (Gent's rule); give the modulus of another rubber itself, as in material = "
-            '"neo-hooke" and mu = "15 MPa", a third of Young\'s modulus'
+            f"shore_A = {shore:g}: a hardness {named}gives a modulus from {low:g} to {high:g} "
+            'Shore A; harder ones are polyurethane, "PU 95", or have their modulus given, as in '
+            'material = "neo-hooke" and mu = "15 MPa", a third of Young\'s modulus'
         )
+
+
+def polymer_of(text: str | None) -> str | None:
+    """The polymer of a rubber that is named."""
+    found = None if text is None else read_rubber("compound", text)
+    return None if found is None else found.polymer
+
+
+def outside(text: str | None, temperature: float | None) -> list[str]:
+    """A warning of a temperature outside the range of a rubber that is named."""
+    polymer = polymer_of(text)
+    used = RANGES[polymer] if polymer else None
+    if used is None or temperature is None or used[0] <= temperature <= used[1]:
+        return []
+    return [
+        f"temperature = {temperature:g} degC: {polymer} is used from {used[0]:g} to "
+        f"{used[1]:g} degC"
+    ]
 
 
 def _source(values: Mapping[str, Any], material: Material) -> str:
@@ -125,7 +126,7 @@ def _require_own(values: dict[str, Any], material: Material, source: str) -> Non
 
 
 def _with_shore(values: dict[str, Any], material: Material) -> None:
-    mu = youngs_modulus(float(values["shore_A"])) / 3.0
+    mu = youngs_modulus(float(values["shore_A"]), polymer_of(values.get("compound"))) / 3.0
     others = [key for key in material.keys if key != "mu"]
     if any(not number(values.get(key)) for key in others):
         return

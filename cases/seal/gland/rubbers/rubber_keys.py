@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 
 from softehl.cases.harness.parameters import Parameters, key
 from softehl.cases.seal.gland.rubbers import materials
-from softehl.cases.seal.gland.rubbers.rubber import require_stable
+from softehl.cases.seal.gland.rubbers.rubber import polymer_of, require_stable
+from softehl.cases.seal.gland.trade.said import rubber_named
 
 Terms = Annotated[
     tuple[Annotated[float, Field(strict=True, allow_inf_nan=False)], ...],
@@ -44,12 +45,17 @@ class RubberKeys(Parameters):
         None, "Arruda-Boyce stretch at which the chains lock", gt=1, le=1000
     )
     J_m: float | None = key(None, "Gent limit of I1bar - 3", gt=0, le=1e6)
+    compound: str | None = key(
+        None,
+        "a rubber by polymer and hardness, for shore_A",
+        bounds='"NBR 70", "FKM 75", "EPDM 80", "PU 95", also as material',
+    )
     shore_A: float | None = key(
         None,
         "hardness Shore A, for mu by Gent's rule; 5 Shore are 20 to 28 % of it at 70, more above",
-        bounds='20 to 90, or "NBR 70"',
+        bounds="20 to 90; polyurethane to 98, by another rule",
         ge=20,
-        le=90,
+        le=98,
     )
     fit: str | None = key(
         None,
@@ -59,6 +65,16 @@ class RubberKeys(Parameters):
     )
     ogden_terms: int = key(3, "terms of an Ogden fit", bounds="1, 2 or 3", ge=1, le=3)
     bulk_modulus: float = key(500.0, "bulk modulus kappa", unit="MPa", gt=0, le=1e5)
+
+    @classmethod
+    def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """As in the base, and rubbers by their names."""
+        return super().worded(rubber_named(given))
+
+    @property
+    def polymer(self) -> str | None:
+        """Of the rubber that is named."""
+        return polymer_of(self.compound)
 
     @property
     def energy(self) -> str:

@@ -1,0 +1,109 @@
+"""Names of oils: "HLP 46", "ISO VG 46", "HVLP 32", "ISO VG 46 VI 150 at 50 degC", "100 mPas"."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from dataclasses import dataclass
+
+from softehl.cases.harness.units import read_quantity
+from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
+
+IMPROVED = 140.0
+"""Least viscosity index of HVLP oils, DIN 51524-3."""
+
+TWO = "46 cSt at 40 degC, 6.8 cSt at 100 degC"
+"""Two viscosities, as an example."""
+
+
+@dataclass(frozen=True)
+class OilName:
+    """An oil as its name says.  grade: of ISO 3448, or points: two viscosities, each (cSt, degC).
+
+    index: viscosity index, None where it is that of a mineral oil. temperature: degC, None where
+    the name does not say it. improved: whether the index is the least of HVLP oils.
+    """
+
+    grade: int | None = None
+    index: float | None = None
+    points: tuple[tuple[float, float], ...] = ()
+    temperature: float | None = None
+    improved: bool = False
+
+
+_MINERAL = r"HLP-?D|HLP|HL|HM|CLP|CL|HH|hydraulic oil"
+_IMPROVED = r"HVLP-?D|HVLP"
+_ISO = r"ISO[ -]?VG|VG|ISO"
+_MAKERS = r"[A-Z][A-Za-z0-9.-]+(?: [A-Z][A-Za-z0-9.-]*)*"
+_DEGREE = r"(?:deg ?C|° ?C|C)"
+_AT = rf"(?:[ ,]*(?:at|@|/)? ?(?P<at>-?{NUMBER}) ?{_DEGREE})?"
+_GRADE = re.compile(
+    rf"(?P<plain>ISO[ -]?)?(?:(?P<improved>{_IMPROVED})|(?P<mineral>{_MINERAL}))?[ -]*"
+    rf"(?P<iso>{_ISO})?[ -]*"
+    rf"(?P<grade>\d{{1,5}})(?:[ ,(]*VI ?=? ?(?P<index>{NUMBER})\)?)?{_AT}",
+    re.IGNORECASE,
+)
+_POINT = re.compile(
+    rf"(?P<nu>{NUMBER}) ?(?:cSt|mm\^?2/s) ?(?:at|@|/)? ?(?P<at>-?{NUMBER}) ?{_DEGREE}",
+    re.IGNORECASE,
+)
+_GREASE = re.compile(r".*\b(?:grease|NLGI|Fett|lithium soap|molykote)\b.*", re.IGNORECASE)
+_OTHER = re.compile(
+    r"(?:ISO )?(?P<kind>HV|HFA[ES]?|HFB|HFC|HFD[RU]?|HEES|HETG|HEPG|HEPR|ATF|PAO|DOT ?\d|SAE)\b.*"
+    r"|(?P<word>water|air|emulsion|skydrol).*",
+    re.IGNORECASE,
+)
+
+
+def read_oil_name(given: str) -> OilName:
+    """The oil of a name.  Raises NotUnderstoodError."""
+    text = plain(given)
+    found = _GRADE.fullmatch(text)
+    if found and any(found[k] for k in ("plain", "improved", "mineral", "iso")):
+        return _of_grade(found)
+    points = [_POINT.fullmatch(part.strip()) for part in re.split(r"[;,]| and ", text)]
+    if len(points) == 2 and all(points):
+        pairs = tuple((float(p["nu"]), float(p["at"])) for p in points if p)
+        for nu, at in pairs:
+            if not (0.7 < nu < 1e6 and -60.0 <= at <= 300.0):
+                raise refused("oil", given, f": {nu:g} cSt at {at:g} degC is out of range", TWO)
+        return OilName(points=pairs)
+    raise _unknown(given, text)
+
+
+def dynamic(given: str) -> float | None:
+    """The dynamic viscosity (MPa s) that a text is, None where it is none."""
+    with suppress(ValueError):
+        return read_quantity(plain(given), "MPa s")
+    return None
+
+
+def _of_grade(found: re.Match[str]) -> OilName:
+    improved = bool(found["improved"] and not found["index"])
+    index = float(found["index"]) if found["index"] else IMPROVED if improved else None
+    at = float(found["at"]) if found["at"] else None
+    return OilName(int(found["grade"]), index, temperature=at, improved=improved)
+
+
+def _unknown(given: str, text: str) -> Exception:
+    """The refusal of a text that is no oil."""
+    if _GREASE.fullmatch(text):
+        why = (
+            "is a grease: its film is one of its base oil, thinner where that does not flow back; "
+            "write the base oil, by the viscosities of its data sheet"
+        )
+        return refused("oil", given, why, TWO)
+    numbers = [int(n) for n in re.findall(r"(?<![\d.])\d+(?![\d.])", text)]
+    grade = next((n for n in numbers if 5 <= n <= 1500), 46)
+    forms = (f"ISO VG {grade}", f"HLP {grade}", f"HVLP {grade}", TWO)
+    if found := _OTHER.fullmatch(text):
+        kind = found["kind"] or found["word"]
+        if kind.upper() == "HV":
+            return refused("oil", given, "does not say its viscosity index", *forms[2:])
+        why = "is no mineral oil: write two viscosities of its data sheet"
+        return refused("oil", given, why, TWO)
+    if re.search(r"cSt|mm\^?2/s", text, re.IGNORECASE):
+        why = "is not understood (one viscosity says nothing of another temperature)"
+    else:
+        why = "is not understood"
+    return refused("oil", given, why, *forms)

@@ -1,0 +1,112 @@
+"""Names of rings: "36x4", "ISO 3601 36x4", "AS568-210", "X-ring 36x4", "U-cup 25x35x8"."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
+
+Kind = Literal["round", "x_ring", "u_cup"]
+
+
+@dataclass(frozen=True)
+class RingName:
+    """A ring as its name says, mm.  kind: of the section, None where the name does not say it.
+
+    number: of SAE AS568; else inner and section; a U-cup is named by its groove instead: rod
+    (inner), groove diameter (outer) and groove width.
+    """
+
+    number: int | None = None
+    inner: float = 0.0
+    section: float = 0.0
+    kind: Kind | None = None
+    outer: float | None = None
+    width: float | None = None
+
+
+_KINDS: tuple[tuple[str, Kind], ...] = (
+    (r"O[- ]?rings?|ORs?|O[- ]?seals?|RORs?|toroidal seals?", "round"),
+    (
+        r"X[- ]?rings?|quad[- ]?rings?|quad seals?|4[- ]?lobe(?:d)?(?: rings?)?|Q-?(?=4\d\d\d)",
+        "x_ring",
+    ),
+    (r"U[- ]?cups?|U[- ]?rings?|U[- ]?seals?|lip seals?|Nutring", "u_cup"),
+)
+_STANDARD = re.compile(
+    r"\b(?:(?:DIN|EN|BS|GOST R)[ -]?)*ISO[ -]?3601(?:-[1-5](?!\d))?(?:[:-](?:19|20)\d\d)?"
+    r"|\bDIN[ -]?3771(?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?",
+    re.IGNORECASE,
+)
+_DASH = re.compile(
+    r"(?P<said>(?:SAE )?AS[ -]?568[A-G]?(?: dash| no\.?)?|ARP ?568|BS(?: ?1806)?|Parker"
+    r"|dash|size|no\.?)?"
+    r"[ -]*?(?P<dash>2-|-)?(?P<number>\d{1,3})[AB]?",
+    re.IGNORECASE,
+)
+_QUAD = re.compile(r"4(?P<number>\d{3})")
+_SIZE = re.compile(
+    rf"(?:\d{{3}}[AB][ -]+)?(?:ID|d1)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?x(?P<section>{NUMBER})"
+    rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[NS])?",
+    re.IGNORECASE,
+)
+_WORDS = re.compile(
+    rf"(?:ID|d1|inside|inner)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?[ ,;/]+(?:CS|d2|section)[ =]*"
+    rf"(?P<section>{NUMBER}) ?(?:mm)?",
+    re.IGNORECASE,
+)
+
+
+def read_ring(given: str) -> RingName:
+    """The ring of a name.  Raises NotUnderstoodError."""
+    text = plain(given)
+    rest, kind = _without_kind(_STANDARD.sub(" ", text))
+    if (found := _SIZE.fullmatch(rest)) or (found := _WORDS.fullmatch(rest)):
+        sizes = found.groupdict()
+        third = sizes.get("third")
+        a, b = float(sizes["inner"]), float(sizes["section"])
+        if third is None:
+            if kind == "u_cup":
+                raise refused(
+                    *("ring", given, "is a U-cup, which is named by rod x groove diameter x width"),
+                    f"U-cup {a:g}x{a + 2 * b:g}x{round(1.6 * b, 1):g}",
+                )
+            return RingName(inner=a, section=b, kind=kind)
+        if kind in (None, "u_cup") and b > a:
+            return RingName(inner=a, kind="u_cup", outer=b, width=float(third))
+    if kind == "x_ring" and (found := _QUAD.fullmatch(rest)):
+        return RingName(number=int(found["number"]), kind=kind)
+    if (found := _DASH.fullmatch(rest)) and kind != "u_cup":
+        if not (found["said"] or found["dash"] or len(found["number"]) == 3):
+            raise refused(
+                *("ring", given, "is a number of AS568 or a diameter"),
+                *(f"AS568-{int(found['number']):03d}", f"{found['number']}x3.55"),
+            )
+        return RingName(number=int(found["number"]), kind=kind)
+    raise _unknown(given, rest)
+
+
+def _without_kind(text: str) -> tuple[str, Kind | None]:
+    """A text without the word for a section, and which it is."""
+    for pattern, kind in _KINDS:
+        found = re.search(rf"(?<![A-Za-z])(?:{pattern})(?![A-Za-z])", text, re.IGNORECASE)
+        if found:
+            text = f"{text[: found.start()]} {text[found.end() :]}"
+            return " ".join(text.split()).strip(" ,;:-") or "", kind
+    left = " ".join(text.split())
+    return (left if re.fullmatch(r"-\d+", left) else left.strip(" ,;:-")), None
+
+
+def _unknown(given: str, rest: str) -> Exception:
+    usual = ("36x4", "ISO 3601 50.4x3.55", "AS568-226")
+    if found := re.fullmatch(r"(?:JIS ?(?:B ?2401)? ?)?([PGVS])-? ?(\d+)A?", rest, re.IGNORECASE):
+        size = f"{found[1].upper()}{found[2]}"
+        why = f"is a size of JIS B 2401 ({size}), whose diameters are not in the catalogue"
+        return refused("ring", given, why, *usual[:2])
+    sizes = re.findall(NUMBER, rest)[-2:]
+    if len(sizes) == 2 and not re.search(r'"|/|\bin', rest):
+        large, small = sorted(map(float, sizes), reverse=True)
+        return refused("ring", given, "is not known", f"{large:g}x{small:g}", usual[2])
+    return refused("ring", given, "is not known", *usual)

@@ -1,0 +1,93 @@
+"""Names of rubbers: polymer and hardness, "NBR 70", "FKM 75 Shore A", "PU 95"."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from softehl.cases.seal.gland.trade.text import NUMBER, number_text, plain, refused
+
+RANGES: dict[str, tuple[float, float] | None] = {
+    "NBR": (-40.0, 120.0),
+    "HNBR": (-30.0, 150.0),
+    "FKM": (-20.0, 200.0),
+    "EPDM": (-50.0, 150.0),
+    "VMQ": (-60.0, 200.0),
+    "FVMQ": (-60.0, 175.0),
+    "FFKM": (-25.0, 325.0),
+    "PU": (-30.0, 80.0),
+    "CR": (-40.0, 120.0),
+    "ACM": (-20.0, 150.0),
+    **dict.fromkeys(("XNBR", "AEM", "FEPM", "IIR", "SBR", "NR")),
+}
+"""Polymer -> temperatures at which a common chart of makers lets it be used for long, degC."""
+
+_ALIASES = {
+    "NBR": ("nitrile", "Buna[ -]?N", "Perbunan", "acrylonitrile"),
+    "FKM": ("FPM", "Viton"),
+    "EPDM": ("EPM",),
+    "VMQ": ("MVQ", "silicone"),
+    "PU": ("PUR", "TPU", "AU", "EU", "TPE-?U", "polyurethane", "urethane"),
+    "CR": ("neoprene", "chloroprene"),
+    "FFKM": ("Kalrez",),
+    "NR": ("natural rubber",),
+}
+_SPELT = {word: name for name in RANGES for word in (name, *_ALIASES.get(name, ()))}
+_POLYMER = rf"(?P<name>{'|'.join(sorted(_SPELT, key=len, reverse=True))})"
+_UNIT = r"(?:°|deg)? ?(?:(?:sh(?:ore)?\.?)? ?-?(?P<scale>[AD])|sh(?:ore)?|IRHD|duro(?:meter)?)"
+_SHORE = rf"(?P<shore>{NUMBER})(?: ?{_UNIT})?"
+_FORMS = tuple(
+    re.compile(form, re.IGNORECASE)
+    for form in (
+        rf"{_POLYMER}(?:[ /-]*{_SHORE})?",
+        rf"{_SHORE}[ /-]+{_POLYMER}",
+        rf"{_POLYMER}[ ,/-]+(?:sh(?:ore)?) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})",
+        r"(?P<shore>\d+(?:\.\d+)?) ?" + _UNIT,
+        rf"(?:sh(?:ore)?\.?) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})",
+    )
+)
+_PLASTICS = re.compile(r"(?:PTFE|Teflon|POM|PA ?6?|PEEK|UHMW-?PE)\b.*", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class RubberName:
+    """Polymer, None where only the hardness is named, and hardness Shore A."""
+
+    polymer: str | None
+    shore_A: float
+
+    @property
+    def text(self) -> str:
+        """As it is written here."""
+        shore = number_text(self.shore_A)
+        return f"{self.polymer} {shore}" if self.polymer else f"{shore} Shore A"
+
+
+def read_rubber(key: str, given: str) -> RubberName | None:
+    """The rubber of a name, None where the text is not like one.  Raises NotUnderstoodError."""
+    text = plain(given)
+    for form in _FORMS:
+        if found := form.fullmatch(text):
+            return _read(key, given, found.groupdict())
+    if _PLASTICS.fullmatch(text):
+        raise refused(
+            key, given, "is a plastic, no rubber: it may be a cap, cap_thickness and materials.cap"
+        )
+    return None
+
+
+def _read(key: str, given: str, found: dict[str, str | None]) -> RubberName:
+    name = found.get("name")
+    polymer = next((n for w, n in _SPELT.items() if name and re.fullmatch(w, name, re.I)), None)
+    if found["shore"] is None:
+        usual = 95 if polymer == "PU" else 70
+        raise refused(key, given, "needs its hardness in Shore A", f"{polymer} {usual}")
+    shore, scale = float(found["shore"]), (found.get("scale") or "A").upper()
+    if scale == "D":
+        raise refused(
+            *(key, given, "is a hardness Shore D; write that in Shore A, or the shear modulus, mu"),
+            f"{polymer or 'PU'} 95",
+        )
+    if not 10.0 <= shore < 100.0:
+        raise refused(key, given, "is no hardness Shore A", f"{polymer or 'NBR'} 70")
+    return RubberName(polymer, shore)

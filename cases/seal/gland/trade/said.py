@@ -1,0 +1,158 @@
+"""Values in words of the trade: kept as they were said, and put into the keys that they mean.
+
+`rod = "36 f7"` becomes `said = ["rod = 36 f7"]`; the diameter is the middle of its limits.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.gland.given import put
+from softehl.cases.seal.gland.trade.finish_names import RMS_OF_RA, read_finish
+from softehl.cases.seal.gland.trade.fit_names import Band, read_fit
+from softehl.cases.seal.gland.trade.oil_names import dynamic
+from softehl.cases.seal.gland.trade.rubber_names import read_rubber
+from softehl.cases.seal.gland.trade.text import NUMBER, NotUnderstoodError, plain
+
+LENGTHS = {
+    **{"rod": "rod_diameter", "rod_diameter": "rod_diameter"},
+    **{k: k for k in ("housing_diameter", "groove_width", "groove_depth")},
+    **{k: k for k in ("section_diameter", "inner_diameter")},
+}
+"""Key that may be given with a tolerance -> the key that it means."""
+
+_SHAFTS = ("rod", "rod_diameter")
+
+_SECTIONS = {
+    **dict.fromkeys(("o-ring", "oring", "o ring", "circular"), "round"),
+    **dict.fromkeys(("x-ring", "x ring", "xring", "quad ring", "quad-ring", "quad"), "x_ring"),
+    **dict.fromkeys(("u-cup", "u cup", "ucup", "u-ring", "u ring", "lip seal"), "u_cup"),
+    **dict.fromkeys(("d-ring", "d ring"), "d_ring"),
+    **dict.fromkeys(("square ring", "square", "rectangle", "square-ring"), "rectangular"),
+    **dict.fromkeys(("trapezoidal", "trapezoidal ring", "trapezoid ring"), "trapezoid"),
+}
+
+
+class SaidKeys(Parameters):
+    """The key of what was said."""
+
+    said: tuple[str, ...] = key(
+        (),
+        "values that were given in words of the trade",
+        bounds='texts such as "rod = 36 f7"; written by the program',
+        strict=False,
+    )
+
+    @classmethod
+    def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """The values without words of the trade, which are kept in `said`.  ValueError."""
+        values, said = dict(given), [*given.get("said", ())]
+        for name in given:
+            if name in LENGTHS and isinstance(values[name], str):
+                said += _length(name, values)
+        if "roughness" in given:
+            said += _finishes(values)
+        _oil(values)
+        if isinstance(section := values.get("section"), str):
+            values["section"] = _SECTIONS.get(plain(section).lower(), section)
+        return super().worded({**values, "said": tuple(dict.fromkeys(said))} if said else values)
+
+
+def bands(said: tuple[str, ...]) -> Iterator[tuple[str, Band]]:
+    """Keys that were given with limits, and these."""
+    for text in said:
+        name, _, value = text.partition(" = ")
+        if name in LENGTHS:
+            found = read_fit(name, value, hole=name not in _SHAFTS)
+            if found is None:
+                raise NotUnderstoodError(
+                    f'said = "{text}" is not understood; write it in its own key'
+                )
+            yield name, found
+
+
+def with_limits(values: dict[str, Any]) -> dict[str, Any]:
+    """The values with the middles of what has limits.  ValueError."""
+    for name, found in bands(tuple(values.get("said", ()))):
+        put(values, LENGTHS[name], found.middle, f'{name} = "{_shown(values, name)}"', 1e-9)
+    return values
+
+
+def understood(said: tuple[str, ...]) -> list[str]:
+    """Lines that say how words of the trade were understood."""
+    words = []
+    for name, found in bands(said):
+        words.append(
+            f"{name} = {_value(said, name)}: {found.low:.10g} to {found.high:.10g} mm, solved at "
+            f"the middle, {found.middle:.10g}"
+        )
+    for text in said:
+        name, _, value = text.partition(" = ")
+        if name == "roughness" and (height := read_finish(value.partition(" ")[2])):
+            factor = f", {RMS_OF_RA:.4g} Ra (normal distribution)" if "Ra" in value else ""
+            words.append(f"{name} of the {value}: {height:.4g} um rms{factor}")
+    return words
+
+
+def _value(said: tuple[str, ...], name: str) -> str:
+    return next(text.partition(" = ")[2] for text in said if text.startswith(f"{name} = "))
+
+
+def _shown(values: Mapping[str, Any], name: str) -> str:
+    return _value(tuple(values["said"]), name)
+
+
+def _length(name: str, values: dict[str, Any]) -> list[str]:
+    """A size with a tolerance."""
+    text = plain(values[name])
+    if re.fullmatch(rf"{NUMBER} ?(mm)?", text):
+        values[name] = float(text.removesuffix("mm"))
+        return []
+    if read_fit(name, values[name], hole=name not in _SHAFTS) is None:
+        return []
+    del values[name]
+    return [f"{name} = {text}"]
+
+
+def rubber_named(given: dict[str, Any]) -> dict[str, Any]:
+    """The values with a rubber that is named in another key in `compound`.  ValueError."""
+    values = dict(given)
+    for name in ("material", "shore_A"):
+        text = values.get(name)
+        if not isinstance(text, str) or (found := read_rubber(name, text)) is None:
+            continue
+        del values[name]
+        before = values.setdefault("compound", found.text)
+        if before != found.text:
+            raise ValueError(
+                f'compound = "{before}" and {name} = "{text}" contradict: leave one of them out'
+            )
+    return values
+
+
+def _oil(values: dict[str, Any]) -> None:
+    """A dynamic viscosity that stands for an oil, and an oil for a viscosity, to their own keys."""
+    oil, viscosity = values.get("oil"), values.get("viscosity")
+    if isinstance(oil, str) and dynamic(oil) is not None and viscosity is None:
+        values["viscosity"] = values.pop("oil")
+    elif isinstance(viscosity, str) and oil is None and re.match(r"[A-Za-z]", viscosity):
+        values["oil"] = values.pop("viscosity")
+
+
+def _finishes(values: dict[str, Any]) -> list[str]:
+    """Finishes of rod and seal, or of the seal alone, as rms heights."""
+    given = values["roughness"]
+    if isinstance(given, str) and " and " in given:
+        given = given.split(" and ")
+    several = isinstance(given, list | tuple)
+    items, parts = (list(given), ("rod", "seal")) if several else ([given], ("seal",))
+    said = []
+    for n, item in enumerate(items[:2]):
+        if isinstance(item, str) and (height := read_finish(item)) is not None:
+            items[n] = height
+            said += [f"roughness = {parts[n]} {plain(item)}"]
+    values["roughness"] = items if several else items[0]
+    return said

@@ -1,0 +1,214 @@
+"""Standard glands: values of charts, rules between them, keys of depth and fill, tolerances."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import pytest
+
+from softehl.cases.oring import CASE
+from softehl.cases.seal.gland import catalogue
+from softehl.cases.seal.gland.catalogue import as568
+from softehl.cases.seal.gland.grooves import (
+    INCH,
+    UnknownGlandError,
+    cup_gland,
+    gland,
+    squeeze,
+)
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.tolerances import read_tolerances
+
+METRIC = {
+    1.8: (1.45, 2.4),
+    2.0: (1.65, 2.7),
+    2.65: (2.25, 3.6),
+    3.0: (2.6, 4.0),
+    3.55: (3.1, 4.8),
+    4.0: (3.5, 5.2),
+    5.0: (4.4, 6.6),
+    5.3: (4.7, 7.1),
+    6.0: (5.3, 7.4),
+    7.0: (6.1, 9.5),
+}
+"""Section -> depth and width of a maker's chart, dynamic, mm."""
+
+PNEUMATIC = {
+    1.8: (1.55, 2.3),
+    2.0: (1.8, 2.4),
+    2.65: (2.35, 3.1),
+    3.0: (2.75, 3.6),
+    3.55: (3.25, 4.2),
+    4.0: (3.7, 4.8),
+    5.0: (4.65, 6.0),
+    5.3: (4.95, 6.4),
+    6.0: (5.65, 7.2),
+    7.0: (6.6, 8.4),
+}
+
+
+def made(**given: Any) -> ORing:
+    return ORing(**given)
+
+
+def assumed(**given: Any) -> str:
+    return " ".join(CASE.assumed(made(**given), given))
+
+
+def test_glands_of_inch_sections() -> None:
+    found = gland(0.139 * INCH)
+    assert found.depth == pytest.approx((0.119 * INCH, 0.123 * INCH), abs=1e-4)
+    assert found.width.middle == pytest.approx(0.185 * INCH, abs=1e-4)
+    assert found.radius == pytest.approx((0.005 * INCH, 0.030 * INCH), abs=1e-4)
+    assert gland(6.99).depth == pytest.approx((0.234 * INCH, 0.240 * INCH), abs=1e-4)
+
+
+def test_glands_of_metric_sections() -> None:
+    for chart, kind in ((METRIC, "dynamic"), (METRIC, "hydraulic"), (PNEUMATIC, "pneumatic")):
+        for section, (depth, width) in chart.items():
+            found = gland(section, kind)
+            assert (found.depth.middle, found.width.middle) == (depth, width)
+            assert not found.by_rule
+    for section in METRIC:
+        assert squeeze(section, PNEUMATIC[section][0]) < squeeze(section, METRIC[section][0])
+
+
+def test_glands_of_x_rings_are_deeper_and_narrower() -> None:
+    for section in (1.78, 2.62, 3.53, 5.33, 6.99):
+        ring, quad = gland(section), gland(section, section="x_ring")
+        assert quad.depth.middle > ring.depth.middle
+        assert quad.width.middle < ring.width.middle
+    assert gland(3.53, section="x_ring").depth.middle == pytest.approx(3.25, abs=0.005)
+    assert gland(3.53, section="x_ring").width.low == pytest.approx(3.94, abs=0.005)
+
+
+def test_a_section_between_two_of_a_chart_has_proportions_between_theirs() -> None:
+    found = gland(4.0, section="x_ring")
+    assert found.by_rule
+    assert squeeze(5.33, 4.978) < squeeze(4.0, found.depth.middle) < squeeze(3.53, 3.251)
+    assert 4.0 * 1.115 < found.width.middle < 4.0 * 1.145
+
+
+def test_a_u_cup_stands_between_heel_and_lips() -> None:
+    found = cup_gland(5.5, 4.6, 7.15)
+    assert found.depth.middle == pytest.approx(5.05)
+    assert found.width.middle == pytest.approx(7.865)
+
+
+def test_what_has_no_gland_is_told_what_to_give() -> None:
+    with pytest.raises(
+        UnknownGlandError, match=r"section of 9 mm .* give squeeze and groove_width"
+    ):
+        gland(9.0)
+    with pytest.raises(UnknownGlandError, match='there is "dynamic" and "hydraulic"'):
+        gland(3.53, "rotary")
+
+
+def test_the_standard_gland_of_every_ring_is_sound() -> None:
+    """No ring on a rod 2 % wider than its inside, in its gland, is warned about."""
+    metric = [catalogue.ring(f"{inner}x{d}") for inner in (20, 36, 100) for d in METRIC]
+    for found in [*as568().values(), *metric]:
+        if found.section_diameter < 1.6 or found.inner_diameter < 3.0:
+            continue
+        for kind in ("dynamic", "pneumatic"):
+            groove, rod = gland(found.section_diameter, kind), 1.02 * found.inner_diameter
+            housing = rod + 2.0 * groove.depth.middle
+            assert not catalogue.warnings(found, rod, housing, groove.width.middle)
+
+
+def test_a_metric_ring_has_its_gland() -> None:
+    p = made(ring="36x4", rod=36.0)
+    assert (p.housing_diameter, p.groove_width) == (43.0, 5.2)
+    p = made(ring="36x4", rod=36.0, gland="pneumatic")
+    assert (p.housing_diameter, p.groove_width) == (43.4, 4.8)
+    assert "its standard gland (housing_diameter = 43 mm" in assumed(ring="36x4", rod=36.0)
+
+
+def test_a_ring_by_name_brings_its_section() -> None:
+    p = made(ring="X-ring AS568-210", rod=19.0)
+    assert (p.section, p.gland) == ("x_ring", "dynamic")
+    assert p.housing_diameter == pytest.approx(19.0 + 2 * 0.128 * INCH, abs=1e-3)
+    assert ORing(**p.model_dump()) == p
+    with pytest.raises(ValueError, match='section = "u_cup" and ring = "X-ring AS568-210" contra'):
+        made(ring="X-ring AS568-210", rod=19.0, section="u_cup")
+
+
+def test_a_u_cup_by_its_groove() -> None:
+    p = made(ring="U-cup 25x35x8")
+    assert (p.section, p.rod_diameter, p.housing_diameter) == ("u_cup", 25.0, 35.0)
+    assert p.groove_width == 8.0
+    assert p.section_diameter == pytest.approx(5.435)
+    assert p.inner_diameter == pytest.approx(25.0 - 0.435)
+    assert ORing(**p.model_dump()) == p
+    fitted = made(ring="U-cup 25x35x8", rod="25 f7", housing_diameter="35 H9")
+    assert fitted.rod_diameter == pytest.approx(24.9695)
+    assert fitted.housing_diameter == pytest.approx(35.031)
+
+
+def test_a_u_cup_in_a_gland_by_rule_is_told() -> None:
+    p = made(section="u_cup", rod=25.0, inner_diameter=24.6, section_diameter=5.5, gland="dynamic")
+    assert p.housing_diameter == pytest.approx(25.0 + 2 * 5.06, abs=1e-3)
+    given = {"section": "u_cup", "rod": 25.0, "inner_diameter": 24.6, "gland": "dynamic"}
+    assert "half way between heel and lips" in assumed(**given)
+    with pytest.raises(ValueError, match='gland = "dynamic" gives a groove'):
+        made(section="u_cup", rod=25.0, inner_diameter=24.6)
+
+
+def test_a_section_without_a_chart_is_told() -> None:
+    given = {"ring": "AS568-210", "rod": 19.0, "section": "d_ring"}
+    assert "the gland of an O-ring, as none is known for this D-ring" in assumed(**given)
+    given = {"ring": "X-ring 36x4", "rod": 36.0}
+    assert "between those of the neighbouring sections" in assumed(**given)
+    assert "its standard gland" in assumed(ring="X-ring AS568-210", rod=19.0)
+
+
+def test_depth_and_fill_decide_housing_and_width() -> None:
+    p = made(ring="36x4", rod=36.0, groove_depth=3.4, fill=75.0)
+    assert p.housing_diameter == pytest.approx(42.8)
+    volume = 2 * pi**2 * 20.0 * 2.0**2
+    assert volume / (0.25 * pi * (42.8**2 - 36.0**2) * p.groove_width) == pytest.approx(0.75)
+    assert ORing(**p.model_dump()) == p
+    square = made(section="rectangular", groove_depth=3.2, fill=80.0)
+    filled = catalogue.fill(square.free_ring, 50.0, 56.4, square.groove_width)
+    assert filled == pytest.approx(80.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"groove_depth": 3.2, "housing_diameter": 57.0}, "contradict"),
+        ({"groove_depth": 3.2, "squeeze": 20.0}, "contradict"),
+        ({"fill": 75.0, "groove_width": 9.0}, "contradict"),
+        ({"fill": 100.0}, "groove_width = .* must be at least"),
+    ],
+)
+def test_what_contradicts_is_refused(given: dict[str, float], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        made(**given)
+
+
+def test_tolerances_of_depth_squeeze_and_fill_are_those_of_diameter_and_width() -> None:
+    p = made(ring="36x4", rod=36.0, groove_depth="3.5 ±0.04", fill=70.0)
+    shares = read_tolerances(("squeeze 2 %", "fill 7 %"), dict(p), None)
+    assert [keys for _, keys in shares.values()] == [
+        *([("housing_diameter",)] * 2),
+        ("groove_width",),
+    ]
+    sizes = [share for share, _ in shares.values()]
+    assert sizes == pytest.approx([2 * 0.04 / 43.0, 2 * 0.02 * 4.0 / 43.0, 0.1])
+    shares = read_tolerances(("groove_depth 2 %",), dict(ORing()), None)
+    assert shares["groove_depth"][0] == pytest.approx(0.02 * 6.3 / 56.3)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("squeeze 0.1 mm", 'write "squeeze 2 %"'),
+        ("fill 5 %", 'write "groove_width 0.2 mm"'),
+        ("groove_depth", "is not understood"),
+    ],
+)
+def test_a_tolerance_that_is_not_understood(text: str, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        read_tolerances((text,), dict(ORing()), None)
