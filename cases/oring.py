@@ -34,7 +34,7 @@ class ORingCase(Case[ORing, FilmRow]):
     title = "reciprocating O-ring, a rod seal: film thickness, friction, leakage over the rod speed"
     parameters = ORing
     row = FilmRow
-    selection = ("speeds", "stroke", "solver", "linear", "tolerance")
+    selection = ("speeds", "stroke", "travel", "solver", "linear", "tolerance")
     ways = ("solver", "linear")
     files = (
         *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv"),
@@ -102,7 +102,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def answer(self, parameters: ORing, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
-        return answer(rows)
+        return answer(rows, parameters.travel)
 
     def titled(self, parameters: ORing) -> str:
         """See :class:`Case`."""

@@ -19,6 +19,12 @@ P = TypeVar("P", bound=Parameters)
 R = TypeVar("R", bound=Row)
 
 
+class Alarm(str):
+    """A line that is shown in red."""
+
+    __slots__ = ()
+
+
 class Case(Generic[P, R]):
     """Base of the declaration of a case; one instance of it, `CASE`, is in the module of the case.
 
@@ -102,7 +108,7 @@ class Case(Generic[P, R]):
         return []
 
     def answer(self, parameters: P, rows: Sequence[R]) -> list[str]:
-        """The main results in words, a line each."""
+        """The main results in words, a line each; what should alarm a reader is an Alarm."""
         return []
 
     def titled(self, parameters: P) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Unpack
 import click
 
 from softehl.cases.harness import table
-from softehl.cases.harness.case import Run
+from softehl.cases.harness.case import Alarm, Run
 from softehl.cases.harness.earlier import Existing
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.files import Content
@@ -174,7 +174,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
     if not quiet and (rows or rejected):
         table.print_rows(case, rows, rejected)
         for line in case.answer(record.run.parameters, rows):
-            click.echo(line)
+            click.secho(line, fg="red" if isinstance(line, Alarm) else None)
         if words := case.assumed(record.run.parameters, record.run.given):
             click.echo(f"assumed: {', '.join(words)}")
         for note in case.notes(rows, record.advice):

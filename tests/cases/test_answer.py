@@ -3,38 +3,81 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
 import pytest
 
 from softehl.cases import cycle, oring
+from softehl.cases.harness.case import Alarm
 from softehl.cases.harness.report.page import parts_of, render, write_xlsx
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.states.answer import answer
+from softehl.cases.seal.states.answer import RETURNS, answer
 from softehl.cases.seal.states.state import UNCERTAIN, FilmRow
 from tests.cases.test_leakage import row
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "head", "said"),
     [
-        ([row(400.0, 1.4), row(-400.0, 1.1)], "400 mm/s: leaks 2.36 mm3; friction 3 N out, 3 N in"),
-        ([row(400.0, 1.1), row(-400.0, 1.4)], "400 mm/s: returns what it takes out; friction"),
-        ([row(400.0, 1.1), row(-400.0, 1.11)], "out and back the same within 2 %: no net leakage"),
-        ([row(400.0, 1.1)], "400 mm/s: leakage needs both strokes; friction 3 N out"),
+        (
+            [row(400.0, 1.4), row(-400.0, 1.1)],
+            "leaks 2.36 mm3",
+            "leaks 2.36 mm3 (takes out 11 mm3, could take back 8.64), 1.18 cm3 in 100 m of travel; "
+            "friction 3 N out, 3 N in",
+        ),
+        ([row(400.0, 1.1), row(-400.0, 1.4)], RETURNS, f"{RETURNS} (takes out 8.64 mm3, could"),
+        (
+            [row(400.0, 1.1), row(-400.0, 1.11)],
+            "takes back as much as it takes out",
+            "out and back the same within 2 %: no net leakage (",
+        ),
+        (
+            [row(400.0, 1.1)],
+            "whether it leaks needs both strokes: stroke = both",
+            "friction 3 N out",
+        ),
         (
             [row(-400.0, 1.1, UNCERTAIN)],
+            "whether it leaks needs both strokes: stroke = both",
             "leakage needs both strokes; friction 3 N in (in uncertain)",
         ),
     ],
 )
-def test_whether_a_seal_leaks_and_what_friction_it_has(rows: Sequence[FilmRow], said: str) -> None:
-    head, line = answer(rows)
-    assert head == "in a cycle of 100 mm out and 100 mm back:"
+def test_whether_a_seal_leaks_and_what_friction_it_has(
+    rows: Sequence[FilmRow], head: str, said: str
+) -> None:
+    first, line = answer(rows, 100.0)
+    assert first == head + (" in a cycle of 100 mm out and back" if len(rows) > 1 else "")
+    assert line.startswith("  400 mm/s: ")
     assert said in line
+    assert not isinstance(line, Alarm)
+
+
+def test_several_speeds_have_one_line_that_says_where_it_leaks_most() -> None:
+    rows = [row(400.0, 1.4), row(-400.0, 1.1), row(100.0, 0.5), row(-100.0, 0.6)]
+    assert answer(rows, 50.0)[0] == (
+        "leaks, most at 400 mm/s: 1.18 mm3 in a cycle of 50 mm out and back; not at 1 of 2"
+    )
+    assert answer([], 50.0) == []
+    more = [*rows, row(400.0, 2.4, sealed_pressure=2.0), row(-400.0, 1.1, sealed_pressure=2.0)]
+    assert answer(more, 50.0)[0].startswith("leaks, most at 2 MPa and 400 mm/s: 5.11 mm3")
+
+
+def test_films_thinner_than_roughness_are_an_alarm() -> None:
+    back = replace(row(-400.0, 1.1), lambda_ratio=0.7, regime="boundary")
+    out = replace(row(400.0, 1.4), lambda_ratio=3.5, regime="full")
+    line = answer([out, back], 100.0)[1]
+    assert isinstance(line, Alarm)
+    assert line.endswith("least lambda 0.7 in (boundary); thinner than the surfaces are rough: in")
+    smooth = replace(row(400.0, 1.4), h_min_um=0.1)
+    assert isinstance(answer([smooth], 100.0)[1], Alarm)
+    assert "usual surfaces" in answer([smooth], 100.0)[1]
+    page = render([cycles()], [Part("x", lines=[line, "calm"])])
+    assert f'<li class="not">{line}</li><li>calm</li>' in page
 
 
 def cycles() -> FinishedRun:
@@ -61,6 +104,7 @@ def test_a_report_of_cycles_has_their_numbers() -> None:
     run = cycles()
     said = "cycle 3: leaks 0.51 mm3; friction 12 N out, 10 N in at most; its work 425 mJ"
     assert run.case.answer(run.parameters, run.rows) == [said]
+    assert parts_of([run])[0].title == "Answer"
     page = render([run], parts_of([run]))
     assert said in page
     assert "work of friction on the rod [mJ]" in page

@@ -47,6 +47,7 @@ def test_net_leakage_is_the_difference_of_the_two_films() -> None:
     assert (fast.speed_mm_s, slow.speed_mm_s) == (400.0, 100.0)
     assert fast.net_film_um == pytest.approx(0.3)
     assert fast.net_mm3_per_mm == pytest.approx(math.pi * RADIUS * 0.3e-3)
+    assert fast.net_mm3_per_100_m == pytest.approx(50e3 * math.pi * RADIUS * 0.3e-3)
     assert slow.net_mm3_per_mm == pytest.approx(math.pi * RADIUS * 0.1e-3)
     assert fast.leak_out_mm3_s > 0.0 > fast.leak_in_mm3_s
     assert (fast.verdict, slow.verdict) == (OSCILLATING, OK)

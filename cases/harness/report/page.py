@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.harness.case import load_case
+from softehl.cases.harness.case import Alarm, load_case
 from softehl.cases.harness.curve import CurveFolder
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
@@ -64,7 +64,7 @@ def parts_of(runs: Sequence[FinishedRun]) -> list[Part]:
         own = list(runs[0].case.report(runs))
     except ImportError as error:
         raise BadInput(f"{_MISSING} ({error})") from None
-    parts = [_asked(runs), *([_side_by_side(runs)] if len(runs) > 1 else []), *own]
+    parts = [*_answers(runs), _asked(runs), *([_side_by_side(runs)] if len(runs) > 1 else []), *own]
     left_out = runs[0].case.left_out
     if left_out:
         parts.append(Part("What the model leaves out", lines=left_out))
@@ -86,6 +86,7 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part]) -> str:
         loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     page.filters["shown"] = shown
+    page.tests["alarm"] = lambda line: isinstance(line, Alarm)
     page.filters["base64"] = lambda data: base64.b64encode(data).decode()
     return page.get_template("report.html").render(
         title=_title(runs),
@@ -139,6 +140,17 @@ def _tables(parts: Sequence[Part]) -> Iterator[tuple[str, Table]]:
 
 
 # --- parts that every case has ------------------------------------------------------------------
+
+
+def _answers(runs: Sequence[FinishedRun]) -> list[Part]:
+    """The main results of every run in words."""
+    several = len(runs) > 1
+    lines = [
+        type(line)(f"{run.name}: {line.strip()}" if several else line.strip())
+        for run in runs
+        for line in run.case.answer(run.parameters, run.rows)
+    ]
+    return [Part("Answer", lines=lines)] if lines else []
 
 
 def _asked(runs: Sequence[FinishedRun]) -> Part:

@@ -26,7 +26,7 @@ SEAL = {
         *("oil", "temperature", "viscosity", "pressure_viscosity", "roelands", "oil_density"),
         *ThinningKeys.model_fields,
     ),
-    "motion": ("sealed_pressure", "speeds", "stroke"),
+    "motion": ("sealed_pressure", "speeds", "stroke", "travel"),
     "film": (*_SURFACES, *_CAVITATION, "shear_traction", "arc_start", "arc_end"),
     "mesh": ("density", "tolerance", "error_estimate", "mesh"),
     "numerics": (

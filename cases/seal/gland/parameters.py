@@ -110,6 +110,9 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
         min_length=1,
         strict=False,
     )
+    travel: float = key(
+        100.0, "way of the rod from end to end, for leakage in a cycle", unit="mm", gt=0
+    )
     pressure_viscosity: float = key(
         0.02,
         "coefficient alpha of eta = eta_0 exp(alpha p)",

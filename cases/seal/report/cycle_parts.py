@@ -33,11 +33,8 @@ def _numbers(runs: Sequence[FinishedRun]) -> Part:
         for run in runs
         for row in run.rows
     ]
-    lines = [
-        f"{run.name}: {line}" for run in runs for line in run.case.answer(run.parameters, run.rows)
-    ]
     text = "A cycle is periodic where it differs from the one before by less than 1 %."
-    return Part("Cycles", text, tables=[Table("Every cycle", header, rows)], lines=lines)
+    return Part("Cycles", text, tables=[Table("Every cycle", header, rows)])
 
 
 def _found(runs: Sequence[FinishedRun], name: str) -> list[Picture]:

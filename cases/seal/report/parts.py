@@ -130,13 +130,14 @@ def _several_speeds(runs: Sequence[FinishedRun]) -> bool:
 
 
 def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
-    """Leakage of a cycle, also for a stroke of 100 mm."""
+    """Leakage of a cycle, also for the travel of the run."""
     tables = []
     for run in runs:
         rows = net_leakage(run.rows)
         if rows:
-            header = (*LeakageRow.header(), "mm3 in a cycle of 100 mm")
-            cells = [(*row.cells(), 100.0 * row.net_mm3_per_mm) for row in rows]
+            travel = run.parameters.travel
+            header = (*LeakageRow.header(), f"mm3 in a cycle of {travel:g} mm out and back")
+            cells = [(*row.cells(), travel * row.net_mm3_per_mm) for row in rows]
             tables.append(Table(run.name, header, cells))
     text = (
         "Out minus in; negative: the instroke could take back more than there is, dry on balance."

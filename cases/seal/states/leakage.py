@@ -32,6 +32,9 @@ class LeakageRow(Record):
         "negative where the instroke could take back more than there is: dry on balance",
     )
     net_film_um: float = column("um", "h*_out - h*_in")
+    net_mm3_per_100_m: float = column(
+        "mm3", "net volume that leaves in 100 m of travel, out and back together"
+    )
     verdict: str = column("", "the worse one of the two states")
 
 
@@ -48,15 +51,15 @@ def net_leakage(rows: Sequence[FilmRow]) -> list[LeakageRow]:
 
 
 def _cycle(out: FilmRow, back: FilmRow) -> LeakageRow:
+    net = out.leak_rate_mm3_s / out.rod_speed_mm_s - back.leak_rate_mm3_s / back.rod_speed_mm_s
     return LeakageRow(
         sealed_pressure_MPa=out.sealed_pressure_MPa,
         speed_mm_s=out.rod_speed_mm_s,
         leak_out_mm3_s=out.leak_rate_mm3_s,
         leak_in_mm3_s=back.leak_rate_mm3_s,
-        net_mm3_per_mm=(
-            out.leak_rate_mm3_s / out.rod_speed_mm_s - back.leak_rate_mm3_s / back.rod_speed_mm_s
-        ),
+        net_mm3_per_mm=net,
         net_film_um=out.h_star_um - back.h_star_um,
+        net_mm3_per_100_m=0.5e5 * net,
         verdict=max(out.verdict, back.verdict, key=_severity),
     )
 
