@@ -37,12 +37,12 @@ from tests.cases.test_leakage import row
         ),
         (
             [row(400.0, 1.1)],
-            "whether it leaks needs both strokes: stroke = both",
+            "whether it leaks is open: no speed has a film of both strokes",
             "friction 3 N out",
         ),
         (
             [row(-400.0, 1.1, UNCERTAIN)],
-            "whether it leaks needs both strokes: stroke = both",
+            "whether it leaks is open: no speed has a film of both strokes",
             "leakage needs both strokes; friction 3 N in (in uncertain)",
         ),
     ],

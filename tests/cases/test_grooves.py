@@ -120,6 +120,8 @@ def test_the_standard_gland_of_every_ring_is_sound() -> None:
 def test_a_metric_ring_has_its_gland() -> None:
     p = made(ring="36x4", rod=36.0)
     assert (p.housing_diameter, p.groove_width) == (43.0, 5.2)
+    fitted = made(ring="36x4", rod="36 f7")
+    assert (fitted.rod_diameter, fitted.housing_diameter) == (35.9625, 43.0)
     p = made(ring="36x4", rod=36.0, gland="pneumatic")
     assert (p.housing_diameter, p.groove_width) == (43.4, 4.8)
     assert "its standard gland (housing_diameter = 43 mm" in assumed(ring="36x4", rod=36.0)
@@ -141,6 +143,8 @@ def test_a_u_cup_by_its_groove() -> None:
     assert p.section_diameter == pytest.approx(5.435)
     assert p.inner_diameter == pytest.approx(25.0 - 0.435)
     assert ORing(**p.model_dump()) == p
+    assert "gland" not in assumed(ring="U-cup 25x35x8")
+    assert "rod" not in assumed(ring="U-cup 25x35x8")
     fitted = made(ring="U-cup 25x35x8", rod="25 f7", housing_diameter="35 H9")
     assert fitted.rod_diameter == pytest.approx(24.9695)
     assert fitted.housing_diameter == pytest.approx(35.031)

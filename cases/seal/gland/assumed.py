@@ -11,6 +11,7 @@ from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.sections.keys import ROUND, dimensions
 from softehl.cases.seal.gland.trade.oil_names import IMPROVED
+from softehl.cases.seal.gland.trade.ring_names import read_ring
 
 _RUBBER = {"fit", "shore_A"}.union(*(m.keys for m in materials.MATERIALS.values()))
 
@@ -41,6 +42,8 @@ def _ring(p: ORing, said: frozenset[str]) -> Iterator[str]:
 
 def _gland(p: ORing, said: frozenset[str]) -> Iterator[str]:
     """Rod and groove."""
+    if p.ring and read_ring(p.ring).outer is not None:
+        said |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
     if not said & {"rod", "rod_diameter"}:
         yield f"a rod of {p.rod_diameter:g} mm"
     sizes = {

@@ -16,6 +16,7 @@ from softehl.cases.seal.gland.sections.base import parts_of
 from softehl.cases.seal.gland.sections.keys import SectionKeys
 from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
+from softehl.cases.seal.gland.trade.said import bands
 
 _SAME = 1e-9
 _GLAND = ("squeeze", "groove_depth", "fill")
@@ -93,7 +94,9 @@ def _with_gland(values: dict[str, Any]) -> None:
     if isinstance(values.get("gland"), str):
         gland = _gland(values, section)
         if values.get("housing_diameter") is None:
-            values["housing_diameter"] = round(rod + 2.0 * gland.depth.middle, 4)
+            nominal = dict(bands(tuple(values.get("said", ())))).get("rod")
+            rod_of_chart = nominal.nominal if nominal else rod
+            values["housing_diameter"] = round(rod_of_chart + 2.0 * gland.depth.middle, 4)
         if values.get("groove_width") is None and values.get("fill") is None:
             values["groove_width"] = round(gland.width.middle, 4)
     if number(values.get("fill")):

@@ -65,7 +65,7 @@ def _whether(
 ) -> str:
     """One line: leaks, how much and where most, or returns what it takes out."""
     if not kinds:
-        return "whether it leaks needs both strokes: stroke = both"
+        return "whether it leaks is open: no speed has a film of both strokes"
     cycle = f"in a cycle of {travel:g} mm out and back"
     leaking = [at for at, kind in kinds.items() if kind == "leaks"]
     if not leaking:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from softehl.cases.harness.parameters import Parameters, key
@@ -77,7 +77,9 @@ def bands(said: tuple[str, ...]) -> Iterator[tuple[str, Band]]:
 def with_limits(values: dict[str, Any]) -> dict[str, Any]:
     """The values with the middles of what has limits.  ValueError."""
     for name, found in bands(tuple(values.get("said", ()))):
-        put(values, LENGTHS[name], found.middle, f'{name} = "{_shown(values, name)}"', 1e-9)
+        source = f'{name} = "{_value(tuple(values["said"]), name)}"'
+        for key_of in dict.fromkeys((name, LENGTHS[name])):
+            put(values, key_of, found.middle, source, 1e-9)
     return values
 
 
@@ -99,10 +101,6 @@ def understood(said: tuple[str, ...]) -> list[str]:
 
 def _value(said: tuple[str, ...], name: str) -> str:
     return next(text.partition(" = ")[2] for text in said if text.startswith(f"{name} = "))
-
-
-def _shown(values: Mapping[str, Any], name: str) -> str:
-    return _value(tuple(values["said"]), name)
 
 
 def _length(name: str, values: dict[str, Any]) -> list[str]:
