@@ -150,7 +150,9 @@ def require_known(kind: type[Parameters], keys: Iterable[str], origins: Mapping[
     known = [one.name for one in keys_of(kind)]
     for key in keys:
         if key not in kind.model_fields:
-            near = meant(key, known)
+            near = (
+                f" ({kind.words[key.lower()]})" if key.lower() in kind.words else meant(key, known)
+            )
             allowed = "what `softehl keys` lists" if near else ", ".join(known)
             raise BadInput(
                 f"{origins[key]}: unknown key {shortened(key)!r}{near}; allowed: {allowed}"

@@ -42,6 +42,8 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     names: ClassVar[tuple[str, ...]] = ()
     """Keys that do no more than give values to others, such as the name of a standard part."""
+    words: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """A key that there is not -> what to write instead."""
     headings: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
     """Heading -> keys, in the order in which they are listed; the others follow without one."""
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.oring import CASE
+from softehl.cases.seal.gland.headings import WORDS
 from softehl.cases.seal.gland.oils import density
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.tolerances import read_tolerances
@@ -125,6 +128,11 @@ def test_the_examples_of_astm_d2270() -> None:
         (("oil=hydraulic oil ISO 47", "temperature=50"), "nearest: ISO VG 46 and ISO VG 68"),
         (("oil=grease NLGI 2", "temperature=50"), "write the base oil"),
         (("ring=36x9", "rod=36"), "squeeze = 12.9 and groove_width = 12.2"),
+        (("bore=40 H8",), "unknown key 'bore' (a piston seal, which sits in the piston"),
+        (("pressure=160 bar",), "unknown key 'pressure' (write sealed_pressure)"),
+        (("Ra=0.2",), "unknown key 'Ra' (write roughness = \"Ra 0.2\")"),
+        (("material=rubber 70",), 'write "NBR 70"'),
+        (("section=lip ring",), "input should be 'round'"),
         (("ring=OR 36-4", "rod=36"), 'write "36x4" or "AS568-226"'),
     ],
 )
@@ -134,3 +142,11 @@ def test_what_is_not_read_is_answered_with_what_to_write(
     with pytest.raises(BadInput) as caught:
         typed(*assignments)
     assert answer in str(caught.value)
+
+
+def test_every_word_that_is_no_key_is_answered_with_one() -> None:
+    keys = ORing.model_fields
+    assert not set(WORDS) & set(keys)
+    for answer in WORDS.values():
+        names = re.findall(r"write (\w+)", answer)
+        assert "piston" in answer or (names and set(names) <= set(keys)), answer

@@ -185,6 +185,8 @@ NO_RUBBERS = {
     "NBR 700": "NBR 70",
     "NBR 5": "NBR 70",
     "PTFE": "cap_thickness",
+    "rubber 70": "70 Shore A",
+    "XYZ-70": "FKM 75",
 }
 NO_NAMES = ("gent", "neo-hooke", "mooney-rivlin", "soft", "rubber")
 FINISHES = {

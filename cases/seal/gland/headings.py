@@ -36,6 +36,27 @@ SEAL = {
 }
 """Heading -> keys."""
 
+_PISTON = "a piston seal, which sits in the piston and slides on the bore, is not solved yet"
+
+WORDS = {
+    **dict.fromkeys(("bore", "piston", "cylinder", "piston_diameter", "bore_diameter"), _PISTON),
+    **dict.fromkeys(("pressure", "p", "p_s"), "write sealed_pressure"),
+    **dict.fromkeys(("speed", "velocity", "u"), "write speeds"),
+    **dict.fromkeys(("hardness", "rubber", "polymer"), 'write material = "NBR 70"'),
+    **dict.fromkeys(("fluid", "lubricant", "grease"), 'write oil = "HLP 46 at 50 degC"'),
+    **dict.fromkeys(("eta", "dynamic_viscosity"), "write viscosity"),
+    **dict.fromkeys(("seal", "profile", "type"), 'write ring = "36x4" or section = "u_cup"'),
+    **dict.fromkeys(("temp", "t"), "write temperature"),
+    **dict.fromkeys(("housing", "groove_diameter", "gland_diameter"), "write housing_diameter"),
+    **dict.fromkeys(("depth", "gland_depth"), "write groove_depth"),
+    **dict.fromkeys(("width", "gland_width", "groove_length"), "write groove_width"),
+    **dict.fromkeys(("surface", "finish", "ra", "rq"), 'write roughness = "Ra 0.2"'),
+    **dict.fromkeys(("stroke_length", "length"), "write travel"),
+    **dict.fromkeys(("gap", "clearance"), "write extrusion_gap"),
+    **dict.fromkeys(("compression", "interference"), "write squeeze"),
+}
+"""Words of the trade that are no keys -> what to write."""
+
 CYCLE = {
     **SEAL,
     "motion": (

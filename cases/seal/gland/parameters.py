@@ -13,7 +13,7 @@ from softehl.cases.seal.gland.catalogue import Ring
 from softehl.cases.seal.gland.contradictions import require_consistent
 from softehl.cases.seal.gland.fitting import fitted
 from softehl.cases.seal.gland.grooves import Kind
-from softehl.cases.seal.gland.headings import SEAL
+from softehl.cases.seal.gland.headings import SEAL, WORDS
 from softehl.cases.seal.gland.oils import with_oil
 from softehl.cases.seal.gland.rubbers.regions import MATERIALS, Region, with_regions
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
@@ -51,6 +51,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
         *("oil", "oil_density", "roelands", "said"),
     )
     headings = SEAL
+    words = WORDS
 
     density: Literal[1, 2, 4, 8, 16] = key(
         2,

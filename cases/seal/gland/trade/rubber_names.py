@@ -73,6 +73,9 @@ def read_rubber(key: str, given: str) -> RubberName | None:
         raise refused(
             key, given, "is a plastic, no rubber: it may be a cap, cap_thickness and materials.cap"
         )
+    if shore := re.search(r"\d+", text):
+        forms = ("NBR 70", "FKM 75", "EPDM 80", "PU 95", f"{shore[0]} Shore A")
+        raise refused(key, given, "names no polymer that is known here", *forms)
     return None
 
 
