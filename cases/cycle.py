@@ -26,7 +26,7 @@ from softehl.cases.seal.gland.rubbers.rubber import outside
 from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
 from softehl.cases.seal.gland.trade.said import understood
 from softehl.cases.seal.report.limits import LEFT_OUT
-from softehl.cases.seal.states.answer import leaks
+from softehl.cases.seal.states.answer import far, leaks
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
 
@@ -230,8 +230,11 @@ class CycleCase(Case[Cycle, CycleRow]):
             return []
         row = rows[-1]
         end = "" if row.verdict == OK else f" ({row.verdict}: more cycles may change it)"
+        leak = leaks(row.leak_mm3)
+        if row.leak_mm3 > 0.0 and parameters.motion is None:
+            leak += f", {far(row.leak_mm3, parameters.travel)}"
         return [
-            f"cycle {row.cycle:g}: {leaks(row.leak_mm3)}; friction {row.friction_out_N:.3g} N out, "
+            f"cycle {row.cycle:g}: {leak}; friction {row.friction_out_N:.3g} N out, "
             f"{abs(row.friction_in_N):.3g} N in at most; its work {row.energy_mJ:.4g} mJ{end}"
         ]
 

@@ -102,7 +102,10 @@ def cycles() -> FinishedRun:
 
 def test_a_report_of_cycles_has_their_numbers() -> None:
     run = cycles()
-    said = "cycle 3: leaks 0.51 mm3; friction 12 N out, 10 N in at most; its work 425 mJ"
+    said = (
+        "cycle 3: leaks 0.51 mm3, 1.28 cm3 in 100 m of travel; friction 12 N out, 10 N in at most; "
+        "its work 425 mJ"
+    )
     assert run.case.answer(run.parameters, run.rows) == [said]
     assert parts_of([run])[0].title == "Answer"
     page = render([run], parts_of([run]))

@@ -14,9 +14,6 @@ from softehl.cases.seal.states.verdict import LARGEST_ERROR
 
 RETURNS = "returns what it takes out"
 
-HUNDRED = 1e5
-"""mm in 100 m."""
-
 _Place = tuple[float, float]
 _Strokes = Mapping[str, FilmRow]
 
@@ -47,6 +44,11 @@ def answer(rows: Sequence[FilmRow], travel: float) -> list[str]:
 def leaks(volume: float) -> str:
     """Whether a seal leaks; volume: net, mm3 in a cycle, + = to the air side."""
     return f"leaks {volume:.3g} mm3" if volume > 0.0 else RETURNS
+
+
+def far(volume: float, travel: float) -> str:
+    """The net volume of a cycle (mm3) as that of 100 m, out and back together."""
+    return f"{1e-3 * volume * 1e5 / (2.0 * travel):.3g} cm3 in 100 m of travel"
 
 
 def _kind(net: LeakageRow, out: FilmRow) -> str:
@@ -101,8 +103,8 @@ def _leakage(net: LeakageRow | None, kind: str, travel: float) -> str:
         return f"out and back the same within {LARGEST_ERROR:g} %: no net leakage ({both})"
     if kind == "returns":
         return f"{RETURNS} ({both})"
-    far = 1e-3 * net.net_mm3_per_100_m
-    return f"{leaks(travel * net.net_mm3_per_mm)} ({both}), {far:.3g} cm3 in 100 m of travel"
+    volume = travel * net.net_mm3_per_mm
+    return f"{leaks(volume)} ({both}), {far(volume, travel)}"
 
 
 def _friction(strokes: _Strokes) -> str:
