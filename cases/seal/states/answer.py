@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from softehl.cases.harness.case import Alarm
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.surfaces import MIXED
-from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
+from softehl.cases.seal.states.leakage import LeakageRow, net_leakage, per_100_m
 from softehl.cases.seal.states.plan import USUAL
 from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.seal.states.verdict import LARGEST_ERROR
@@ -47,8 +47,8 @@ def leaks(volume: float) -> str:
 
 
 def far(volume: float, travel: float) -> str:
-    """The net volume of a cycle (mm3) as that of 100 m, out and back together."""
-    return f"{1e-3 * volume * 1e5 / (2.0 * travel):.3g} cm3 in 100 m of travel"
+    """The net volume of a cycle (mm3) as that of 100 m, in words."""
+    return f"{1e-3 * per_100_m(volume, travel):.3g} cm3 in 100 m of travel"
 
 
 def _kind(net: LeakageRow, out: FilmRow) -> str:

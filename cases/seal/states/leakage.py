@@ -50,6 +50,11 @@ def net_leakage(rows: Sequence[FilmRow]) -> list[LeakageRow]:
     return [_cycle(out, back) for out, back in pairs]
 
 
+def per_100_m(volume: float, travel: float) -> float:
+    """The net volume of a cycle of this travel (mm) as that of 100 m, out and back together."""
+    return volume * 1e5 / (2.0 * travel)
+
+
 def _cycle(out: FilmRow, back: FilmRow) -> LeakageRow:
     net = out.leak_rate_mm3_s / out.rod_speed_mm_s - back.leak_rate_mm3_s / back.rod_speed_mm_s
     return LeakageRow(
@@ -59,7 +64,7 @@ def _cycle(out: FilmRow, back: FilmRow) -> LeakageRow:
         leak_in_mm3_s=back.leak_rate_mm3_s,
         net_mm3_per_mm=net,
         net_film_um=out.h_star_um - back.h_star_um,
-        net_mm3_per_100_m=0.5e5 * net,
+        net_mm3_per_100_m=per_100_m(net, 1.0),
         verdict=max(out.verdict, back.verdict, key=_severity),
     )
 
