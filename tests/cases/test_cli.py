@@ -284,7 +284,7 @@ def names(folder: Path) -> set[str]:
 
 BAD = {
     "unknown key": (["oring", "--set", "densty=4"], "did you mean 'density'"),
-    "half a key": (["oring", "--set", "pressure=3"], "'sealed_pressure' or 'pressure_order'"),
+    "half a key": (["oring", "--set", "corner=0.1"], "'corner_radius' or 'corner_fillet'"),
     "wrong type": (["oring", "--set", "sealed_pressure=high"], 'sealed_pressure = "high"'),
     "negative pressure": (["oring", "--set", "sealed_pressure=-1"], "sealed_pressure = -1"),
     "nan pressure": (["oring", "--set", "sealed_pressure=nan"], "sealed_pressure = NaN"),

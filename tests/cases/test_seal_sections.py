@@ -71,7 +71,7 @@ def _curve(**changes: Any) -> Outcome:
             {"section": "d_ring", "sensitivity": True, "cap_thickness": 1.4},
             "not of an outline of a file",
         ),
-        ({"section": "quad"}, "'round', 'rectangular', 'x_ring'"),
+        ({"section": "hat"}, "'round', 'rectangular', 'x_ring'"),
         ({"outline": "nothing.dxf"}, "there is no such file"),
     ],
 )

@@ -16,6 +16,7 @@ from softehl.cases.seal.gland.tolerances import read_tolerances
 from softehl.cases.seal.gland.viscosity_index import at_100_of_index, viscosity_index
 from softehl.cases.shipped import SHIPPED
 
+CAP = "materials.cap=PU 95"
 GLAND = ("rod=36", "squeeze=15", "groove_width=5.4")
 
 
@@ -53,6 +54,11 @@ def test_polyurethane_has_a_rule_of_its_own() -> None:
     (told,) = (words for words in said(p) if "hardness" in words)
     assert "known to -32 and +91 %" in told
     assert typed("shore_A=90").shear_modulus < typed("material=PU 90").shear_modulus
+
+
+def test_a_cap_may_be_a_rubber_by_its_name() -> None:
+    capped = typed("section=rectangular", "cap_thickness=0.8", "groove_width=8", CAP)
+    assert capped.materials["cap"].shear_modulus == typed("material=PU 95").shear_modulus
 
 
 def test_a_rubber_outside_its_temperatures_is_told() -> None:
@@ -133,6 +139,7 @@ def test_the_examples_of_astm_d2270() -> None:
         (("Ra=0.2",), "unknown key 'Ra' (write roughness = \"Ra 0.2\")"),
         (("material=rubber 70",), 'write "NBR 70"'),
         (("section=lip ring",), "input should be 'round'"),
+        (("material=PTFE",), "is a plastic, no rubber: it may be a cap"),
         (("ring=OR 36-4", "rod=36"), 'write "36x4" or "AS568-226"'),
     ],
 )

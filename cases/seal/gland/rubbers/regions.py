@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from softehl.cases.seal.gland.given import number
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
 from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
+from softehl.cases.seal.gland.trade.rubber_names import is_plastic
 from softehl.runtime.mesh.parted_mesh import CAP
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -26,6 +27,13 @@ MATERIALS = (
 
 class Region(RubberKeys):
     """What a region of a section is made of.  Raises pydantic.ValidationError, ValueError."""
+
+    @classmethod
+    def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
+        """As in the base; a plastic is one of the presets, or none."""
+        name = given.get("material")
+        plastic = isinstance(name, str) and is_plastic(name)
+        return given if plastic else super().worded(given)
 
     @classmethod
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:

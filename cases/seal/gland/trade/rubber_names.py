@@ -69,7 +69,7 @@ def read_rubber(key: str, given: str) -> RubberName | None:
     for form in _FORMS:
         if found := form.fullmatch(text):
             return _read(key, given, found.groupdict())
-    if _PLASTICS.fullmatch(text):
+    if is_plastic(text):
         raise refused(
             key, given, "is a plastic, no rubber: it may be a cap, cap_thickness and materials.cap"
         )
@@ -77,6 +77,11 @@ def read_rubber(key: str, given: str) -> RubberName | None:
         forms = ("NBR 70", "FKM 75", "EPDM 80", "PU 95", f"{shore[0]} Shore A")
         raise refused(key, given, "names no polymer that is known here", *forms)
     return None
+
+
+def is_plastic(text: str) -> bool:
+    """Whether a name is that of a plastic."""
+    return _PLASTICS.fullmatch(plain(text)) is not None
 
 
 def _read(key: str, given: str, found: dict[str, str | None]) -> RubberName:
