@@ -12,6 +12,7 @@ import pytest
 
 from softehl.__main__ import main
 from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.sensitivity import design_command
 from softehl.cases.seal.sensitivity.design import (
     Change,
     NoDesignError,
@@ -108,7 +109,7 @@ def test_a_key_that_is_no_number_is_refused(capsys: pytest.CaptureFixture[str]) 
         (("friction -3%", "--by", "rod_diamter"), "(did you mean 'rod_diameter'?)"),
         (("friction -3%", "--by", "housing"), "(did you mean 'housing_diameter'?)"),
         (("friction -3%", "--by", "speed"), "not by the speed"),
-        (("friction -3%", "--by", "squeeze"), "housing_diameter decides it"),
+        (("friction -3%", "--by", "gap"), "housing_diameter decides it"),
         (("friction -3%", "--by", "shore_A"), "the modulus follows from it"),
         (("friktion -3%", "--by", "rod"), "(did you mean 'friction'?)"),
         (("friktion", "-3%", "--by", "rod"), '"friktion -3%" is not understood'),
@@ -126,6 +127,34 @@ def test_what_a_stranger_types_is_answered(
     assert main(["design", "oring", *typed]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
+
+
+@pytest.mark.parametrize(
+    ("measure", "key", "ends"),
+    [
+        ("groove_depth", "housing_diameter", (3.15, 3.2)),
+        ("squeeze", "housing_diameter", (10.765, 9.348)),
+        ("fill", "groove_width", (84.28, 78.80)),
+    ],
+)
+def test_a_measure_of_the_gland_is_designed_by_the_key_that_it_decides(
+    measure: str,
+    key: str,
+    ends: tuple[float, float],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def found(p: ORing, _target: Target, by: str, *_: object) -> list[Step]:
+        first, last = {"housing_diameter": (56.3, 56.4), "groove_width": (3.74, 4.0)}[by]
+        return [Step(first, 5.0, math.nan), Step(last, 4.5, 4.5)]
+
+    monkeypatch.setattr(design_command, "designed", found)
+    assert main(["design", "oring", "friction -10%", "--by", measure]) == 0
+    *_, summary, told = capsys.readouterr().out.splitlines()
+    assert f"by {key} = " in summary
+    words = re.fullmatch(rf"{measure} from (\S+) to (\S+) (mm|%)", told)
+    assert words
+    assert (float(words[1]), float(words[2])) == pytest.approx(ends, rel=1e-3)
 
 
 def test_h_star_may_be_typed_as_it_is_printed() -> None:

@@ -8,6 +8,8 @@ import click
 from pydantic import ValidationError
 
 from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.parameters import keys_of
+from softehl.cases.seal.gland.derived import BASES, derived
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.varied import NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.design import Change, NoDesignError, Step, Target, designed
@@ -25,7 +27,6 @@ _MODULUS = "the modulus follows from it: use mu, or mu_1 and mu_2"
 INSTEAD = {
     **dict.fromkeys(("U", "speed", "speeds", "rod_speed"), _SPEED),
     **dict.fromkeys(("shore_A", "shore", "hardness", "modulus"), _MODULUS),
-    "squeeze": "housing_diameter decides it",
     "gap": "housing_diameter decides it",
     "gland": "housing_diameter and groove_width make it",
     "ring": "section_diameter and inner_diameter make it",
@@ -37,11 +38,12 @@ INSTEAD = {
 
 def design_case(p: ORing, target: str, key: str) -> int:
     """Print the way to the target; exit code 0, or 3 where it is not reached.  Raises BadInput."""
-    key = SAME.get(key, key)
+    asked = SAME.get(key, key)
+    key = BASES.get(asked, asked)
     known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
     if key not in known:
         hint = f" ({INSTEAD[key]})" if key in INSTEAD else meant(key, known)
-        raise BadInput(f"--by {key}{hint}: allowed: {', '.join(known)}")
+        raise BadInput(f"--by {key}{hint}: allowed: {', '.join([*known, *BASES])}")
     p = _one_film(p)
     try:
         wanted = Target.of(target)
@@ -52,7 +54,16 @@ def design_case(p: ORing, target: str, key: str) -> int:
         wrong = f"the target needs a {key} that a case cannot have: {_reason(error)}"
         raise BadInput(wrong) from None
     _tell(p, wanted, key, steps)
+    if asked != key:
+        first, last = (
+            derived(p.model_copy(update={key: step.value}), asked) for step in (steps[0], steps[-1])
+        )
+        click.echo(f"{asked} from {first:.5g} to {last:.5g} {_unit(asked)}")
     return 0
+
+
+def _unit(key: str) -> str:
+    return next(one.unit for one in keys_of(ORing) if one.name == key)
 
 
 def _one_film(p: ORing) -> ORing:
