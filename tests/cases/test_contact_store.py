@@ -63,7 +63,8 @@ THINNING: dict[str, Any] = {
 
 OTHER_WORDS = {
     *("eyring_stress", "carreau_rate"),
-    *("ring", "rod", "squeeze", "gland", "backup", "sensitivity", "tolerances"),
+    *("ring", "rod", "squeeze", "groove_depth", "fill", "gland", "backup", "said", "compound"),
+    *("sensitivity", "tolerances", "travel"),
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
 }
 """Other words for the diameters and the width, for rubber and oil, which are what matters."""
