@@ -114,6 +114,10 @@ ROLLED = (*AT_POINTS, Task.PSEUDO_LOAD)
 """Tasks whose loop over the points is never written out: they are called once a state."""
 
 
+class TargetError(ValueError):
+    """The page has something that the target cannot hold; the message names it."""
+
+
 class Target(StrEnum):
     """For whom a kernel is printed."""
 

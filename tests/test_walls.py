@@ -23,7 +23,7 @@ ALLOWED = {
 ORDER = {
     "codegen": (
         *("abi", "graph", "language", "derive", "optimise", "emit"),
-        *("pipeline", "models", "tools"),
+        *("pipeline", "hosts", "models", "tools"),
     ),
     "runtime": (
         *(

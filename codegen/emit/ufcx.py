@@ -18,25 +18,21 @@ from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 
 
-class TargetError(ValueError):
-    """The model has something that the target cannot hold; the message names it."""
-
-
 def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
     """The tasks that a form of DOLFINx can use; raises `TargetError` for an unfit model."""
     if d.interpolated:
-        raise TargetError(
+        raise abi.TargetError(
             f"{d.name} interpolates {d.interpolated} with any number of unknowns: target ufcx "
             "needs a fixed number, use simd or scalar"
         )
     if d.point_data or any(n.op is Op.CALL for n in reachable([d.potential])):
-        raise TargetError(
+        raise abi.TargetError(
             f"{d.name} has local unknowns, stretches or data per point, which target ufcx cannot "
             "hold: use simd or scalar"
         )
     if (d.nodes, d.rule.dimension) not in abi.VERTEX_ORDER:
         known = ", ".join(f"{n} in {k}-D" for n, k in abi.VERTEX_ORDER)
-        raise TargetError(
+        raise abi.TargetError(
             f"{d.name} has {d.nodes} nodes and a rule in {d.rule.dimension}-D; DOLFINx has "
             f"Lagrange elements of as many nodes as {known}: choose one of them, or use simd or "
             "scalar"

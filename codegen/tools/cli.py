@@ -8,8 +8,9 @@ from pathlib import Path
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
+from softehl.codegen.hosts.all import ELEMENTS
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import cache, product, targets
+from softehl.codegen.tools import cache, hosts, product, targets
 from softehl.codegen.tools import files as cli_files
 from softehl.codegen.tools.build import GENERATED, BuildError
 from softehl.codegen.tools.location import CacheError
@@ -33,6 +34,10 @@ def generate(
     """See `_generate`; says what is wrong in one line."""
     try:
         _require_printable(*models, *([out] if out else []))
+        if target in ELEMENTS:
+            if check or trace is not None:
+                return _refused(f"--check and --trace know target simd, not {target}")
+            return hosts.generate(models, target, out)
         return _generate(models, check, trace, Target(target), out, seconds)
     except (ModelFileError, NoStateError, BuildError, CacheError) as error:
         return _refused(str(error))

@@ -10,8 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from softehl.codegen import pipeline
-from softehl.codegen.abi import Target
-from softehl.codegen.emit.ufcx import TargetError
+from softehl.codegen.abi import Target, TargetError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import cache, product
 

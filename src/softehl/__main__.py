@@ -75,10 +75,12 @@ def _commands() -> "click.Group":
     @click.option("--trace", metavar="KERNEL", help="Show what each pass did to a kernel.")
     @click.option(
         "--target",
-        type=click.Choice(["simd", "scalar", "ufcx"]),
+        type=click.Choice(
+            ["simd", "scalar", "ufcx", "c", "cpp", "abaqus", "calculix", "jax", "ngsolve"]
+        ),
         default="simd",
         show_default=True,
-        help="Four elements at once, one at a time, or cells for DOLFINx.",
+        help="Four elements at once, one at a time, cells for DOLFINx, or another host.",
     )
     @click.option(
         "--out",

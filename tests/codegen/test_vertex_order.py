@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from softehl.codegen import pipeline
-from softehl.codegen.abi import VERTEX_ORDER, Target
-from softehl.codegen.emit.ufcx import TargetError
+from softehl.codegen.abi import VERTEX_ORDER, Target, TargetError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements.cells import ELEMENTS, Element
 from softehl.codegen.language.model import Model

@@ -1,0 +1,76 @@
+"""States of an element and what its kernel must say there, for the tests in a host's folder.
+
+The values are those of the outputs that the compiler printed, evaluated in 30 digits: printing, C
+compiler, processor and the calls of the host are tested by them. Derivatives are not: the tests
+compare these with differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import mpmath
+
+from softehl.codegen.abi import Task
+from softehl.codegen.derive.outputs import Entry
+from softehl.codegen.graph.evaluate import State, Walk
+from softehl.codegen.hosts.interface import Interface
+from softehl.codegen.pipeline import KernelSource
+
+DIGITS = 30
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One state and its values; empty where the page does not offer the task.
+
+    tangent: row by row. fields: point by point.
+    """
+
+    state: State
+    energy: list[float]
+    residual: list[float]
+    tangent: list[float]
+    fields: list[float]
+
+    @property
+    def data(self) -> list[float]:
+        """Data of the element, then those of each point."""
+        return [float(v) for row in (self.state.data, *self.state.point_data) for v in row]
+
+
+def sample(page: Interface, kernel: KernelSource, state: State) -> Sample:
+    """The values of all tasks at one state."""
+    # where the loop over the points is written out, their data stand behind those of the element
+    flat = [v for row in (state.data, *state.point_data) for v in row]
+    with mpmath.workdps(DIGITS):
+        walk = Walk(replace(state, data=flat), {})
+        size = len(state.dofs)
+        residual, tangent = [0.0] * size, [0.0] * size**2
+        task = Task.TANGENT if Task.TANGENT in kernel.functions else Task.RESIDUAL
+        for x in _entries(kernel, task):
+            value = float(walk.value(x.node))
+            if x.column is None:
+                residual[x.row.position] = value
+            else:
+                tangent[x.row.position * size + x.column.position] = value
+        energy = [float(walk.value(x.node)) for x in _entries(kernel, Task.ENERGY)]
+        nodes = [n for _, n in page.definition.fields]
+        fields = [float(walk.at(n, q)) for q in range(page.points) for n in nodes]
+    return Sample(
+        state,
+        energy,
+        residual if task in kernel.functions else [],
+        tangent if task == Task.TANGENT else [],
+        fields if Task.FIELDS in kernel.functions else [],
+    )
+
+
+def _entries(kernel: KernelSource, task: str) -> list[Entry]:
+    return kernel.functions[task].chosen.entries if task in kernel.functions else []
+
+
+def samples(page: Interface, kernel: KernelSource, states: Sequence[State]) -> list[Sample]:
+    """The values at several states."""
+    return [sample(page, kernel, s) for s in states]

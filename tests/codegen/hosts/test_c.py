@@ -1,0 +1,135 @@
+"""Targets `c` and `cpp`: the folder's own test, its header, and the Python kernel."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from softehl.codegen.abi import TargetError
+from softehl.codegen.hosts.interface import Before, Given, Interface, Timed
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.models import ALL
+from softehl.codegen.tools import cli, hosts, samples
+from softehl.runtime.arrays import Array
+from tests.codegen.hosts.random_pages import A, K, page, pages
+from tests.codegen.hosts.workshop import errors, folder, made
+from tests.codegen.workshop import compiled
+
+ROOT = Path(__file__).parents[3]
+NEO_HOOKE = ROOT / "docs" / "models" / "neo_hooke.py"
+HEAT = ROOT / "docs" / "models" / "heat.py"
+
+
+def simple() -> Definition:
+    return page("quad4", A**2 * K, A**3, conservative=False)
+
+
+@pytest.mark.parametrize("host", ["c", "cpp"])
+def test_a_folder_tests_itself(host: str, tmp_path: Path) -> None:
+    if host == "cpp" and shutil.which("g++") is None:
+        pytest.skip("no C++ compiler")
+    assert cli.generate([NEO_HOOKE], target=host, out=tmp_path) == 0
+    strict = f"-O1 -Wall -Wextra -Werror -Wpedantic -Wno-psabi{' -std=c++17' * (host == 'cpp')}"
+    done = made(tmp_path, "all", **{"CXXFLAGS" if host == "cpp" else "CFLAGS": strict})
+    assert done.returncode == 0, done.stderr
+    done = made(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    *values, first, second = errors(done.stdout)
+    assert len(values) == 5
+    assert max(values) < 1e-13
+    assert 0 < max(first, second) < 1e-6
+    shown = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
+    assert shown.stdout.startswith("residual[0] = ")
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("samples.h", "sample_residual[] = {\n    ", "sample_residual[] = {\n    1.0 + "),
+        ("random_quad4.c", "X, u, data, p, NULL", "X, X, data, p, NULL"),
+    ],
+)
+def test_the_test_of_a_folder_sees_a_fault(name: str, old: str, new: str, tmp_path: Path) -> None:
+    folder(simple(), "c", tmp_path)
+    text = (tmp_path / name).read_text()
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new))
+    done = made(tmp_path)
+    assert done.returncode != 0
+    assert "FAILED" in done.stdout
+
+
+def called(library: ctypes.CDLL, d: Definition, arrays: list[Array]) -> tuple[Array, Array]:
+    """Residual and tangent of the functions in the folder."""
+    n, size = len(arrays[1]), len(d.unknowns)
+    R, K = np.empty((n, size)), np.empty((n, size, size))
+    pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (*arrays, R, K)]
+    getattr(library, f"{d.name}_tangent")(ctypes.c_ssize_t(n), *pointers)
+    return R, K
+
+
+@settings(max_examples=3, derandomize=True, deadline=None,
+          suppress_health_check=[HealthCheck.too_slow])  # fmt: skip
+@given(d=pages())
+def test_random_pages_give_what_their_python_kernels_give(
+    d: Definition, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    place = folder(d, "c", tmp_path_factory.mktemp("c"))
+    assert made(place, "lib").returncode == 0
+    states = samples.admissible(d, 3)
+    X, u = (np.array([getattr(s, k) for s in states]) for k in ("coordinates", "dofs"))
+    constants, points = (np.array([getattr(s, k) for s in states]) for k in ("data", "point_data"))
+    p = np.array(states[0].parameters)
+    kernel = compiled(d, tmp_path_factory.mktemp("python"))
+    expected = kernel.tangent(X, u, data=constants, point_data=points, parameters=p)
+    data = np.hstack([constants, points.reshape(3, -1)])
+    found = called(ctypes.CDLL(str(place / f"lib{d.name}.so")), d, [X, u, data, p])
+    for a, b in zip(found, expected, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-13 * np.abs(b).max())
+
+
+# -------------------------------------------------------------------------------- the description
+
+
+def test_who_fills_the_arguments_of_a_page() -> None:
+    seen = Interface.of(simple(), "c")
+    assert seen.parameters == [Given(0)]
+    assert seen.data == [Given(1), *(Before(k, rate=False) for k in range(4))]
+    assert [a.name for a in seen.given] == ["k", "c"]
+    assert seen.by_node() == [0, 4, 1, 5, 2, 6, 3]
+    assert seen.renewed == [1]
+    assert not seen.symmetric
+    assert seen.cell is not None
+    assert seen.cell.name == "quad4"
+
+
+def test_rates_come_from_the_step_in_time() -> None:
+    from softehl.codegen.tools import user
+
+    (heat,) = user.definitions(HEAT)
+    seen = Interface.of(heat, "c")
+    assert seen.parameters == [Given(0), Given(1), Timed("rate")]
+    assert seen.data == [Before(0, rate=True), Before(1, rate=True)]
+
+
+def test_an_interpolated_field_is_refused() -> None:
+    with pytest.raises(TargetError, match=r"film interpolates p .* target c needs a fixed number"):
+        hosts.files(ALL["film"](), "c")
+
+
+def test_a_page_and_a_folder_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.generate([NEO_HOOKE], target="c") == 2
+    assert "target c needs a MODEL.py and --out FOLDER" in capsys.readouterr().err
+
+
+def test_a_file_of_somebody_else_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "Makefile").write_text("all:\n")
+    assert cli.generate([NEO_HOOKE], target="c", out=tmp_path) == 2
+    assert "Makefile is there, and softehl did not write it" in capsys.readouterr().err
+    assert (tmp_path / "Makefile").read_text() == "all:\n"
