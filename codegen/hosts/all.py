@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from softehl.codegen.graph.evaluate import State
-from softehl.codegen.hosts import c
+from softehl.codegen.hosts import abaqus, c
 from softehl.codegen.hosts.interface import Interface
 
 Files = dict[str, str]
@@ -14,5 +14,6 @@ Files = dict[str, str]
 ELEMENTS: dict[str, Callable[[Interface, Sequence[State]], Files]] = {
     "c": c.c,
     "cpp": c.cpp,
+    "abaqus": abaqus.uel,
 }
 """Writers of the hosts that take a page of an element, with two states for their tests."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib.resources import files as resources
 
 from softehl.codegen import abi, pipeline
-from softehl.codegen.abi import Target, Task
+from softehl.codegen.abi import Task
 from softehl.codegen.emit import source
 from softehl.codegen.emit.printer import number
 from softehl.codegen.hosts.interface import Interface
@@ -20,13 +20,17 @@ from softehl.codegen.pipeline import KernelSource
 ARRAYS = "ptrdiff_t n, const double *X, const double *u, const double *data,\n    const double *p"
 
 
-def files(page: Interface, target: Target) -> tuple[dict[str, str], KernelSource]:
-    """Header, functions and kernels of a page, and what the compiler says of these."""
-    kernel = pipeline.compile_model(page.definition, target)
+def files(page: Interface, *, single: bool = False) -> tuple[dict[str, str], KernelSource]:
+    """Header, functions and kernels of a page, and the kernels' record.
+
+    single: for a host that asks for one element at a time, so that lanes would be empty.
+    """
+    kernel = pipeline.compile_model(page.definition)
+    lanes = ["#define SOFTEHL_LANES 1\n"] if single else []
     declarations = [abi.declaration(page.name, t) for t in kernel.functions]
     return {
         f"{page.name}.h": header(page),
-        f"{page.name}.c": "\n".join([kernel.text, functions(page)]),
+        f"{page.name}.c": "\n".join([*lanes, kernel.text, functions(page)]),
         source.HEADER: source.header(declarations, signed=False),
     }, kernel
 

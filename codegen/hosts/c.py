@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from softehl.codegen.abi import Target, Task
+from softehl.codegen.abi import Task
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.hosts import api
 from softehl.codegen.hosts.interface import Interface
@@ -29,7 +29,7 @@ def cpp(page: Interface, states: Sequence[State]) -> dict[str, str]:
 
 
 def _files(page: Interface, states: Sequence[State], suffix: str) -> dict[str, str]:
-    texts, kernel = api.files(page, Target.SIMD)
+    texts, kernel = api.files(page)
     found = samples(page, kernel, states)
     words = {"name": page.name, "suffix": suffix, "flags": FLAGS, **_language(suffix)}
     texts["samples.h"] = sample_table(found)

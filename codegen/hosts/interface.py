@@ -86,7 +86,7 @@ class Interface:
 
     @property
     def symmetric(self) -> bool:
-        """Whether the tangent is."""
+        """True where the tangent is symmetric."""
         return self.definition.conservative
 
     @property
@@ -128,6 +128,18 @@ class Interface:
         """Unknowns that belong to the element alone."""
         return tuple(name for name, node in self.definition.places if node is None)
 
+    @cached_property
+    def vector(self) -> tuple[int, ...]:
+        """Numbers in `nodal` of the components of the first vector: the displacements."""
+        first = [
+            place
+            for start, width in self.definition.nodal
+            if width == self.dimension
+            for place in range(start, start + width)
+        ]
+        found = [k for k, f in enumerate(self.nodal) if f.places[0] in first]
+        return tuple(found[: self.dimension])
+
     def at_node(self, node: int) -> list[int]:
         """Numbers of the unknowns at a node, in the order of the names."""
         return [f.places[node] for f in self.nodal if node < len(f.places)]
@@ -157,12 +169,12 @@ class Interface:
 
     @property
     def parameters(self) -> list[Source]:
-        """Where each parameter comes from."""
+        """Source of each parameter."""
         return self._sources[0]
 
     @property
     def data(self) -> list[Source]:
-        """Where each datum of the element comes from."""
+        """Source of each datum of the element."""
         return self._sources[1]
 
     @property
@@ -174,6 +186,11 @@ class Interface:
     def state(self) -> tuple[Argument, ...]:
         """Data of each point: what a host stores between steps."""
         return self.definition.point_data
+
+    @property
+    def variables(self) -> int:
+        """Numbers that a host may store for an element: state and fields of all points, or 1."""
+        return max(self.points * (len(self.state) + len(self.definition.fields)), 1)
 
     @cached_property
     def renewed(self) -> list[int | None]:

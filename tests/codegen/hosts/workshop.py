@@ -10,7 +10,7 @@ from pathlib import Path
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import hosts
 
-_ERROR = re.compile(r"(\d\.\de[-+]\d\d)  (?:ok|FAILED)$", re.MULTILINE)
+_ERROR = re.compile(r"(\d\.\de[-+]\d\d)  (?:ok|FAILED)$", re.MULTILINE | re.IGNORECASE)
 
 
 def folder(d: Definition, host: str, place: Path) -> Path:

@@ -1,0 +1,116 @@
+"""Target `abaqus` from the page of an element: a user element (UEL), a deck, a small host."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from softehl.codegen.abi import TargetError, Task
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.hosts import abaqus_host as host
+from softehl.codegen.hosts import api, patch
+from softehl.codegen.hosts.abaqus_deck import deck, degrees
+from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
+from softehl.codegen.hosts.interface import Before, Given, Interface, Source, Timed
+from softehl.codegen.hosts.sample import samples
+
+
+def uel(page: Interface, states: Sequence[State]) -> dict[str, str]:
+    """Every file of a user element."""
+    _require(page)
+    texts, kernel = api.files(page, single=True)
+    found = samples(page, kernel, host.in_time(page, states))
+    words = _words(page)
+    texts["uel.c"] = api.filled(api.template("uel.c"), words)
+    texts["host.f90"] = api.filled(api.template("uel_host.f90"), words)
+    texts["Makefile"] = api.filled(api.template("uel.mk"), words)
+    texts["NOTES.md"] = api.filled(api.template("uel.md"), words)
+    texts["samples.txt"] = host.sample_file(page, found)
+    if page.cell is not None:
+        mesh, settings = patch.patch(page.cell), host.settings_of(page, found[0])
+        texts["patch.txt"] = host.patch_file(page, mesh, settings)
+        texts[f"{page.name}.inp"] = deck(page, mesh, settings)
+    return texts
+
+
+def _require(page: Interface) -> None:
+    page.require("abaqus", Task.TANGENT)
+    if page.free:
+        raise TargetError(
+            f"{page.name} has unknowns of the element alone ({', '.join(page.free)}): target "
+            "abaqus has unknowns at nodes only; condense them by m.implicit, or give them a node"
+        )
+    if page.dimension not in (1, 2, 3):
+        raise TargetError(
+            f"{page.name} has {page.dimension} coordinates a node: target abaqus needs 1, 2 or 3"
+        )
+    if any(k is not None for k in page.renewed):
+        page.require("abaqus", Task.FIELDS)
+
+
+def _words(page: Interface) -> dict[str, object]:
+    d, numbers = page.definition, degrees(page)
+    rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(page.given)]
+    names = [f"`{f.name}` is {n}" for f, n in zip(page.nodal, numbers, strict=True)]
+    state = [a.name for a in page.state]
+    return {
+        "name": page.name,
+        "NAME": page.name.upper(),
+        "given": len(page.given),
+        "order": ", ".join(map(str, page.by_node())),
+        "arguments": "".join(_arguments(page)),
+        "outputs": "".join(_outputs(page)),
+        "history": "".join(_history(page)),
+        "limit": _fortran(LIMIT),
+        "difference": _fortran(DIFFERENCE),
+        "differences": ".false." if d.given else ".true.",
+        "properties": "\n".join(rows) or "| | none |",
+        "degrees": ", ".join(names),
+        "state": ", ".join(state) or "none",
+        "fields": ", ".join(name for name, _ in d.fields) or "none",
+        "points": page.points,
+        "needed": page.points * len(state),
+        "variables": page.variables,
+        "coordinates": ", ".join(d.coordinates),
+        "symmetry": "symmetric" if page.symmetric else "not symmetric (`UNSYMM` in the deck)",
+    }
+
+
+def _fortran(value: float) -> str:
+    return f"{value:g}".replace("e", "d")
+
+
+def _arguments(page: Interface) -> Iterable[str]:
+    """Lines of C that fill parameters and data."""
+    for array, sources in (("p", page.parameters), ("data", page.data)):
+        for k, source in enumerate(sources):
+            yield f"    {array}[{k}] = {_argument(page, source)};\n"
+
+
+def _argument(page: Interface, source: Source) -> str:
+    rate = "(*dtime > 0.0 ? 1.0 / *dtime : 0.0)"
+    match source:
+        case Given(index):
+            return f"props[{index}]"
+        case Timed(what):
+            return "*dtime" if what == "dt" else rate
+        case Before(place, is_rate):
+            i = page.by_node().index(place)
+            return f"-(U[{i}] - du[{i}]) * {rate}" if is_rate else f"U[{i}] - du[{i}]"
+
+
+def _outputs(page: Interface) -> Iterable[str]:
+    if Task.FIELDS in page.tasks:
+        yield f"    {page.name}_fields(1, X, u, data, p, fields);\n"
+    if Task.ENERGY in page.tasks:
+        yield f"    {page.name}_energy(1, X, u, data, p, stored);\n"
+
+
+def _history(page: Interface) -> Iterable[str]:
+    """Lines of C that store the new state."""
+    width, fields = len(page.state), len(page.definition.fields)
+    for k, field in enumerate(page.renewed):
+        if field is not None:
+            yield (
+                f"    for (int q = 0; q < {page.points}; ++q)\n"
+                f"        svars[{width} * q + {k}] = fields[{fields} * q + {field}];\n"
+            )

@@ -1,0 +1,116 @@
+"""Files of the small host of a user element: states with their values, and a patch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.hosts import patch
+from softehl.codegen.hosts.interface import Before, Given, Interface, Source, Timed
+from softehl.codegen.hosts.patch import Patch
+from softehl.codegen.hosts.sample import Sample
+
+INCREMENTS = 4
+"""Increments of the patch."""
+
+
+def dt_of(page: Interface) -> float:
+    """Length of an increment."""
+    return dict(page.definition.example).get("dt", 1.0)
+
+
+def in_time(page: Interface, states: Sequence[State]) -> list[State]:
+    """States whose values of the step before are those of the state before in the list."""
+    return [_stepped(page, s, states[k - 1].dofs) for k, s in enumerate(states)]
+
+
+def _stepped(page: Interface, state: State, before: Sequence[float]) -> State:
+    dt = dt_of(page)
+
+    def value(source: Source, own: float) -> float:
+        match source:
+            case Timed(what):
+                return dt if what == "dt" else 1 / dt
+            case Before(place, rate):
+                return -before[place] / dt if rate else before[place]
+        return own
+
+    return replace(
+        state,
+        parameters=[value(s, v) for s, v in zip(page.parameters, state.parameters, strict=True)],
+        data=[value(s, v) for s, v in zip(page.data, state.data, strict=True)],
+    )
+
+
+def settings_of(page: Interface, s: Sample) -> list[float]:
+    """Values of the properties: those of a state."""
+    values = [0.0] * len(page.given)
+    pairs = [*zip(page.parameters, s.state.parameters, strict=True)]
+    pairs += [*zip(page.data, s.state.data, strict=True)]
+    for source, v in pairs:
+        if isinstance(source, Given):
+            values[source.index] = v
+    return values
+
+
+def _renewed(page: Interface, s: Sample) -> list[float]:
+    """State of all points after a step, then the fields."""
+    width = len(page.definition.fields)
+    rows = [list(row) for row in s.state.point_data]
+    for q, row in enumerate(rows):
+        for k, field in enumerate(page.renewed):
+            if field is not None:
+                row[k] = s.fields[width * q + field]
+    return [*(v for row in rows for v in row), *s.fields]
+
+
+def sample_file(page: Interface, found: Sequence[Sample]) -> str:
+    """samples.txt: what the host hands over, and what the element must give back."""
+    order, size = page.by_node(), len(page.definition.unknowns)
+    after = _renewed(page, found[0])
+    head = [len(found), size, page.definition.nodes, page.dimension]
+    lines = [" ".join(map(str, (*head, len(page.given), len(after), len(found[0].fields))))]
+    for k, s in enumerate(found):
+        u, before = s.state.dofs, found[k - 1].state.dofs
+        old = [v for row in s.state.point_data for v in row]
+        matrix = [s.tangent[i * size + j] for j in order for i in order]
+        groups = (
+            [dt_of(page)],
+            s.state.coordinates,
+            [u[i] for i in order],
+            [u[i] - before[i] for i in order],
+            settings_of(page, s),
+            [*old, *[0.0] * len(s.fields)],
+            [-s.residual[i] for i in order],
+            matrix,
+            _renewed(page, s),
+        )
+        lines += [" ".join(repr(float(v)) for v in group) for group in groups]
+    return "\n".join(lines) + "\n"
+
+
+def patch_file(page: Interface, mesh: Patch, settings: Sequence[float]) -> str:
+    """patch.txt: the mesh, equations of each cell, and what is held."""
+    number, fixed = patch.numbers(page, mesh), patch.held(page, mesh)
+    width = page.variables
+    rest = patch.starts(page)
+    state = [dict(page.definition.example).get(a.name, 0.0) for a in page.state]
+    start = ([*state * page.points] + [0.0] * width)[:width]
+    of_place = {place: k for k, f in enumerate(page.nodal) for place in f.places}
+    nodes = [page.definition.places[i][1] for i in page.by_node()]
+    head = [len(mesh.points), page.dimension, len(mesh.cells), page.definition.nodes]
+    head += [len(page.definition.unknowns), len(number), len(page.given), width, len(fixed)]
+    lines = [" ".join(map(str, [*head, INCREMENTS, INCREMENTS * dt_of(page)]))]
+    lines += [" ".join(map(repr, p)) for p in mesh.points]
+    for cell in mesh.cells:
+        places = [
+            number[cell[node or 0], of_place[i]] + 1
+            for i, node in zip(page.by_node(), nodes, strict=True)
+        ]
+        lines.append(" ".join(str(v) for v in [*(n + 1 for n in cell), *places]))
+    lines.append(" ".join(repr(float(v)) for v in settings))
+    lines.append(" ".join(repr(float(v)) for v in start))
+    lines.append(" ".join(repr(rest[k]) for _, k in number))
+    lines += [f"{number[h.node, h.field] + 1} {h.value!r}" for h in fixed]
+    return "\n".join(lines) + "\n"
