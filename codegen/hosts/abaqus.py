@@ -9,7 +9,6 @@ from softehl.codegen.graph.evaluate import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import api, patch
 from softehl.codegen.hosts.abaqus_deck import deck, degrees
-from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
 from softehl.codegen.hosts.interface import Before, Given, Interface, Source, Timed
 from softehl.codegen.hosts.sample import samples
 
@@ -21,7 +20,7 @@ def uel(page: Interface, states: Sequence[State]) -> dict[str, str]:
     found = samples(page, kernel, host.in_time(page, states))
     words = _words(page)
     texts["uel.c"] = api.filled(api.template("uel.c"), words)
-    texts["host.f90"] = api.filled(api.template("uel_host.f90"), words)
+    texts["host.f90"] = host.program(page)
     texts["Makefile"] = api.filled(api.template("uel.mk"), words)
     texts["NOTES.md"] = api.filled(api.template("uel.md"), words)
     texts["samples.txt"] = host.sample_file(page, found)
@@ -43,7 +42,7 @@ def _require(page: Interface) -> None:
         raise TargetError(
             f"{page.name} has {page.dimension} coordinates a node: target abaqus needs 1, 2 or 3"
         )
-    if any(k is not None for k in page.renewed):
+    if page.remembers:
         page.require("abaqus", Task.FIELDS)
 
 
@@ -60,9 +59,6 @@ def _words(page: Interface) -> dict[str, object]:
         "arguments": "".join(_arguments(page)),
         "outputs": "".join(_outputs(page)),
         "history": "".join(_history(page)),
-        "limit": _fortran(LIMIT),
-        "difference": _fortran(DIFFERENCE),
-        "differences": ".false." if d.given else ".true.",
         "properties": "\n".join(rows) or "| | none |",
         "degrees": ", ".join(names),
         "state": ", ".join(state) or "none",
@@ -73,10 +69,6 @@ def _words(page: Interface) -> dict[str, object]:
         "coordinates": ", ".join(d.coordinates),
         "symmetry": "symmetric" if page.symmetric else "not symmetric (`UNSYMM` in the deck)",
     }
-
-
-def _fortran(value: float) -> str:
-    return f"{value:g}".replace("e", "d")
 
 
 def _arguments(page: Interface) -> Iterable[str]:
@@ -100,7 +92,8 @@ def _argument(page: Interface, source: Source) -> str:
 
 def _outputs(page: Interface) -> Iterable[str]:
     if Task.FIELDS in page.tasks:
-        yield f"    {page.name}_fields(1, X, u, data, p, fields);\n"
+        needed = "" if page.remembers else "if (*nsvars >= STATE + OUTPUT)\n        "
+        yield f"    {needed}{page.name}_fields(1, X, u, data, p, fields);\n"
     if Task.ENERGY in page.tasks:
         yield f"    {page.name}_energy(1, X, u, data, p, stored);\n"
 

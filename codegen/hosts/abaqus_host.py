@@ -6,13 +6,29 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from softehl.codegen.graph.evaluate import State
-from softehl.codegen.hosts import patch
+from softehl.codegen.hosts import api, patch
+from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
 from softehl.codegen.hosts.interface import Before, Given, Interface, Source, Timed
 from softehl.codegen.hosts.patch import Patch
 from softehl.codegen.hosts.sample import Sample
 
 INCREMENTS = 4
 """Increments of the patch."""
+
+
+def program(page: Interface) -> str:
+    """The host itself, in Fortran."""
+    words = {
+        "name": page.name,
+        "limit": _fortran(LIMIT),
+        "difference": _fortran(DIFFERENCE),
+        "differences": ".false." if page.definition.given else ".true.",
+    }
+    return api.filled(api.template("uel_host.f90"), words)
+
+
+def _fortran(value: float) -> str:
+    return f"{value:g}".replace("e", "d")
 
 
 def dt_of(page: Interface) -> float:

@@ -199,6 +199,11 @@ class Interface:
         history = self.definition.history
         return [fields.index(f"new_{a.name}") if a.name in history else None for a in self.state]
 
+    @property
+    def remembers(self) -> bool:
+        """True where the page renews data of points: history."""
+        return any(k is not None for k in self.renewed)
+
 
 def _previous(d: Definition, suffix: str) -> Iterator[tuple[str, Before]]:
     """Data such as u_old1 (for an unknown u at node 1) and the unknown whose value before it is."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
-from softehl.codegen.hosts.all import ELEMENTS
+from softehl.codegen.hosts.all import HOSTS
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cache, hosts, product, targets
 from softehl.codegen.tools import files as cli_files
@@ -34,7 +34,7 @@ def generate(
     """See `_generate`; says what is wrong in one line."""
     try:
         _require_printable(*models, *([out] if out else []))
-        if target in ELEMENTS:
+        if target in HOSTS:
             if check or trace is not None:
                 return _refused(f"--check and --trace know target simd, not {target}")
             return hosts.generate(models, target, out)

@@ -5,6 +5,7 @@ would with any script.  Its models are
 
 - the functions of the file that take no argument and are annotated `-> Definition`, and
 - the names of the file that hold a `Definition`,
+- its materials (`@softehl.material`), which hosts take,
 
 in the order in which they are written; where the file has a mapping or list `MODELS` (of such
 functions or definitions), those alone.  Names that begin with an underscore are left out.
@@ -29,6 +30,7 @@ from typing import Any
 from softehl.codegen.language import names
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools.model_text import ModelFileError, read
 
@@ -48,6 +50,18 @@ _IN_SYMPY = {"fabs": "Abs", "abs": "Abs", "absolute": "Abs", "pow": "Pow", "powe
 
 def definitions(path: Path) -> list[Definition]:
     """The models of a file, which is run; raises `ModelFileError`."""
+    found = pages(path)
+    models = [d for d in found if isinstance(d, Definition)]
+    if not models:
+        raise ModelFileError(
+            f"{path.name} has materials only, which have no kernel of their own: give a --target "
+            "that takes materials, or put them into an element"
+        )
+    return models
+
+
+def pages(path: Path) -> list[Definition | Law]:
+    """The models and the materials of a file, which is run; raises `ModelFileError`."""
     path = path.resolve()
     text = read(path)
     with _imports_from(path.parent), _errors_of(path):
@@ -92,7 +106,7 @@ def _at_most(seconds: float) -> Iterator[None]:
         sys.setprofile(before)
 
 
-def check_names(where: str, found: Iterable[Definition]) -> None:
+def check_names(where: str, found: Iterable[Definition | Law]) -> None:
     """Raise `ModelFileError` unless the names are different."""
     seen: set[str] = set()
     for d in found:
@@ -118,7 +132,7 @@ def _entries(path: Path, module: ModuleType) -> list[Any]:
     if chosen is not None:
         return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
     public = [(k, v) for k, v in vars(module).items() if not k.startswith("_")]
-    found = [v for _, v in public if isinstance(v, Definition) or _makes_a_model(module, v)]
+    found = [v for _, v in public if isinstance(v, (Definition, Law)) or _makes_a_model(module, v)]
     if not found:
         bare = [k for k, v in public if _own_function(module, v) and _annotation(v) is None]
         if bare:
@@ -149,9 +163,9 @@ def _makes_a_model(module: ModuleType, value: Any) -> bool:
     return annotation is Definition
 
 
-def _made(entry: Any) -> Definition:
+def _made(entry: Any) -> Definition | Law:
     made = entry() if callable(entry) else entry
-    if not isinstance(made, Definition):
+    if not isinstance(made, (Definition, Law)):
         label = getattr(entry, "__name__", repr(entry))
         code = getattr(entry, "__code__", None)
         where = f"{Path(code.co_filename).name}:{code.co_firstlineno}: " if code else ""

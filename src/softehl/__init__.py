@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.elements import quadrature, shapes
     from softehl.codegen.language.elements.cells import element
+    from softehl.codegen.language.material import material
     from softehl.codegen.language.model import Model
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
     from softehl.runtime.fem.checks import ProblemError
@@ -73,6 +74,7 @@ _MODELLING = {
     "Model": "softehl.codegen.language.model",
     "element": "softehl.codegen.language.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
+    "material": "softehl.codegen.language.material",
     "quadrature": "softehl.codegen.language.elements.quadrature:",
     "shapes": "softehl.codegen.language.elements.shapes:",
 }
@@ -107,6 +109,7 @@ __all__ = [
     "kinematics",
     "load_kernel",
     "main",
+    "material",
     "processes",
     "quadrature",
     "run_oring",

@@ -85,7 +85,7 @@ void uel_(double *rhs, double *amatrx, double *svars, double *energy, const int 
         data[@NAME@_DATA + k] = svars[k];
 
     @name@_tangent(1, X, u, data, p, R, K);
-    double fields[OUTPUT + 1], stored[1] = {0.0};
+    double fields[OUTPUT + 1] = {0.0}, stored[1] = {0.0};
 @outputs@    if (!finite_numbers(R, UNKNOWNS) || !finite_numbers(K, UNKNOWNS * UNKNOWNS)
         || !finite_numbers(fields, OUTPUT)) {
         *pnewdt = 0.25; /* Abaqus begins the increment again, with this part of its length */

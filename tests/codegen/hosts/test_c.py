@@ -128,8 +128,17 @@ def test_a_page_and_a_folder_are_needed(capsys: pytest.CaptureFixture[str]) -> N
     assert "target c needs a MODEL.py and --out FOLDER" in capsys.readouterr().err
 
 
-def test_a_file_of_somebody_else_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_of_somebody_else_stays(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "Makefile").write_text("all:\n")
     assert cli.generate([NEO_HOOKE], target="c", out=tmp_path) == 2
-    assert "Makefile is there, and softehl did not write it" in capsys.readouterr().err
-    assert (tmp_path / "Makefile").read_text() == "all:\n"
+    assert "holds Makefile, which softehl did not write" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["Makefile"]
+
+
+def test_a_folder_of_ours_is_written_anew(tmp_path: Path) -> None:
+    assert cli.generate([NEO_HOOKE], target="c", out=tmp_path) == 0
+    (tmp_path / "neo_hooke.h").write_text("")
+    assert cli.generate([NEO_HOOKE], target="c", out=tmp_path) == 0
+    assert (tmp_path / "neo_hooke.h").stat().st_size > 1000

@@ -5,18 +5,25 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
 
 from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.material import Law
 from softehl.codegen.tools import hosts
 
 _ERROR = re.compile(r"(\d\.\de[-+]\d\d)  (?:ok|FAILED)$", re.MULTILINE | re.IGNORECASE)
 
 
-def folder(d: Definition, host: str, place: Path) -> Path:
+def folder(d: Definition | Law, host: str, place: Path) -> Path:
     """The folder of a page for a host."""
-    hosts.write(place, hosts.files(d, host))
+    hosts.write(place, _of_law(d, host) if isinstance(d, Law) else hosts.files(d, host))
     return place
+
+
+@cache
+def _of_law(law: Law, host: str) -> dict[str, str]:
+    return hosts.files(law, host)
 
 
 def made(place: Path, target: str = "test", **settings: str) -> subprocess.CompletedProcess[str]:

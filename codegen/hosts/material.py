@@ -1,0 +1,204 @@
+"""A material in the measures of a host: its stress and modulus, derived on the page's own graph.
+
+The deformation moves by six small strains about its value, and the stress of the host is
+differentiated along them: so the modulus is exact, and no formula converts it afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cached_property
+from typing import Any
+
+import mpmath
+import sympy as sp
+
+from softehl.codegen.abi import TargetError, Task
+from softehl.codegen.graph.evaluate import State, Walk
+from softehl.codegen.graph.graph import Node
+from softehl.codegen.graph.traverse import substitute
+from softehl.codegen.hosts.interface import Interface
+from softehl.codegen.language import kinematics
+from softehl.codegen.language.definition import Argument, Definition
+from softehl.codegen.language.elements import cells, quadrature
+from softehl.codegen.language.material import Law, Material
+from softehl.codegen.language.model import Model
+
+VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Order of the components; shears of strains count twice."""
+
+
+class Measure(StrEnum):
+    """Stress and modulus that a host wants."""
+
+    CAUCHY = "Cauchy stress and the modulus of the Jaumann rate of the Kirchhoff stress over J"
+    SECOND = "second Piola-Kirchhoff stress and its derivative by the Green strain"
+    SMALL = "stress and its derivative by the small strain"
+
+
+@dataclass(frozen=True)
+class Response:
+    """A material in one measure.
+
+    Its unknowns are F row by row, or six small strains; its fields are the energy (zero for a law
+    that has none), 6 stresses, and 21 moduli row by row of the upper triangle, or 36.
+    """
+
+    law: Law
+    measure: Measure
+    definition: Definition
+    written: Definition
+    symmetric: bool
+
+    @property
+    def page(self) -> Interface:
+        """The response as a page without nodes."""
+        return Interface(self.definition)
+
+    @cached_property
+    def parameters(self) -> tuple[Argument, ...]:
+        """Constants of the material."""
+        return self.definition.parameters
+
+    def modulus(self, i: int, j: int) -> int:
+        """Number of the field that is the modulus in row i and column j."""
+        if not self.symmetric:
+            return 7 + 6 * i + j
+        a, b = min(i, j), max(i, j)
+        return 7 + 6 * a - a * (a - 1) // 2 + b - a
+
+
+def is_small(law: Law) -> bool:
+    """True for a law of small strains."""
+    return bool(_written(law, sp.eye(3))[1].small)
+
+
+def _written(law: Law, F: Any) -> tuple[Model, Material]:
+    m = Model(law.name, nodes=1, rule=quadrature.point_rule(), doc=law.doc)
+    return m, law.on(m, F)
+
+
+def response(law: Law, measure: Measure) -> Response:
+    """The law in a measure of large strains; a law of small strains in its own."""
+    m = Model(law.name, nodes=1, rule=quadrature.point_rule(), doc=law.doc)
+    if is_small(law):
+        return _small(law, m)
+    F0 = sp.Matrix(3, 3, [m.unknown(f"F{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)])
+    steps = m.data(**{f"step{i + 1}{j + 1}": "strain from here" for i, j in VOIGT})
+    E = _tensor(steps)
+    if measure is Measure.CAUCHY:
+        F = m.define("F", (sp.eye(3) + E) * F0)
+    else:
+        inverse = m.define("F0_inverse", F0.adjugate() / F0.det(method="berkowitz"))
+        F = m.define("F", F0 + inverse.T * E)
+    found = law.on(m, F)
+    P = _first(m, found, F)
+    if measure is Measure.CAUCHY:
+        stress, volume = P * F.T, m.define("J0", F0.det(method="berkowitz"))
+    else:
+        stress, volume = m.define("F_inverse", F.adjugate() / F.det(method="berkowitz")) * P, 1
+    values = [m.define(f"tau_{i}{j}", stress[i, j]) for i, j in VOIGT]
+    moduli = [[c / volume for c in m.derivative(f"C_{k}", v, steps)] for k, v in enumerate(values)]
+    m.fields(**_named(found, [v / volume for v in values], moduli))
+    m.fields(**{f"skew{i}{j}": stress[i, j] - stress[j, i] for i, j in VOIGT[3:]})
+    m.example(F11=1, F22=1, F33=1, **{str(s): 0 for s in steps})
+    _close(m, found, list(P), list(F))
+    d = m.finish()
+    return Response(law, measure, _at_rest(d), d, found.W is not None)
+
+
+def _tensor(strains: Sequence[Any]) -> Any:
+    e = dict(zip(VOIGT, strains, strict=True))
+    return sp.Matrix(3, 3, lambda i, j: e[min(i, j), max(i, j)] / (1 if i == j else 2))
+
+
+def _first(m: Model, law: Material, F: Any) -> Any:
+    """First Piola-Kirchhoff stress."""
+    return m.define("P", law.P) if law.W is None else m.derivative("P", law.W, F)
+
+
+def _named(law: Material, stress: Sequence[Any], moduli: Sequence[Sequence[Any]]) -> Any:
+    named = {"W": sp.Integer(0) if law.W is None else law.W}
+    named |= {f"s{k}": v for k, v in enumerate(stress)}
+    start = range(6) if law.W is not None else [0] * 6
+    for i, first in enumerate(start):
+        named |= {f"C{i}{j}": moduli[i][j] for j in range(first, 6)}
+    return named
+
+
+def _at_rest(d: Definition) -> Definition:
+    """The definition with the six strains at zero: they are no arguments of it."""
+    g, zero = d.graph, d.graph.zero
+    at_zero: dict[Node, Node] = {g.input("data", k): zero for k in range(6)}
+    roots = [d.potential, *(n for _, n in d.fields), *d.constant, *d.interface]
+    new, _ = substitute(g, roots, at_zero)
+    names, count = [name for name, _ in d.fields], 1 + len(d.fields)
+    frozen = new[count : count + len(d.constant)]
+    return replace(
+        d,
+        potential=new[0],
+        fields=tuple(zip(names, new[1:count], strict=True)),
+        constant=tuple(frozen),
+        interface=(),
+        data=(),
+        tasks=(Task.FIELDS,),
+    )
+
+
+def _close(m: Model, law: Material, P: Sequence[Any], F: Sequence[Any]) -> None:
+    """Give the page the potential that every page has; no host asks for its residual."""
+    if law.W is not None:
+        m.potential(law.W)
+    else:
+        m.potential(sum(a * b for a, b in zip(P, F, strict=True)), constant=P)
+
+
+def _small(law: Law, m: Model) -> Response:
+    strains = [m.unknown(f"e{i + 1}{j + 1}") for i, j in VOIGT]
+    found = law.on(m, sp.eye(3) + _tensor(strains))
+    if found.W is not None:
+        stress = m.derivative("s", found.W, strains)
+    else:
+        stress = [m.define(f"stress_{i}{j}", found.P[i, j]) for i, j in VOIGT]
+    moduli = [m.derivative(f"C_{k}", v, strains) for k, v in enumerate(stress)]
+    m.fields(**_named(found, stress, moduli))
+    if found.P is not None:
+        m.fields(**{f"skew{i}{j}": found.P[i, j] - found.P[j, i] for i, j in VOIGT[3:]})
+    _close(m, found, stress, strains)
+    d = m.finish()
+    return Response(law, Measure.SMALL, _at_rest(d), d, found.W is not None)
+
+
+def checked(r: Response, states: Sequence[State]) -> Response:
+    """The response without its test: raises `TargetError` where its stress is not symmetric."""
+    d = r.definition
+    skew = [n for name, n in d.fields if name.startswith("skew")]
+    stress = [n for name, n in d.fields if name[0] == "s" and not name.startswith("skew")]
+    with mpmath.workdps(30):
+        for state in states:
+            walk = Walk(state, {})
+            size = max(abs(walk.value(n)) for n in stress)
+            if any(abs(walk.value(n)) > size * mpmath.mpf(10) ** -20 for n in skew):
+                raise TargetError(
+                    f"the stress of {r.law.name} is not symmetric: its energy must not change "
+                    "when the body rotates, write it by F.T * F"
+                )
+    fields = tuple((name, n) for name, n in d.fields if not name.startswith("skew"))
+    return replace(r, definition=replace(d, fields=fields))
+
+
+def solid(law: Law, name: str = "tet4") -> Definition:
+    """The law in a standard cell of three dimensions with displacements."""
+    kind = cells.element(name)
+    m = Model(f"{law.name}_{name}", nodes=len(kind.nodes), rule=kind.rule, doc=law.doc)
+    X, u = m.coordinates("X", "Y", "Z"), m.nodal_unknowns("u_x", "u_y", "u_z")
+    e = kinematics.isoparametric(m, X, kind.gradient(*m.point()))
+    F = kinematics.deformation_gradient(m, e.dN, u)
+    found = law.on(m, F)
+    if found.W is not None:
+        m.potential(m.integral("Pi", found.W * e.detJ))
+    else:
+        m.weak_form([(found.P[k] * e.detJ, F[k]) for k in range(9)])
+    return m.finish()

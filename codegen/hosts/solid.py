@@ -1,0 +1,78 @@
+"""What the hosts of materials share: words for their texts, a cell that tests the law, a block.
+
+The cell is a tetrahedron of 4 nodes. The small host has one that asks the law for stress and
+modulus as the program does; it must give the forces and the stiffness of the law in our own cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from softehl.codegen.abi import Task
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.hosts import abaqus_host as host
+from softehl.codegen.hosts import api, patch
+from softehl.codegen.hosts.interface import Interface
+from softehl.codegen.hosts.material import Measure, Response, solid
+from softehl.codegen.hosts.sample import samples
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import cells
+from softehl.codegen.pipeline import compile_model
+
+States = Callable[[Definition], Sequence[State]]
+"""States at which a page has values."""
+PULL, TWIST = 0.2, 0.3
+"""Stretch of the block in a deck, and its twist by shear."""
+
+
+def words(r: Response) -> dict[str, object]:
+    """Words of the texts of a host."""
+    small = r.measure is Measure.SMALL
+    stress, _, modulus = str(r.measure).partition(" and ")
+    rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(r.parameters)]
+    return {
+        "name": r.law.name,
+        "NAME": r.law.name.upper(),
+        "given": len(r.parameters),
+        "small": ".true." if small else ".false.",
+        "properties": "\n".join(rows) or "| | none |",
+        "stress": stress,
+        "modulus": modulus,
+        "symmetry": "symmetric" if r.symmetric else "not symmetric (`UNSYMM` in the deck)",
+        "steps": "Small strains: NLGEOM=NO." if small else "Large strains: NLGEOM=YES.",
+    }
+
+
+def tests(r: Response, states: States) -> tuple[dict[str, str], list[float]]:
+    """Files of the small host, and values of the constants."""
+    page = Interface(replace(solid(r.law), tasks=(Task.TANGENT,)))
+    found = samples(page, compile_model(page.definition), states(page.definition))
+    settings = host.settings_of(page, found[0])
+    assert page.cell is not None
+    return {
+        "tetrahedron.f90": api.template("tetrahedron.f90"),
+        "host.f90": host.program(page),
+        "samples.txt": host.sample_file(page, found),
+        "patch.txt": host.patch_file(page, patch.patch(page.cell), settings),
+    }, settings
+
+
+def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:
+    """Lines of a deck: nodes and elements of a distorted block, and what is held on its ends."""
+    mesh = patch.patch(cells.element("hex8"), count)
+    nodes = [f"{n + 1}, {', '.join(map(repr, p))}" for n, p in enumerate(mesh.points)]
+    elements = [
+        f"{n + 1}, {', '.join(str(k + 1) for k in cell)}" for n, cell in enumerate(mesh.cells)
+    ]
+    held = [f"{n + 1}, 1, 3, 0.0" for n in mesh.left]
+    for n in mesh.right:
+        _, y, z = mesh.points[n]
+        moves = (PULL, -TWIST * (z - 1.5), TWIST * (y - 1.5))
+        held += [f"{n + 1}, {k + 1}, {k + 1}, {v!r}" for k, v in enumerate(moves)]
+    return nodes, elements, held
+
+
+def constants(values: Sequence[float]) -> list[str]:
+    """Lines of *USER MATERIAL, at most 8 numbers each."""
+    return [", ".join(map(repr, values[k : k + 8])) for k in range(0, max(len(values), 1), 8)]

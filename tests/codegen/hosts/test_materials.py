@@ -1,0 +1,190 @@
+"""Materials for `abaqus` and `calculix`: closed forms, and a cell that calls them."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+
+import softehl
+from softehl.codegen.abi import TargetError
+from softehl.codegen.graph.evaluate import State, Walk
+from softehl.codegen.hosts.material import VOIGT, Measure, Response, response, solid
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.material import Law, Material
+from softehl.codegen.language.model import Model
+from softehl.codegen.tools import cli, hosts
+from softehl.codegen.tools.model_text import ModelFileError
+from softehl.codegen.tools.user import definitions
+from softehl.runtime.arrays import Array
+from tests.codegen.hosts.materials import fluid, hooke, neo, ogden_1, turned
+from tests.codegen.hosts.workshop import errors, folder, made
+
+MU, BULK = 0.4, 1.7
+F = np.array([[1.1, 0.2, -0.1], [0.05, 0.9, 0.15], [-0.2, 0.1, 1.3]])
+needs_fortran = pytest.mark.skipif(shutil.which("gfortran") is None, reason="no gfortran")
+
+
+def values(r: Response, parameters: list[float]) -> tuple[float, Array, Array]:
+    """Energy, stress and modulus at F."""
+    with mpmath.workdps(30):
+        walk = Walk(State((), F.ravel().tolist(), (), parameters), {})
+        found = [float(walk.value(n)) for _, n in r.definition.fields]
+    moduli = [[found[r.modulus(i, j)] for j in range(6)] for i in range(6)]
+    return found[0], np.array(found[1:7]), np.array(moduli)
+
+
+def voigt(C: Array) -> Array:
+    """Rows and columns of a tensor (3, 3, 3, 3) with both minor symmetries."""
+    return np.array([[C[i, j, k, m] for k, m in VOIGT] for i, j in VOIGT])
+
+
+def second() -> tuple[Array, Array]:
+    """Second Piola-Kirchhoff stress of neo-Hooke and its derivative by the Green strain."""
+    J, inverse = np.linalg.det(F), np.linalg.inv(F.T @ F)
+    S = MU * (np.eye(3) - inverse) + BULK * J * (J - 1) * inverse
+    swapped = np.einsum("ik,jl->ijkl", inverse, inverse)
+    swapped = swapped + swapped.transpose(0, 1, 3, 2)
+    outer = np.einsum("ij,kl->ijkl", inverse, inverse)
+    return S, BULK * J * (2 * J - 1) * outer + (MU - BULK * J * (J - 1)) * swapped
+
+
+def test_the_second_measure_is_the_closed_form() -> None:
+    S, C = second()
+    energy, stress, moduli = values(response(neo, Measure.SECOND), [MU, BULK])
+    J = np.linalg.det(F)
+    by_hand = MU / 2 * (np.trace(F.T @ F) - 3 - 2 * np.log(J)) + BULK / 2 * (J - 1) ** 2
+    assert energy == pytest.approx(by_hand, rel=1e-14)
+    np.testing.assert_allclose(stress, [S[p] for p in VOIGT], atol=1e-14)
+    np.testing.assert_allclose(moduli, voigt(C), atol=1e-13)
+
+
+def test_the_cauchy_measure_is_its_push_forward() -> None:
+    """With the terms of Jaumann's rate of the Kirchhoff stress."""
+    S, C = second()
+    J, one = np.linalg.det(F), np.eye(3)
+    tau = F @ S @ F.T
+    pushed = np.einsum("iI,jJ,kK,lL,IJKL->ijkl", F, F, F, F, C)
+    turning = np.einsum("ik,jl->ijkl", one, tau)
+    for order in ((1, 0, 2, 3), (0, 1, 3, 2), (1, 0, 3, 2)):
+        turning = turning + np.einsum("ik,jl->ijkl", one, tau).transpose(order)
+    _, stress, moduli = values(response(neo, Measure.CAUCHY), [MU, BULK])
+    np.testing.assert_allclose(stress, [tau[p] / J for p in VOIGT], atol=1e-14)
+    np.testing.assert_allclose(moduli, voigt(pushed + turning / 2) / J, atol=1e-13)
+
+
+@needs_fortran
+@pytest.mark.parametrize(
+    "law",
+    [neo, pytest.param(ogden_1, marks=pytest.mark.slow), fluid, hooke],
+    ids=lambda law: law.name,
+)
+def test_a_cell_of_umat_is_the_page(law: Law, tmp_path: Path) -> None:
+    folder(law, "abaqus", tmp_path)
+    done = made(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    rhs, matrix, _, differences, cut, _ = errors(done.stdout)
+    assert max(rhs, matrix) < 1e-13
+    assert differences < 1e-7
+    assert cut == 0
+    assert " 7 iterations" not in done.stdout
+
+
+@needs_fortran
+@pytest.mark.parametrize(
+    "law", [neo, pytest.param(hooke, marks=pytest.mark.slow)], ids=lambda law: law.name
+)
+def test_a_cell_of_calculix_is_the_page(law: Law, tmp_path: Path) -> None:
+    folder(law, "calculix", tmp_path)
+    done = made(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert max(errors(done.stdout)[:2]) < 1e-13
+
+
+@needs_fortran
+@pytest.mark.parametrize(
+    ("host", "name", "old", "new"),
+    [
+        ("abaqus", "umat.c", "fields[modulus[i][j]]", "1.0001 * fields[modulus[i][j]]"),
+        ("abaqus", "umat.c", "dfgrd1[i + 3 * j]", "dfgrd1[3 * i + j]"),
+        ("calculix", "calculix.c", "u[2] = 2.0 *", "u[2] = 1.0 *"),
+    ],
+)
+def test_the_cell_sees_a_fault(host: str, name: str, old: str, new: str, tmp_path: Path) -> None:
+    folder(neo, host, tmp_path)
+    text = (tmp_path / name).read_text()
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new))
+    done = made(tmp_path)
+    assert done.returncode != 0
+    assert "FAILED" in done.stdout
+
+
+def test_a_law_in_a_page_of_a_study() -> None:
+    """Uniaxial strain: P = mu (l - 1 / l) + K (l - 1)."""
+    study = softehl.Study(softehl.Mesh.box((1, 1, 1), cells=(1, 1, 1), shape="tetrahedron"))
+    study.add("body", solid(neo), mu=MU, K=BULK)
+    study.fix("left", u_x=0)
+    study.fix("right", u_x=0.3)
+    study.fix(np.arange(8), u_y=0, u_z=0)
+    pull = study.solve().reaction("right")["u_x"]
+    assert pull == pytest.approx(MU * (1.3 - 1 / 1.3) + BULK * 0.3, rel=1e-12)
+
+
+# -------------------------------------------------------------------------------- what is refused
+
+
+def test_an_energy_that_changes_with_a_rotation_is_refused() -> None:
+    with pytest.raises(TargetError, match="turned is not symmetric: its energy must not change"):
+        hosts.files(turned, "abaqus")
+
+
+def test_calculix_needs_an_energy() -> None:
+    with pytest.raises(TargetError, match="fluid gives a stress, and its modulus need not be"):
+        hosts.files(fluid, "calculix")
+
+
+def test_a_host_takes_what_it_can() -> None:
+    with pytest.raises(TargetError, match="neo is a material: target ngsolve takes elements"):
+        hosts.files(neo, "ngsolve")
+    with pytest.raises(TargetError, match="neo_tet4 is an element: target calculix takes mat"):
+        hosts.files(solid(neo), "calculix")
+
+
+def test_a_file_of_materials(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = tmp_path / "laws.py", tmp_path / "out"
+    path.write_text("from tests.codegen.hosts.materials import fluid, hooke\n")
+    with pytest.raises(ModelFileError, match="materials only, which have no kernel of their own"):
+        definitions(path)
+    assert cli.generate([path], target="calculix", out=out) == 2
+    assert [p.name for p in out.iterdir()] == ["hooke"]
+    assert "fluid gives a stress" in capsys.readouterr().err
+    assert "*MATERIAL, NAME=@HOOKE_HOOKE\n" in (out / "hooke" / "hooke.inp").read_text()
+
+
+def on_a_page(function: object) -> Material:
+    m = Model("page", nodes=1, rule=quadrature.point_rule())
+    return softehl.material(function).on(m, sp.eye(3))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("write", "message"),
+    [
+        (lambda m: m.energy(m.F[0, 0] + m.strain[0, 0]), r"uses m\.F and m\.strain: use one"),
+        (lambda m: m.F, r"has neither m\.energy\(W\) nor m\.stress\(P\)"),
+        (lambda m: m.energy(1), r"uses neither m\.F nor m\.strain"),
+        (lambda m: [m.energy(m.F[0, 0]), m.stress(m.F)], "has an energy: it cannot have a stress"),
+        (lambda m: m.stress(m.F[:, 0]), r"the stress has shape \(3, 1\), must be \(3, 3\)"),
+    ],
+)
+def test_what_a_law_must_say(write: object, message: str) -> None:
+    def law(m: Material) -> None:
+        write(m)  # type: ignore[operator]
+
+    with pytest.raises(ModelError, match=message):
+        on_a_page(law)
