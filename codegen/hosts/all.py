@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from softehl.codegen.graph.evaluate import State
-from softehl.codegen.hosts import abaqus, abaqus_material, c, calculix
+from softehl.codegen.hosts import abaqus, abaqus_material, c, calculix, jax
 from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.hosts.solid import States
 from softehl.codegen.language.material import Law
@@ -17,6 +17,7 @@ ELEMENTS: dict[str, Callable[[Interface, Sequence[State]], Files]] = {
     "c": c.c,
     "cpp": c.cpp,
     "abaqus": abaqus.uel,
+    "jax": jax.module,
 }
 """Writers of the hosts that take a page of an element, with two states for their tests."""
 

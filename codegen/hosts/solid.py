@@ -1,4 +1,4 @@
-"""What the hosts of materials share: words for their texts, a cell that tests the law, a block.
+"""Shared files of the hosts of materials: words of texts, a cell that tests the law, a block.
 
 The cell is a tetrahedron of 4 nodes. The small host has one that asks the law for stress and
 modulus as the program does; it must give the forces and the stiffness of the law in our own cell.

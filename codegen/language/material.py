@@ -23,7 +23,7 @@ from softehl.codegen.language.model import NAME, Model
 
 
 class Material:
-    """What the function of a law is given: the deformation, and calls that say what the law is."""
+    """Argument of the function of a law: the deformation, and calls that say what the law is."""
 
     def __init__(self, name: str, model: Model, F: Any) -> None:
         self.name, self.model = name, model

@@ -1,0 +1,117 @@
+"""Target `jax`: XLA operations with derivatives from the exact tangent."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+
+from softehl.codegen.abi import Task
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.hosts import api
+from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
+from softehl.codegen.hosts.interface import Interface
+from softehl.codegen.hosts.sample import Sample, samples
+
+
+def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
+    """Every file of a module for JAX."""
+    page.require("jax", Task.RESIDUAL, Task.TANGENT)
+    page = with_derivatives(page)
+    texts, kernel = api.files(page)
+    found = samples(page, kernel, states)
+    words = _words(page, found[0])
+    texts["jax_ops.cc"] = api.filled(
+        api.template("jax.cc"), {**words, "operations": "\n".join(_operations(page))}
+    )
+    parts = "".join(api.template(f"jax_{t}.py.in") for t in _parts(page))
+    module = api.template("jax.py.in").replace("@functions@\n", parts)
+    texts[f"{page.name}_jax.py"] = api.filled(module, words).rstrip() + "\n"
+    texts[f"test_{page.name}.py"] = api.filled(api.template("jax_test.py.in"), words)
+    texts["samples.json"] = _sample_file(found)
+    texts["Makefile"] = api.filled(api.template("jax.mk"), words)
+    texts["NOTES.md"] = api.filled(api.template("jax.md"), words)
+    return texts
+
+
+def with_derivatives(page: Interface) -> Interface:
+    """The page with derivatives of its residual by every parameter and datum of the element."""
+    d = page.definition
+    arrays = (("parameters", d.parameters), ("data", d.data))
+    by = [(a.name, d.graph.input(array, k)) for array, row in arrays for k, a in enumerate(row)]
+    return Interface(replace(d, derivatives=tuple(by)))
+
+
+def _parts(page: Interface) -> list[str]:
+    own = [t for t in (Task.ENERGY, Task.FIELDS) if t in page.tasks]
+    return [*own, Task.RESIDUAL]
+
+
+def _tasks(page: Interface) -> list[str]:
+    return [t for t in page.tasks if t != Task.PRODUCT]
+
+
+def _operations(page: Interface) -> list[str]:
+    """C++ of each operation."""
+    d = page.definition
+    width = {Task.ENERGY: 1, Task.FIELDS: page.points * len(d.fields)}
+    texts = []
+    for task in _tasks(page):
+        size = width.get(Task(task), len(d.unknowns)) if task in set(Task) else len(d.unknowns)
+        matrix = task == Task.TANGENT
+        second = f", K->typed_data() + e * {len(d.unknowns) ** 2}" if matrix else ""
+        texts.append(
+            f"static ffi::Error {task}(Array X, Array u, Array data, Array p, Result R"
+            f"{', Result K' if matrix else ''})\n{{\n"
+            "    return each(X, u, data, p, [&](std::size_t e, std::ptrdiff_t n, const double *X,\n"
+            "        const double *u, const double *data, const double *p) {\n"
+            f"        {page.name}_{task}(n, X, u, data, p, R->typed_data() + e * {size}{second});\n"
+            "    });\n}\n"
+            f"XLA_FFI_DEFINE_HANDLER_SYMBOL({page.name}_{task}_op, {task}, ffi::Ffi::Bind()"
+            f"{'.Arg<Array>()' * 4}{'.Ret<Array>()' * (1 + matrix)});\n"
+        )
+    return texts
+
+
+def _words(page: Interface, first: Sample) -> dict[str, object]:
+    d, sizes = page.definition, api.sizes(page)
+    has_energy = Task.ENERGY in page.tasks
+    pairs = zip(d.parameters, first.state.parameters, strict=True)
+    return {
+        "name": page.name,
+        "NAME": page.name.upper(),
+        "doc": d.doc.replace("\\", "\\\\").replace('"""', "'''") or "A page.",
+        "coordinates": sizes["NODES"] * sizes["DIMENSION"],
+        "unknowns": sizes["UNKNOWNS"],
+        "parameters": sizes["PARAMETERS"],
+        "data": sizes["DATA"] + sizes["POINTS"] * sizes["POINT_DATA"],
+        "data_count": sizes["DATA"],
+        "point_data": bool(d.point_data),
+        "points": sizes["POINTS"],
+        "field_count": sizes["FIELDS"],
+        "parameter_names": {a.name: a.meaning for a in d.parameters},
+        "data_names": {a.name: a.meaning for a in d.data},
+        "unknown_names": tuple(d.unknowns),
+        "field_names": tuple(name for name, _ in d.fields),
+        "tasks": tuple(str(t) for t in _tasks(page)),
+        "limit": LIMIT,
+        "difference": DIFFERENCE,
+        "parameters_given": ", ".join(f"{a.name}={float(v):.3g}" for a, v in pairs),
+        "derivatives": "The residual by u, p and data"
+        + ("; the energy by u, twice." if has_energy else "."),
+    }
+
+
+def _sample_file(found: Sequence[Sample]) -> str:
+    size = len(found[0].state.dofs)
+    values = {
+        "X": [list(map(float, s.state.coordinates)) for s in found],
+        "u": [list(map(float, s.state.dofs)) for s in found],
+        "data": [s.data for s in found],
+        "p": list(map(float, found[0].state.parameters)),
+        "energy": [v for s in found for v in s.energy],
+        "residual": [s.residual for s in found],
+        "tangent": [[s.tangent[k : k + size] for k in range(0, size**2, size)] for s in found],
+        "fields": [s.fields for s in found],
+    }
+    return json.dumps(values) + "\n"

@@ -1,0 +1,81 @@
+"""Target `jax`: the test of its folder, with JAX where it is installed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from softehl.codegen.abi import TargetError
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.model import Model
+from softehl.codegen.tools import hosts
+from tests.codegen.hosts.random_pages import A, B, K, page, pages
+from tests.codegen.hosts.workshop import errors, folder, made
+
+PYTHON = os.environ.get("SOFTEHL_JAX", sys.executable)
+"""A Python that has JAX."""
+
+
+def has_jax() -> bool:
+    found = subprocess.run([PYTHON, "-c", "import jax"], capture_output=True, check=False)
+    return found.returncode == 0
+
+
+needs_jax = pytest.mark.skipif(not has_jax(), reason="no JAX; SOFTEHL_JAX names a Python with it")
+
+
+def checked(d: Definition, place: Path) -> list[float]:
+    done = made(folder(d, "jax", place), PYTHON=PYTHON)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return errors(done.stdout)
+
+
+@needs_jax
+@settings(max_examples=2, derandomize=True, deadline=None,
+          suppress_health_check=[HealthCheck.too_slow])  # fmt: skip
+@given(d=pages())
+def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -> None:
+    found = checked(d, tmp_path_factory.mktemp("jax"))
+    assert max(found[:3]) < 1e-13
+    assert found[-2:] == [0.0, 0.0]
+
+
+@needs_jax
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("jax_ops.cc", "u.typed_data() + s * n * kU", "u.typed_data()"),
+        ("random_line2_jax.py", '"eij,ej->ei"', '"eji,ej->ei"'),
+    ],
+)
+def test_the_test_of_a_folder_sees_a_fault(name: str, old: str, new: str, tmp_path: Path) -> None:
+    folder(page("line2", A**2 * K, A * B, conservative=False), "jax", tmp_path)
+    text = (tmp_path / name).read_text()
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new))
+    done = made(tmp_path, PYTHON=PYTHON)
+    assert done.returncode != 0
+    assert "FAILED" in done.stdout
+
+
+def test_a_page_without_a_tangent_is_refused() -> None:
+    m = Model("force", nodes=1, rule=quadrature.point_rule())
+    u = m.unknown("u")
+    m.potential(u**2)
+    m.offer(tasks=["residual"])
+    with pytest.raises(TargetError, match="force offers no task tangent, which target jax needs"):
+        hosts.files(m.finish(), "jax")
+
+
+def test_the_module_names_what_the_page_has() -> None:
+    texts = hosts.files(page("line2", A**2 * K, A * B, conservative=True), "jax")
+    module = texts["random_line2_jax.py"]
+    compile(module, "random_line2_jax.py", "exec")
+    assert "PARAMETERS = {'k': 'a parameter'}" in module
+    assert "random_line2_d_a_old2_op" in texts["jax_ops.cc"]
