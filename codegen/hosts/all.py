@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from softehl.codegen.graph.evaluate import State
-from softehl.codegen.hosts import abaqus, abaqus_material, c, calculix, jax
+from softehl.codegen.hosts import abaqus, abaqus_material, c, calculix, jax, ngsolve
 from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.hosts.solid import States
 from softehl.codegen.language.material import Law
@@ -18,6 +18,7 @@ ELEMENTS: dict[str, Callable[[Interface, Sequence[State]], Files]] = {
     "cpp": c.cpp,
     "abaqus": abaqus.uel,
     "jax": jax.module,
+    "ngsolve": ngsolve.module,
 }
 """Writers of the hosts that take a page of an element, with two states for their tests."""
 

@@ -1,0 +1,188 @@
+"""Target `ngsolve`: an integrator of NGSolve on its own spaces, as a Python module."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any
+
+from softehl.codegen.abi import TargetError, Task
+from softehl.codegen.graph.evaluate import State
+from softehl.codegen.hosts import abaqus_host as host
+from softehl.codegen.hosts import api, patch
+from softehl.codegen.hosts.interface import Given, Interface
+from softehl.codegen.hosts.sample import Sample, samples
+from softehl.codegen.language.elements import cells
+from softehl.codegen.language.elements.cells import Element
+
+KINDS = {
+    "line2": ("ET_SEGM", 1), "line3": ("ET_SEGM", 2),
+    "tri3": ("ET_TRIG", 1), "tri6": ("ET_TRIG", 2),
+    "quad4": ("ET_QUAD", 1), "quad9": ("ET_QUAD", 2),
+    "tet4": ("ET_TET", 1), "tet10": ("ET_TET", 2),
+    "wedge6": ("ET_PRISM", 1),
+    "hex8": ("ET_HEX", 1), "hex27": ("ET_HEX", 2),
+}  # fmt: skip
+"""NGSolve's name of the cell, and the order of its space, for each kind of ours."""
+MESHES = {
+    "ET_SEGM": "Make1DMesh(5, mapping=lambda x: bent(x)[0])",
+    "ET_TRIG": "MakeStructured2DMesh(quads=False, nx=3, ny=3, mapping=bent)",
+    "ET_QUAD": "MakeStructured2DMesh(quads=True, nx=3, ny=3, mapping=bent)",
+    "ET_TET": "MakeStructured3DMesh(hexes=False, nx=2, ny=2, nz=2, mapping=bent)",
+    "ET_HEX": "MakeStructured3DMesh(hexes=True, nx=2, ny=2, nz=2, mapping=bent)",
+    "ET_PRISM": "MakeStructured3DMesh(hexes=False, prism=True, nx=2, ny=2, nz=2, mapping=bent)",
+}
+
+
+def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
+    """Every file of the integrator."""
+    kind = _kind(page)
+    texts, kernel = api.files(page, single=True)
+    words = _words(page, kind, samples(page, kernel, states)[0])
+    texts["ngsolve.cpp"] = api.filled(api.template("ngsolve.cpp"), words)
+    texts[f"test_{page.name}.py"] = api.filled(api.template("ngsolve_test.py.in"), words)
+    texts["Makefile"] = api.filled(api.template("ngsolve.mk"), words)
+    texts["NOTES.md"] = api.filled(api.template("ngsolve.md"), words)
+    return texts
+
+
+def _kind(page: Interface) -> Element:
+    """The cell of the page.  Raises `TargetError`."""
+    page.require("ngsolve", Task.TANGENT)
+    kind = page.cell
+    if kind is None or kind.name not in KINDS:
+        raise TargetError(
+            f"{page.name} has {page.definition.nodes} nodes in {page.dimension} coordinates: "
+            f"target ngsolve has spaces for {', '.join(KINDS)}"
+        )
+    missing = {
+        "unknowns of the element alone": page.free,
+        "data of points": [a.name for a in page.state],
+        "values of a step in time": [
+            s for s in (*page.parameters, *page.data) if not isinstance(s, Given)
+        ],
+    }
+    for what, found in missing.items():
+        if found:
+            raise TargetError(f"{page.name} has {what}, which target ngsolve cannot hold")
+    corners = len(_corners(kind).nodes)
+    wrong = [f.name for f in page.nodal if len(f.places) not in (corners, len(kind.nodes))]
+    if wrong:
+        raise TargetError(
+            f"{page.name}: {wrong[0]} is neither at all nodes nor at all corners, as spaces of "
+            "target ngsolve are"
+        )
+    return kind
+
+
+def _corners(kind: Element) -> Element:
+    """The cell of order 1 with the same corners."""
+    number = {"line": "2", "tri": "3", "quad": "4", "tet": "4", "wedge": "6", "hex": "8"}
+    family = kind.name.rstrip("0123456789")
+    return cells.element(family + number[family])
+
+
+def _parent(kind: Element) -> list[list[float]]:
+    """Places of the nodes in NGSolve's parent cell, between 0 and 1."""
+    scaled = {"tri": 0, "tet": 0, "wedge": 1}.get(kind.name.rstrip("0123456789"), 3)
+    rows = []
+    for place in kind.nodes:
+        first = len(place) - scaled if scaled < 3 else 0
+        rows.append([float((1 + c) / 2 if k >= first else c) for k, c in enumerate(place)])
+    return rows
+
+
+def _mirrored(row: Sequence[float]) -> list[float]:
+    return [1 - row[0]] if len(row) == 1 else [row[1], row[0], *row[2:]]
+
+
+def _space(page: Interface, order: int) -> str:
+    """The space as a line of Python."""
+    full = page.definition.nodes
+    parts = []
+    for count, group in groupby(page.nodal, lambda f: len(f.places)):
+        names = list(group)
+        degree = order if count == full else 1
+        while names:
+            vector = len(names) >= page.dimension > 1
+            parts.append(f"ng.{'VectorH1' if vector else 'H1'}(mesh, order={degree})")
+            names = names[page.dimension if vector else 1 :]
+    return " * ".join(parts)
+
+
+def _words(page: Interface, kind: Element, first: Sample) -> dict[str, object]:
+    d, (name, order) = page.definition, KINDS[kind.name]
+    parent = _parent(kind)
+    pairs = zip(page.given, host.settings_of(page, first), strict=True)
+    settings = {a.name: v for a, v in pairs}
+    has_energy, has_residual = (t in page.tasks for t in (Task.ENERGY, Task.RESIDUAL))
+    return {
+        "name": page.name,
+        "NAME": page.name.upper(),
+        "kind": name,
+        "cell": kind.name,
+        "names": len(page.nodal),
+        "unknowns": ", ".join(f.name for f in page.nodal),
+        "nodes": ",\n".join(_braces([parent, [_mirrored(r) for r in parent]])),
+        "counts": ", ".join(str(len(f.places)) for f in page.nodal),
+        "places": ",\n".join(f"    {{{', '.join(map(str, f.places))}}}" for f in page.nodal),
+        "symmetric": "true" if page.symmetric else "false",
+        "symmetry": ", symmetric=True" if page.symmetric else "",
+        "residual": f"{page.name}_residual(1, e.X, e.u, e.data, e.p, R);"
+        if has_residual
+        else f"double K[U * U];\n        {page.name}_tangent(1, e.X, e.u, e.data, e.p, R, K);",
+        "energy": f"const Element e = Read(fel, trafo, &elx, lh);\n        double value;\n"
+        f"        {page.name}_energy(1, e.X, e.u, e.data, e.p, &value);\n        return value;"
+        if has_energy
+        else f'throw Exception("{page.name} has no energy");',
+        "parameters": ", ".join(f'"{a.name}"' for a in d.parameters),
+        "constants": ", ".join(f'"{a.name}"' for a in d.data),
+        "arguments": ", ".join(f"{k}={v:.3g}" for k, v in settings.items()),
+        **_of_test(page, kind, first),
+        "settings": settings,
+        "space": _space(page, order),
+        "mesh": MESHES[name],
+        "order": order,
+    }
+
+
+def _of_test(page: Interface, kind: Element, first: Sample) -> dict[str, Any]:
+    d, corner = page.definition, _corners(kind)
+    weights = [[float(N) for N in corner.shape(*place)] for place in kind.nodes]
+    image = [tuple(_mirrored([float(c) for c in p])) for p in corner.nodes]
+    own = [tuple(float(c) for c in p) for p in corner.nodes]
+    mirror = [own.index(p) for p in image] if page.dimension > 1 else [1, 0]
+    edges = [_neighbour(own, k) for k in range(page.dimension)]
+    return {
+        "dimension": page.dimension,
+        "nodes_count": d.nodes,
+        "unknowns_count": len(d.unknowns),
+        "corners": weights,
+        "place_lists": [list(f.places) for f in page.nodal],
+        "mirror": mirror,
+        "jacobian": f"np.array([X[k] - X[0] for k in {edges}])[:, :DIM]",
+        "rest": patch.starts(page),
+        "size": 0.02,
+        "parameter_values": [float(v) for v in first.state.parameters],
+        "data_values": [float(v) for v in first.state.data],
+    }
+
+
+def _neighbour(places: Sequence[tuple[float, ...]], direction: int) -> int:
+    """The corner that lies from the first one along a direction."""
+    return next(
+        n
+        for n, p in enumerate(places)
+        if p[direction] > places[0][direction]
+        and all(a == b for k, (a, b) in enumerate(zip(p, places[0], strict=True)) if k != direction)
+    )
+
+
+def _braces(tables: Sequence[Sequence[Sequence[float]]]) -> list[str]:
+    """Rows of C, filled to three coordinates."""
+    return [
+        "    {" + ", ".join(
+            "{" + ", ".join(repr(float(c)) for c in [*row, 0, 0][:3]) + "}" for row in rows
+        ) + "}"
+        for rows in tables
+    ]  # fmt: skip
