@@ -63,8 +63,8 @@ interpolated field keeps 8 (ndof + ndof^2) bytes a lane on the stack.  The lanes
 extensions of gcc >= 12 and clang; another compiler, or `-DSOFTEHL_LANES=1`, gets groups of one
 element from the same source.
 `scalar`: the functions above, one element after another, plain C11.
-`ufcx`: one cell at a time for DOLFINx custom kernels.  The tasks `energy`, `residual`, `tangent`
-and `d_NAME` of a family become functions `softehl_NAME_TASK_ufcx` of UFCx's type,
+`ufcx`: one cell at a time for DOLFINx custom kernels.  The tasks `energy`, `residual`, `tangent`,
+`d_NAME` and `fields` of a family become functions `softehl_NAME_TASK_ufcx` of UFCx's type,
 
     void f(double *A, const double *w, const double *c, const double *coordinate_dofs,
            const int *entity_local_index, const uint8_t *quadrature_permutation,
@@ -73,8 +73,10 @@ and `d_NAME` of a family become functions `softehl_NAME_TASK_ufcx` of UFCx's typ
 | argument                 | shape              | meaning                                        |
 |--------------------------|--------------------|------------------------------------------------|
 | `A`                      | 1, ndof, ndof*ndof | **accumulated** (UFCx adds, the caller clears):|
-|                          |                    | energy, residual, or tangent row-major         |
-| `w`                      | ndof + ndata       | unknowns of the cell, then its data            |
+|                          | points * nfields   | energy, residual, tangent row-major, or fields |
+|                          |                    | point by point, as an expression               |
+| `w`                      | ndof + ndata +     | unknowns of the cell, then its data, then those|
+|                          | points * npoint    | of its points, point by point                  |
 | `c`                      | nparameters        | parameters, in the manifest's order            |
 | `coordinate_dofs`        | nodes, 3           | vertices (x, y, z); the plane ones read (x, y) |
 | `entity_local_index`     |                    | not read, may be NULL                          |

@@ -103,7 +103,9 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     functions = {t: compile_task(definition, t, target) for t in tasks}
     if target is Target.UFCX:
         texts = [f.text for f in functions.values()]
-        return KernelSource(definition, emit_ufcx.source(definition, texts), functions)
+        used = dict.fromkeys(r for f in functions.values() for r in f.routines)
+        before = emit_routines.texts(definition, used)
+        return KernelSource(definition, emit_ufcx.source(definition, texts, before), functions)
     design = [f for t, f in functions.items() if t in DESIGN]
     others = [f for t, f in functions.items() if t not in DESIGN]
     text, more = _file(definition, others), _file(definition, design) if design else ""

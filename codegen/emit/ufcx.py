@@ -12,10 +12,12 @@ from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
 from softehl.codegen.emit import support as support_c
 from softehl.codegen.emit.printer import Printer, number
+from softehl.codegen.emit.routines import called
 from softehl.codegen.emit.schedule import Loop, Schedule
-from softehl.codegen.graph.graph import Input, Node, Op
-from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.graph.graph import Input, Node
 from softehl.codegen.language.definition import Definition
+
+_NOT_OFFERED = (abi.Task.PRODUCT, abi.Task.PSEUDO_LOAD, abi.Task.FIELDS_RATE)
 
 
 def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
@@ -25,11 +27,6 @@ def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
             f"{d.name} interpolates {d.interpolated} with any number of unknowns: target ufcx "
             "needs a fixed number, use simd or scalar"
         )
-    if d.point_data or any(n.op is Op.CALL for n in reachable([d.potential])):
-        raise abi.TargetError(
-            f"{d.name} has local unknowns, stretches or data per point, which target ufcx cannot "
-            "hold: use simd or scalar"
-        )
     if (d.nodes, d.rule.dimension) not in abi.VERTEX_ORDER:
         known = ", ".join(f"{n} in {k}-D" for n, k in abi.VERTEX_ORDER)
         raise abi.TargetError(
@@ -37,7 +34,7 @@ def tasks(d: Definition, offered: Iterable[str]) -> list[str]:
             f"Lagrange elements of as many nodes as {known}: choose one of them, or use simd or "
             "scalar"
         )
-    return [t for t in offered if t not in (*abi.ROLLED, abi.Task.PRODUCT)]
+    return [t for t in offered if t not in _NOT_OFFERED]
 
 
 def chosen(entries: Sequence[Entry], task: str) -> list[Entry]:
@@ -80,6 +77,9 @@ class _CellPrinter(Printer):
                 return f"w[{self.places[k]}]"
             case "data":
                 return f"w[{len(self.places) + k}]"
+            case "point data":
+                start, width = len(self.places) + len(self.d.data), len(self.d.point_data)
+                return f"w[{start} + {width} * q + {k}]"
             case "parameters":
                 return f"c[{k}]"
         return f"rule[{self.d.rule.dimension + 1} * q + {k}]"
@@ -94,14 +94,21 @@ def function(
     p.line(1, "(void)entity_local_index, (void)quadrature_permutation, (void)custom_data;")
     if any(stage.loop is not None for stage in plan.stages):
         _table(p)
+    fallible = bool(called([x.node for x in entries]))
+    if fallible:
+        p.line(1, "int failed = 0;")
+    values = {} if task == abi.Task.FIELDS else {_target(p, task, x): x.node for x in entries}
     for stage in plan.stages:
         p.block(1, stage.before)
         if stage.loop is not None:
-            _loop(p, stage.loop)
-    zero = definition.graph.zero
-    outputs = {_target(p, task, x): x.node for x in entries if x.node is not zero}
-    for k in sorted(outputs):
-        p.line(1, f"A[{k}] += {p.ref(outputs[k])};")
+            _loop(p, stage.loop, entries if task == abi.Task.FIELDS else [])
+    if task == abi.Task.FIELDS:
+        _same_at_all_points(p, entries)
+    for k in sorted(values):
+        if values[k] is not definition.graph.zero:
+            p.line(1, f"A[{k}] += {p.ref(values[k])};")
+    if fallible:
+        _mark(p, task)
     declaration = abi.ufcx_declaration(definition.name, task)
     body = "\n".join(p.lines)
     return f"{declaration};\n\n{declaration}\n{{\n{body}\n}}\n", p.temporaries
@@ -125,26 +132,62 @@ def _table(p: Printer) -> None:
     p.line(1, "};")
 
 
-def _loop(p: Printer, loop: Loop) -> None:
+def _loop(p: Printer, loop: Loop, fields: Sequence[Entry]) -> None:
+    """The loop over the points; `fields` are stored in it."""
     for s in loop.sums:
         p.line(1, f"double {p.fresh(s, 's')} = 0.0;")
     p.line(1, f"for (int q = 0; q < {len(p.d.rule.weights)}; ++q) {{")
     p.block(2, loop.body)
     for s in loop.sums:
         p.line(2, f"{p.ref(s)} += {p.ref(s.args[0])};")
+    for x in fields:
+        if x.node in loop.outputs:
+            _store(p, 2, x)
     p.line(1, "}")
 
 
-def source(definition: Definition, functions: Iterable[str]) -> str:
-    """The C file of a kernel family."""
+def _store(p: Printer, depth: int, x: Entry) -> None:
+    p.line(depth, f"A[{len(p.d.fields)} * q + {x.row.position}] += {p.ref(x.node)};")
+
+
+def _same_at_all_points(p: Printer, entries: Sequence[Entry]) -> None:
+    """Fields that do not vary with the point."""
+    fixed = [x for x in entries if not x.node.varying]
+    if fixed:
+        p.line(1, f"for (int q = 0; q < {len(p.d.rule.weights)}; ++q) {{")
+        for x in fixed:
+            _store(p, 2, x)
+        p.line(1, "}")
+
+
+def _mark(p: _CellPrinter, task: str) -> None:
+    """A routine without a result spoils the whole cell."""
+    size = len(p.places)
+    sizes = {
+        abi.Task.ENERGY: 1,
+        abi.Task.TANGENT: size**2,
+        abi.Task.FIELDS: len(p.d.rule.weights) * len(p.d.fields),
+    }
+    count = sizes.get(abi.Task(task), size) if task in set(abi.Task) else size
+    p.line(1, "if (failed)")
+    p.line(2, f"for (int k = 0; k < {count}; ++k) A[k] = NAN;")
+
+
+def source(definition: Definition, functions: Iterable[str], before: Iterable[str] = ()) -> str:
+    """The C file of a kernel family; `before` are the routines that its functions call."""
     head = [_banner(definition), "#include <math.h>", "#include <stdint.h>", support_c.ROOTS]
-    return "\n".join([*head, *functions])
+    return "\n".join([*head, *before, *functions])
 
 
 def _banner(d: Definition) -> str:
     at = dict(zip(places(d), d.unknowns, strict=True))
     rows = [f"w[{k}]  {at[k]}" for k in sorted(at)]
     rows += [f"w[{len(at) + k}]  {a.name}: {a.meaning}" for k, a in enumerate(d.data)]
+    first, width = len(at) + len(d.data), len(d.point_data)
+    rows += [
+        f"w[{first + k} + {width} q]  {a.name}: {a.meaning}" for k, a in enumerate(d.point_data)
+    ]
+    rows += [f"A[{k} + {len(d.fields)} q]  {name}" for k, (name, _) in enumerate(d.fields)]
     rows += [f"c[{k}]  {a.name}: {a.meaning}" for k, a in enumerate(d.parameters)]
     order = ", ".join(f"{a + 1} at {v}" for a, v in enumerate(vertices(d)))
     lines = [f"{d.name}: {d.doc}", "", f"nodes and their vertices: {order}", *rows]

@@ -25,6 +25,7 @@ from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.kernels import load_kernel
 from tests.codegen.cell_kernels import TENSOR, CellKernels, Plane, cell_kernels, distorted
 from tests.codegen.element_states import MATERIALS, Case, all_cases
+from tests.codegen.pages.maxwell import maxwell
 from tests.codegen.workshop import compiled
 from tests.shipped import SHIPPED
 
@@ -186,9 +187,9 @@ def test_an_interpolated_field_is_refused() -> None:
         pipeline.compile_model(ALL["film"](), Target.UFCX)
 
 
-def test_fields_and_products_are_not_offered() -> None:
+def test_products_and_sensitivities_are_not_offered() -> None:
     tasks = pipeline.compile_model(ALL["solid_q4"](), Target.UFCX).functions
-    assert list(tasks) == ["energy", "residual", "tangent"]
+    assert list(tasks) == ["energy", "residual", "tangent", "fields"]
 
 
 def hexahedron() -> Definition:
@@ -208,3 +209,33 @@ def test_the_vertices_of_a_hexahedron() -> None:
         assert f" * w[{vertex}]  u{node + 1}\n" in text
         assert f"coordinate_dofs[{3 * vertex + 2}]" in text
     assert not re.search(r"coordinate_dofs\[\d*[^258\d]\]", text)
+
+
+def test_local_unknowns_and_data_of_points(tmp_path: Path) -> None:
+    """Viscous strains are found in the cell; their old values are coefficients."""
+    d = maxwell()
+    kernels, batch = cell_kernels(d, tmp_path), compiled(d, tmp_path)
+    rng = np.random.default_rng(3)
+    plane = distorted(rng)
+    X = plane.points[plane.cells[:1]].reshape(1, 8)
+    u, p = 0.02 * rng.uniform(-1, 1, (1, 8)), [0.4, 2.0, 0.3, 1.5, 0.2]
+    old = 1 + 0.02 * rng.uniform(-1, 1, (1, 4, 4)) * [1, 1, 1, 0] - [0, 0, 0, 1]
+    given: dict[str, Any] = {"point_data": old, "parameters": p}
+    at = (2 * np.array(TENSOR)[:, None] + np.arange(2)).ravel()
+    w, vertices = np.empty(8), np.zeros((4, 3))
+    w[at], vertices[list(TENSOR), :2] = u[0], X.reshape(4, 2)
+    R, K = batch.tangent(X, u, **given)
+    A, b, fields = np.zeros((8, 8)), np.zeros(8), np.zeros((4, 4))
+    for task, out in (("tangent", A), ("residual", b), ("fields", fields)):
+        kernels.add(task, out, [*w, *old.ravel()], p, vertices)
+    assert close(A[np.ix_(at, at)], K[0])
+    assert close(b[at], R[0])
+    assert close(fields, batch.fields_at(X, u, **given)[0])
+
+
+def test_a_cell_without_a_solution_is_not_a_number(tmp_path: Path) -> None:
+    kernels = cell_kernels(maxwell(), tmp_path)
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], dtype=float)
+    A = np.zeros((8, 8))
+    kernels.add("tangent", A, [*np.zeros(8), *np.full(16, -1e3)], [0.4, 2, 0.3, 1.5, 0.2], vertices)
+    assert np.isnan(A).all()
