@@ -18,7 +18,7 @@ OTHERS ?= python3.13 python3.12 $(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/py
 MPI_PYTHONS ?= python3.12 $(wildcard $(HOME)/.pyenv/versions/3.12.*/bin/python) python3.13 \
 	$(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python) $(PYTHON)
 
-.PHONY: help oring test test-other mpi mpi-tests slow torture wheel lint check format docs pictures clean
+.PHONY: help oring test test-other mpi mpi-tests hosts hosts-tests slow torture wheel lint check format docs pictures clean
 
 help:
 	@echo "make oring    solve the O-ring and write its film-thickness curve to $(OUT)"
@@ -27,6 +27,7 @@ help:
 	@echo "make wheel    build the wheel, install it elsewhere and use it, with and without compiler"
 	@echo "make test-other    the test suite on a second Python, where one is installed"
 	@echo "make mpi      the engine petsc on 1, 2 and 3 processes, where Python >= 3.12 is installed"
+	@echo "make hosts    JAX, NGSolve and CalculiX with generated pages; CalculiX where apt-get builds it"
 	@echo "make lint     ruff and mypy; make check: lint and test"
 	@echo "make docs     the pages of docs/ as a site, in build/docs"
 	@echo "make clean    remove the environment and everything built"
@@ -70,6 +71,16 @@ mpi-tests: $(VENV)/.mpi $(VENV)/.kernels
 	$(BIN)/python -m pytest -m mpi tests/mpi
 	$(BIN)/python -m pytest tests/codegen/test_dolfinx.py
 
+# other programs: JAX and NGSolve from wheels in an environment of their own, CalculiX from source
+hosts:
+	@exec $(MAKE) hosts-tests VENV=.venv-hosts
+
+hosts-tests: $(VENV)/.hosts $(VENV)/.kernels
+	@mkdir -p build/ccx
+	PATH="$(CURDIR)/$(BIN):$$PATH" \
+	  SOFTEHL_CCX="$$($(BIN)/python -m tests.codegen.hosts.ccx build/ccx)" \
+	  $(BIN)/python -m pytest -rs tests/codegen/hosts -m "slow or not slow"
+
 # faults from outside, at most 15 minutes; writes its table into docs/reliability.md
 torture: $(VENV)/.dev $(VENV)/.kernels
 	$(BIN)/python -m tests.torture 15 docs/reliability.md
@@ -96,7 +107,7 @@ pictures: $(VENV)/.kernels
 	PYTHONPATH=. $(BIN)/python docs/gallery/pictures.py
 
 clean:
-	rm -rf $(VENV) .venv-other .venv-mpi build dist src/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-other .venv-mpi .venv-hosts build dist src/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find codegen generated runtime cases tests -name __pycache__ -prune -exec rm -rf {} +
 	rm -f generated/*.so generated/*.sha256
 
@@ -119,6 +130,10 @@ $(VENV)/.dev: $(VENV)/.installed
 
 $(VENV)/.mpi: $(VENV)/.dev
 	$(PIP) install --editable '.[dev,mpi]'
+	@touch $@
+
+$(VENV)/.hosts: $(VENV)/.dev
+	$(PIP) install --editable '.[dev,hosts]'
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.installed
