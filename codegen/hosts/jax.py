@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from softehl.codegen.abi import Task
 from softehl.codegen.graph.evaluate import State
-from softehl.codegen.hosts import api
+from softehl.codegen.hosts import api, patch
 from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
 from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.hosts.sample import Sample, samples
@@ -28,6 +28,9 @@ def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
     module = api.template("jax.py.in").replace("@functions@\n", parts)
     texts[f"{page.name}_jax.py"] = api.filled(module, words).rstrip() + "\n"
     texts[f"test_{page.name}.py"] = api.filled(api.template("jax_test.py.in"), words)
+    texts["equilibrium.py"] = api.filled(api.template("equilibrium.py.in"), words)
+    if page.cell is not None and page.nodal and not page.free:
+        texts["patch.json"] = _patch_file(page)
     texts["samples.json"] = _sample_file(found)
     texts["Makefile"] = api.filled(api.template("jax.mk"), words)
     texts["NOTES.md"] = api.filled(api.template("jax.md"), words)
@@ -113,5 +116,25 @@ def _sample_file(found: Sequence[Sample]) -> str:
         "residual": [s.residual for s in found],
         "tangent": [[s.tangent[k : k + size] for k in range(0, size**2, size)] for s in found],
         "fields": [s.fields for s in found],
+    }
+    return json.dumps(values) + "\n"
+
+
+def _patch_file(page: Interface) -> str:
+    """A patch of cells: places, numbers of unknowns, and what is held."""
+    assert page.cell is not None
+    mesh = patch.patch(page.cell)
+    number, fixed, rest = patch.numbers(page, mesh), patch.held(page, mesh), patch.starts(page)
+    dofs = [[0] * len(page.definition.unknowns) for _ in mesh.cells]
+    for row, cell in zip(dofs, mesh.cells, strict=True):
+        for k, f in enumerate(page.nodal):
+            for node, place in enumerate(f.places):
+                row[place] = number[cell[node], k]
+    values = {
+        "X": [[c for n in cell for c in mesh.points[n]] for cell in mesh.cells],
+        "dofs": dofs,
+        "fixed": [number[h.node, h.field] for h in fixed],
+        "values": [h.value for h in fixed],
+        "start": [rest[k] for _, k in number],
     }
     return json.dumps(values) + "\n"

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import sympy as sp
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 
 from softehl.codegen.language import kinematics
@@ -16,6 +17,14 @@ from softehl.codegen.language.elements.cells import element
 from softehl.codegen.language.model import Model
 from tests.codegen.random_models import expressions
 
+FEW = settings(
+    max_examples=3,
+    derandomize=True,
+    deadline=None,
+    phases=(Phase.generate,),
+    suppress_health_check=[HealthCheck.too_slow],
+)
+"""Three pages, each of which is compiled twice; shrinking one would take minutes."""
 CELLS = ("line2", "tri3", "quad4", "tri6")
 A, B, K, C, H = sp.symbols("a_here b_here k c h_old", real=True)
 

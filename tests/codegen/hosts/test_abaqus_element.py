@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 import softehl
 from softehl.codegen.abi import TargetError
@@ -19,7 +19,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import hosts, user
-from tests.codegen.hosts.random_pages import A, B, page, pages
+from tests.codegen.hosts.random_pages import FEW, A, B, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made
 
 ROOT = Path(__file__).parents[3]
@@ -123,8 +123,7 @@ def test_the_host_sees_a_fault(old: str, new: str, tmp_path: Path) -> None:
 
 
 @needs_fortran
-@settings(max_examples=3, derandomize=True, deadline=None,
-          suppress_health_check=[HealthCheck.too_slow])  # fmt: skip
+@FEW
 @given(d=pages())
 def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -> None:
     place = folder(d, "abaqus", tmp_path_factory.mktemp("uel"))

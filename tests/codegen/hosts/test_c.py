@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from softehl.codegen.abi import TargetError
 from softehl.codegen.hosts.interface import Before, Given, Interface, Timed
@@ -17,7 +17,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cli, hosts, samples
 from softehl.runtime.arrays import Array
-from tests.codegen.hosts.random_pages import A, K, page, pages
+from tests.codegen.hosts.random_pages import FEW, A, K, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made
 from tests.codegen.workshop import compiled
 
@@ -74,8 +74,7 @@ def called(library: ctypes.CDLL, d: Definition, arrays: list[Array]) -> tuple[Ar
     return R, K
 
 
-@settings(max_examples=3, derandomize=True, deadline=None,
-          suppress_health_check=[HealthCheck.too_slow])  # fmt: skip
+@FEW
 @given(d=pages())
 def test_random_pages_give_what_their_python_kernels_give(
     d: Definition, tmp_path_factory: pytest.TempPathFactory
