@@ -7,13 +7,16 @@ from collections.abc import Callable, Sequence
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.hosts import abaqus, abaqus_material, c, calculix, jax, ngsolve
 from softehl.codegen.hosts.interface import Interface
+from softehl.codegen.hosts.material import point
 from softehl.codegen.hosts.solid import States
 from softehl.codegen.language.material import Law
 
 Files = dict[str, str]
 """Text of each file of a folder, by its name."""
 
-ELEMENTS: dict[str, Callable[[Interface, Sequence[State]], Files]] = {
+Element = Callable[[Interface, Sequence[State]], Files]
+"""Writer of the files of a page, with states for their tests."""
+ELEMENTS: dict[str, Element] = {
     "c": c.c,
     "cpp": c.cpp,
     "abaqus": abaqus.uel,
@@ -22,9 +25,23 @@ ELEMENTS: dict[str, Callable[[Interface, Sequence[State]], Files]] = {
 }
 """Writers of the hosts that take a page of an element, with two states for their tests."""
 
+
+def _at_a_point(write: Element) -> Callable[[Law, States], Files]:
+    """A writer of elements for materials: a page of one point, with stress and modulus."""
+
+    def files(law: Law, states: States) -> Files:
+        page = Interface(point(law))
+        return write(page, states(page.definition))
+
+    return files
+
+
 MATERIALS: dict[str, Callable[[Law, States], Files]] = {
     "abaqus": abaqus_material.umat,
     "calculix": calculix.library,
+    "c": _at_a_point(c.c),
+    "cpp": _at_a_point(c.cpp),
+    "jax": _at_a_point(jax.module),
 }
 """Writers of the hosts that take a material, with a function that gives states for their tests."""
 HOSTS = tuple(dict.fromkeys([*ELEMENTS, *MATERIALS]))

@@ -189,6 +189,27 @@ def checked(r: Response, states: Sequence[State]) -> Response:
     return replace(r, definition=replace(d, fields=fields))
 
 
+def point(law: Law) -> Definition:
+    """The law as a page of one point: the residual is its stress, the tangent its modulus."""
+    small = is_small(law)
+    told = "Unknowns: strains (shears twice), residual: stress, tangent: modulus."
+    if not small:
+        told = "Unknowns: F row by row, residual: first Piola-Kirchhoff stress P, tangent: dP/dF."
+    m = Model(law.name, nodes=1, rule=quadrature.point_rule(), doc=f"{law.doc} {told}")
+    if small:
+        unknowns = [m.unknown(f"e{i + 1}{j + 1}") for i, j in VOIGT]
+        F = sp.eye(3) + _tensor(unknowns)
+    else:
+        unknowns = [m.unknown(f"F{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)]
+        F = sp.Matrix(3, 3, unknowns)
+        m.example(F11=1, F22=1, F33=1)
+    found = law.on(m, F)
+    stress = [found.P[p] for p in VOIGT] if small and found.P is not None else found.P
+    P = [] if stress is None else [m.define(f"P_{k}", v) for k, v in enumerate(stress)]
+    _close(m, found, P, unknowns)
+    return m.finish()
+
+
 def solid(law: Law, name: str = "tet4") -> Definition:
     """The law in a standard cell of three dimensions with displacements."""
     kind = cells.element(name)

@@ -106,6 +106,14 @@ def test_a_cell_of_calculix_is_the_page(law: Law, tmp_path: Path) -> None:
     assert max(errors(done.stdout)[:2]) < 1e-13
 
 
+@pytest.mark.parametrize("law", [neo, fluid, hooke], ids=lambda law: law.name)
+def test_a_law_in_c_has_stress_and_modulus(law: Law, tmp_path: Path) -> None:
+    done = made(folder(law, "c", tmp_path))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert max(errors(done.stdout)[:3]) < 1e-13
+    assert "tangent by differences of residual" in done.stdout
+
+
 @needs_fortran
 @pytest.mark.parametrize(
     ("host", "name", "old", "new"),
