@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from softehl.codegen.abi import TargetError, Task
+from softehl.codegen.emit.printer import number
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import api, patch
@@ -57,6 +58,8 @@ def _words(page: Interface) -> dict[str, object]:
         "given": len(page.given),
         "order": ", ".join(map(str, page.by_node())),
         "arguments": "".join(_arguments(page)),
+        "conditions": "".join(_conditions(page)),
+        "required": "; ".join(f"{c.name} {c.relation} {c.bound:g}" for c in d.conditions) or "none",
         "outputs": "".join(_outputs(page)),
         "history": "".join(_history(page)),
         "properties": "\n".join(rows) or "| | none |",
@@ -76,6 +79,18 @@ def _arguments(page: Interface) -> Iterable[str]:
     for array, sources in (("p", page.parameters), ("data", page.data)):
         for k, source in enumerate(sources):
             yield f"    {array}[{k}] = {_argument(page, source)};\n"
+
+
+def _conditions(page: Interface) -> Iterable[str]:
+    """Lines of C that refuse arguments which the page does not allow."""
+    d = page.definition
+    rows = (("p", d.parameters), ("data", d.data))
+    places = {a.name: f"{array}[{k}]" for array, row in rows for k, a in enumerate(row)}
+    for c in d.conditions:
+        yield (
+            f"    if (!({places[c.name]} {c.relation} {number(c.bound)}))\n"
+            f'        refuse(*jelem, "{c.name} {c.relation} {c.bound:g} is required");\n'
+        )
 
 
 def _argument(page: Interface, source: Source) -> str:

@@ -81,7 +81,7 @@ void uel_(double *rhs, double *amatrx, double *svars, double *energy, const int 
             X[@NAME@_DIMENSION * node + c] = coords[*mcrd * node + c];
     for (int i = 0; i < UNKNOWNS; ++i)
         u[order[i]] = U[i];
-@arguments@    for (int k = 0; k < STATE; ++k)
+@arguments@@conditions@    for (int k = 0; k < STATE; ++k)
         data[@NAME@_DATA + k] = svars[k];
 
     @name@_tangent(1, X, u, data, p, R, K);

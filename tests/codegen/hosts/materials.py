@@ -33,7 +33,7 @@ def fluid(m: Material) -> None:
     J = m.define("J", m.F.det())
     inverse = m.define("inverse", m.F.adjugate() / J)
     B = m.F * m.F.T
-    tau = k * (B - sp.eye(3)) + a * B.trace() * B * B
+    tau = k * (B - sp.eye(3)) + a * J * B
     m.stress(tau * inverse.T)
 
 

@@ -144,6 +144,21 @@ def test_an_unknown_of_the_element_is_refused() -> None:
         hosts.files(m.finish(), "abaqus")
 
 
+@needs_fortran
+def test_a_property_that_the_page_does_not_allow_ends_the_analysis(tmp_path: Path) -> None:
+    m = Model("link", nodes=2, rule=quadrature.gauss(1, 1))
+    (X,), (u,) = m.coordinates("X"), m.nodal_unknowns("u")
+    (k,) = m.parameters(k="stiffness [N]")
+    m.require(k > 0)
+    m.potential(k * (u[1] - u[0]) ** 2 / (X[1] - X[0]))
+    folder(m.finish(), "abaqus", tmp_path)
+    assert made(tmp_path).returncode == 0
+    patched(tmp_path, 0.05, p0=-1.0)
+    done = subprocess.run([tmp_path / "host"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "link, element 1: k > 0 is required" in done.stderr
+
+
 def test_the_deck_has_what_the_page_needs() -> None:
     deck = hosts.files(page("tri6", A**2, A**3, conservative=False), "abaqus")["random_tri6.inp"]
     assert "TYPE=U1, NODES=6, COORDINATES=2, PROPERTIES=2, VARIABLES=9, UNSYMM\n" in deck
