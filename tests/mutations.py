@@ -340,6 +340,25 @@ FAULTS = (
         "volume * 1e5 / travel",
         "tests/cases/test_answer.py",
     ),
+    # other programs
+    Fault(
+        "codegen/hosts/material.py",
+        'F = m.define("F", (sp.eye(3) + E) * F0)',
+        'F = m.define("F", F0 * (sp.eye(3) + E))',
+        "tests/codegen/hosts/test_materials.py",
+    ),
+    Fault(
+        "codegen/hosts/abaqus.py",
+        'return f"-(U[{i}] - du[{i}]) * {rate}" if is_rate else f"U[{i}] - du[{i}]"',
+        'return f"-(U[{i}] - du[{i}]) * {rate}" if is_rate else f"U[{i}]"',
+        "tests/codegen/hosts/test_abaqus_element.py",
+    ),
+    Fault(
+        "codegen/hosts/templates/calculix.c",
+        "stress[i] = fields[1 + i] - beta[i];",
+        "stress[i] = fields[i] - beta[i];",
+        "tests/codegen/hosts/test_materials.py",
+    ),
 )
 
 
