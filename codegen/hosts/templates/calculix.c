@@ -51,7 +51,7 @@ void @FUNCTION@(const char *amat, const int *iel, const int *iint, const int *ko
     if (*iorien > 0)
         refuse(*iel, "takes no *ORIENTATION");
 @deformation@    @name@_fields(1, NULL, u, NULL, props, fields);
-    if (!finite_numbers(fields, FIELDS)) {
+    if (!finite_numbers(u, @NAME@_UNKNOWNS) || !finite_numbers(fields, FIELDS)) {
         *pnewdt = 0.25; /* CalculiX begins the increment again, with this part of its length */
         return;
     }

@@ -86,8 +86,8 @@ void uel_(double *rhs, double *amatrx, double *svars, double *energy, const int 
 
     @name@_tangent(1, X, u, data, p, R, K);
     double fields[OUTPUT + 1] = {0.0}, stored[1] = {0.0};
-@outputs@    if (!finite_numbers(R, UNKNOWNS) || !finite_numbers(K, UNKNOWNS * UNKNOWNS)
-        || !finite_numbers(fields, OUTPUT)) {
+@outputs@    if (!finite_numbers(u, UNKNOWNS) || !finite_numbers(R, UNKNOWNS)
+        || !finite_numbers(K, UNKNOWNS * UNKNOWNS) || !finite_numbers(fields, OUTPUT)) {
         *pnewdt = 0.25; /* Abaqus begins the increment again, with this part of its length */
         for (int i = 0; i < UNKNOWNS; ++i)
             amatrx[i + UNKNOWNS * i] = 1.0;

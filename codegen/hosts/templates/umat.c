@@ -59,7 +59,7 @@ void umat_(double *stress, double *statev, double *ddsdde, double *sse, double *
     if (*nprops < GIVEN)
         refuse(*noel, "*USER MATERIAL needs CONSTANTS=@given@");
 @deformation@    @name@_fields(1, NULL, u, NULL, props, fields);
-    if (!finite_numbers(fields, FIELDS)) {
+    if (!finite_numbers(u, @NAME@_UNKNOWNS) || !finite_numbers(fields, FIELDS)) {
         *pnewdt = 0.25; /* Abaqus begins the increment again, with this part of its length */
         memset(ddsdde, 0, sizeof(double) * (size_t)(*ntens * *ntens));
         for (int i = 0; i < *ntens; ++i)

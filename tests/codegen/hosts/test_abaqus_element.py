@@ -18,6 +18,7 @@ from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
+from softehl.codegen.models import ALL
 from softehl.codegen.tools import hosts, user
 from tests.codegen.hosts.random_pages import FEW, A, B, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made
@@ -83,6 +84,7 @@ def test_a_large_compression_is_cut_and_ends_as_a_study_does(tmp_path: Path) -> 
     assert done.returncode == 0, done.stdout + done.stderr
     assert max(errors(done.stdout)[:3]) < 1e-13
     assert "increment cut" in done.stdout
+    assert "the patch is solved" in done.stdout
     assert off(d, study(d, -0.9, mu=0.4, lame=1.2).solve(steps=6, newton=TIGHT), tmp_path) < 1e-12
 
 
@@ -95,6 +97,7 @@ def test_history_is_committed_and_rolled_back(tmp_path: Path) -> None:
     done = made(tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert max(errors(done.stdout)[:3]) < 1e-13
+    assert "the patch is solved" in done.stdout
     once = np.loadtxt(tmp_path / "solution.txt")
     result = study(d, 0.05, G=80.0, K=170.0, sy=0.5, H=10.0).solve(steps=4, newton=TIGHT)
     assert off(d, result, tmp_path) < 1e-12
@@ -133,6 +136,21 @@ def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -
     assert max(rhs, matrix, state) < 1e-13
     assert differences < 1e-5
     assert cut == 0
+
+
+@needs_fortran
+@pytest.mark.parametrize(
+    ("d", "said"),
+    [
+        (definition(MODELS / "spring.py"), "not-a-number cuts the increment      0.0E+00  ok"),
+        (ALL["axial_spring"](), "left out: the patch has no solution"),
+    ],
+    ids=["a branch without a value", "nothing across"],
+)
+def test_pages_that_hold_little(d: Definition, said: str, tmp_path: Path) -> None:
+    done = made(folder(d, "abaqus", tmp_path))
+    assert done.returncode == 0, done.stdout
+    assert said in done.stdout
 
 
 def test_an_unknown_of_the_element_is_refused() -> None:

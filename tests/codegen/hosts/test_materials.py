@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import shutil
+import subprocess
 from pathlib import Path
 
 import mpmath
@@ -88,10 +90,11 @@ def test_a_cell_of_umat_is_the_page(law: Law, tmp_path: Path) -> None:
     folder(law, "abaqus", tmp_path)
     done = made(tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
-    rhs, matrix, _, differences, cut, _ = errors(done.stdout)
+    rhs, matrix, _, differences, cut = errors(done.stdout)
     assert max(rhs, matrix) < 1e-13
     assert differences < 1e-7
     assert cut == 0
+    assert "the patch is solved" in done.stdout
     assert " 7 iterations" not in done.stdout
 
 
@@ -104,6 +107,7 @@ def test_a_cell_of_calculix_is_the_page(law: Law, tmp_path: Path) -> None:
     done = made(tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert max(errors(done.stdout)[:2]) < 1e-13
+    assert "the patch is solved" in done.stdout
 
 
 @pytest.mark.parametrize("law", [neo, fluid, hooke], ids=lambda law: law.name)
@@ -196,3 +200,50 @@ def test_what_a_law_must_say(write: object, message: str) -> None:
 
     with pytest.raises(ModelError, match=message):
         on_a_page(law)
+
+
+@pytest.fixture(scope="module")
+def umat(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    """UMAT of neo as a library; what would end the analysis is counted."""
+    place = folder(neo, "abaqus", tmp_path_factory.mktemp("umat"))
+    (place / "end.c").write_text("int ended; void xit_(void) { ++ended; }\n")
+    files = ["umat.c", "neo.c", "end.c", "-lm", "-o", "umat.so"]
+    subprocess.run(["cc", "-w", "-shared", "-fPIC", "-O1", *files], cwd=place, check=True)
+    return ctypes.CDLL(str(place / "umat.so"))
+
+
+def asked(library: ctypes.CDLL, F: Array, direct: int, shears: int) -> tuple[Array, Array, float]:
+    """Stress, DDSDDE and PNEWDT for so many components."""
+    count = direct + shears
+    stress, moduli, cut = np.full(count, 7.0), np.full((count, count), 7.0), np.array([1.0])
+    one, zeros, p = np.array([1.0]), np.zeros(9), np.array([MU, BULK])
+    sizes = [ctypes.byref(ctypes.c_int(v)) for v in (direct, shears, count, 0)]
+    arrays = [stress, zeros, moduli, *(zeros.copy() for _ in range(15))]
+    pointers: list[object] = [a.ctypes.data_as(ctypes.c_void_p) for a in arrays]
+    F = np.asfortranarray(F)
+    after = [zeros, np.eye(3), cut, one, np.eye(3), F]
+    pointers += [b"NEO" + b" " * 77, *sizes, p.ctypes.data_as(ctypes.c_void_p)]
+    pointers += [ctypes.byref(ctypes.c_int(2)), *(a.ctypes.data_as(ctypes.c_void_p) for a in after)]
+    pointers += [ctypes.byref(ctypes.c_int(1)) for _ in range(6)]
+    library.umat_(*pointers, ctypes.c_size_t(80))
+    return stress, moduli.T, float(cut[0])
+
+
+def test_plane_strain_has_the_first_components(umat: ctypes.CDLL) -> None:
+    plane = np.array([[1.1, 0.2, 0], [-0.1, 0.9, 0], [0, 0, 1]])
+    stress, moduli, cut = asked(umat, plane, 3, 3)
+    less, fewer, _ = asked(umat, plane, 3, 1)
+    np.testing.assert_array_equal(less, stress[:4])
+    np.testing.assert_array_equal(fewer, moduli[:4, :4])
+    assert cut == 1.0
+    assert stress[3] != 0.0
+
+
+def test_no_deformation_and_plane_stress_are_told(umat: ctypes.CDLL) -> None:
+    stress, moduli, cut = asked(umat, np.diag([1.0, 1.0, -1.0]), 3, 3)
+    assert cut == 0.25
+    assert (stress == 7.0).all()
+    np.testing.assert_array_equal(moduli, np.eye(6))
+    before = ctypes.c_int.in_dll(umat, "ended").value
+    asked(umat, np.eye(3), 2, 1)
+    assert ctypes.c_int.in_dll(umat, "ended").value == before + 1
