@@ -123,7 +123,8 @@ def _words(page: Interface, kind: Element, first: Sample) -> dict[str, object]:
         "cell": kind.name,
         "names": len(page.nodal),
         "unknowns": ", ".join(f.name for f in page.nodal),
-        "nodes": ",\n".join(_braces([parent, [_mirrored(r) for r in parent]])),
+        "nodes": ",\n".join(_braces(parent)),
+        "mirrored": ", ".join(str(_index(parent, _mirrored(r))) for r in parent),
         "counts": ", ".join(str(len(f.places)) for f in page.nodal),
         "places": ",\n".join(f"    {{{', '.join(map(str, f.places))}}}" for f in page.nodal),
         "symmetric": "true" if page.symmetric else "false",
@@ -178,11 +179,15 @@ def _neighbour(places: Sequence[tuple[float, ...]], direction: int) -> int:
     )
 
 
-def _braces(tables: Sequence[Sequence[Sequence[float]]]) -> list[str]:
+def _index(places: Sequence[Sequence[float]], place: Sequence[float]) -> int:
+    """Number of the node at a place."""
+    return next(
+        n
+        for n, p in enumerate(places)
+        if all(abs(a - b) < 1e-9 for a, b in zip(p, place, strict=True))
+    )
+
+
+def _braces(rows: Sequence[Sequence[float]]) -> list[str]:
     """Rows of C, filled to three coordinates."""
-    return [
-        "    {" + ", ".join(
-            "{" + ", ".join(repr(float(c)) for c in [*row, 0, 0][:3]) + "}" for row in rows
-        ) + "}"
-        for rows in tables
-    ]  # fmt: skip
+    return [f"    {{{', '.join(repr(float(c)) for c in [*row, 0, 0][:3])}}}" for row in rows]

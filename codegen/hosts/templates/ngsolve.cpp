@@ -12,10 +12,11 @@ constexpr int DIM = @NAME@_DIMENSION, NODES = @NAME@_NODES, U = @NAME@_UNKNOWNS;
 constexpr int NAMES = @names@;
 const ELEMENT_TYPE kind = @kind@;
 
-// Nodes of the page in NGSolve's parent cell, and in its mirror image for cells with det J < 0.
-const double nodes[2][NODES][3] = {
+// Nodes of the page in NGSolve's parent cell, and their images for cells with det J < 0.
+const double nodes[NODES][3] = {
 @nodes@
 };
+const int mirrored[NODES] = {@mirrored@};
 // Number of nodes of each name, and its unknowns at them.
 const int counts[NAMES] = {@counts@};
 const int places[NAMES][NODES] = {
@@ -24,12 +25,15 @@ const int places[NAMES][NODES] = {
 
 void flatten(const FiniteElement &fel, Array<const BaseScalarFiniteElement *> &out)
 {
-    if (auto all = dynamic_cast<const CompoundFiniteElement *>(&fel)) {
-        for (int k = 0; k < all->GetNComponents(); ++k)
-            flatten((*all)[k], out);
-    } else if (auto vector = dynamic_cast<const VectorFiniteElement *>(&fel)) {
-        for (int k = 0; k < vector->GetNComponents(); ++k)
-            flatten((*vector)[k], out);
+    if (typeid(fel) == typeid(CompoundFiniteElement)) {
+        auto &all = static_cast<const CompoundFiniteElement &>(fel);
+        for (int k = 0; k < all.GetNComponents(); ++k)
+            flatten(all[k], out);
+    } else if (typeid(fel) == typeid(VectorFiniteElement)) {
+        auto &vector = static_cast<const VectorFiniteElement &>(fel);
+        flatten(vector[0], out);
+        for (int k = 1; k < vector.GetNComponents(); ++k)
+            out.Append(out.Last());
     } else if (auto scalar = dynamic_cast<const BaseScalarFiniteElement *>(&fel)) {
         out.Append(scalar);
     } else {
@@ -63,7 +67,8 @@ struct Nodal {
     }
     static IntegrationPoint At(int side, int a)
     {
-        return IntegrationPoint(nodes[side][a][0], nodes[side][a][1], nodes[side][a][2], 0);
+        const double *x = nodes[side ? mirrored[a] : a];
+        return IntegrationPoint(x[0], x[1], x[2], 0);
     }
 };
 
@@ -87,13 +92,13 @@ public:
         if (e.scalars.Size() != NAMES)
             throw Exception("@name@: the space has " + ToString(e.scalars.Size())
                 + " functions, the page @names@: @unknowns@");
-        static const IntegrationPoint middle = Centre();
-        MappedIntegrationPoint<DIM, DIM> centre(middle, trafo);
+        static const IntegrationRule at = All();
+        MappedIntegrationRule<DIM, DIM> mapped(at, trafo, lh);
+        const auto &centre = mapped[NODES];
         const int side = centre.GetJacobiDet() < 0;
-        for (int a = 0; a < NODES; ++a) {
-            FlatVector<> x(DIM, e.X + DIM * a);
-            trafo.CalcPoint(Nodal::At(side, a), x);
-        }
+        for (int a = 0; a < NODES; ++a)
+            for (int c = 0; c < DIM; ++c)
+                e.X[DIM * a + c] = mapped[side ? mirrored[a] : a].GetPoint()(c);
         for (int k = 0, start = 0; k < NAMES; ++k) {
             const int ndof = e.scalars[k]->GetNDof();
             if (ndof != counts[k])
@@ -109,7 +114,7 @@ public:
             } else {
                 new (&e.values[k]) FlatMatrix<double>(ndof, ndof, lh);
                 for (int a = 0; a < ndof; ++a)
-                    e.scalars[k]->CalcShape(Nodal::At(side, a), e.values[k].Row(a));
+                    e.scalars[k]->CalcShape(at[side ? mirrored[a] : a], e.values[k].Row(a));
             }
             for (int a = 0; a < ndof; ++a) {
                 double sum = 0;
@@ -127,13 +132,18 @@ public:
         return e;
     }
 
-    static IntegrationPoint Centre()
+    // All nodes, then the centre.
+    static IntegrationRule All()
     {
+        IntegrationRule out;
         double x[3] = {0, 0, 0};
-        for (int a = 0; a < NODES; ++a)
+        for (int a = 0; a < NODES; ++a) {
+            out.AddIntegrationPoint(Nodal::At(0, a));
             for (int c = 0; c < 3; ++c)
-                x[c] += nodes[0][a][c] / NODES;
-        return IntegrationPoint(x[0], x[1], x[2], 0);
+                x[c] += nodes[a][c] / NODES;
+        }
+        out.AddIntegrationPoint(IntegrationPoint(x[0], x[1], x[2], 0));
+        return out;
     }
 
     void Matrix(const FiniteElement &fel, const ElementTransformation &trafo,
