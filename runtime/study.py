@@ -33,7 +33,13 @@ from softehl.runtime.names import listed
 from softehl.runtime.result import Result
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement import given as read
-from softehl.runtime.statement.pages import elements_of, page_on
+from softehl.runtime.statement.pages import (
+    elements_of,
+    kind_of,
+    page_on,
+    require_geometry,
+    require_page,
+)
 from softehl.runtime.statement.records import (
     Condition,
     Datum,
@@ -48,22 +54,27 @@ from softehl.runtime.system import System
 from softehl.runtime.watch import Series, Telling, Watch, watched
 
 Source: TypeAlias = "str | Path | Kernel | object"
-"""A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition."""
+"""A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition, or a
+function decorated by `softehl.page`."""
 
 
 @dataclass(eq=False)
 class Study:
     """A boundary-value problem that is being written down; `solve` solves what is there.
 
-    mesh: on which it lives; a cell that is turned inside out is a MeshError.
+    mesh: on which it lives; a cell that is turned inside out is a MeshError. geometry: what a page
+    of fields knows of dimensions that the mesh does not have: in 2-D "plane strain" (the default)
+    or "axisymmetric", around the x axis.
     """
 
     mesh: Mesh
+    geometry: str | None = None
     _statement: Statement = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raises MeshError for a cell that is turned inside out."""
+        """Raises MeshError for a cell that is turned inside out, StudyError for a geometry."""
         self.mesh.check()
+        require_geometry(self.mesh, self.geometry)
         self._statement = Statement(self.mesh)
 
     # the problem --------------------------------------------------------------------------------
@@ -81,9 +92,10 @@ class Study:
     ) -> None:
         """Elements of a page on all cells, on a group of cells, or `on` a side.
 
-        source: a page (file), a folder that `softehl generate` wrote, a Definition, a kernel, or
-        the name of one that ships. model: which, where the page has several. shared: unknowns
-        without a node that are one for all elements, not one for each. given: parameters of the
+        source: a page (file or function), a folder that `softehl generate` wrote, a Definition, a
+        kernel, or the name of one that ships; a page of fields stands on any kind of cell. model:
+        which, where the page has several. shared: unknowns without a node that are one for all
+        elements, not one for each. given: parameters of the
         page (numbers, or functions of the load factor) and its data (a number, (n,) numbers or a
         function of the elements' centres (n, dim)). Two are not given: `dt` is the length of a step
         of `march`, `rate` comes from `Model.rates`. On a side, a page of one node has an element at
@@ -92,7 +104,7 @@ class Study:
         blocks = self._statement.blocks
         if name in blocks:
             raise StudyError(f"block {name!r} is there already; blocks: {listed(blocks)}")
-        kernel = source if isinstance(source, Kernel) else _load(source, model)
+        kernel = source if isinstance(source, Kernel) else self._load(source, model, on, cells)
         elements = elements_of(self.mesh, name, kernel, on, cells)
         blocks[name] = page_on(self.mesh, name, kernel, elements, shared, given)
 
@@ -307,6 +319,16 @@ class Study:
         """Equations of the study.  Raises StudyError for what does not fit together."""
         return equations(self._statement)
 
+    def _load(
+        self, source: Source, model: str | None, on: str | Predicate | None, cells: str | None
+    ) -> Kernel:
+        """By the front door, which knows when the generator is needed: this room does not."""
+        require_page(source)
+        import softehl
+
+        kind = None if on is not None else kind_of(self.mesh, cells)
+        return softehl.load_kernel(source, model, cell=kind, geometry=self.geometry)  # type: ignore[arg-type]
+
     def _add_force(
         self,
         what: str,
@@ -318,22 +340,6 @@ class Study:
         forces = self._statement.forces
         label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {', '.join(names)})"
         forces.append(Force(label, kernel, nodes, names))
-
-
-def _load(source: Source, model: str | None) -> Kernel:
-    """By the front door, which knows when the generator is needed: this room does not."""
-    if isinstance(source, str | Path):
-        pass
-    elif callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):
-        name = getattr(source, "__name__", type(source).__name__)
-        hint = f", or what {name} returns when it is called" if callable(source) else ""
-        raise StudyError(
-            f"{type(source).__name__} is no page: give a model file, a kernel, a Definition that "
-            f"m.finish() made{hint}"
-        )
-    import softehl
-
-    return softehl.load_kernel(source, model)  # type: ignore[arg-type]
 
 
 __all__ = ["MeshError", "Study", "StudyError"]

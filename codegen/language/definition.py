@@ -65,6 +65,8 @@ class Definition:
     """Of every unknown its name without number, and its node or None."""
     history: tuple[str, ...] = ()
     """Point data that the last fields are the new values of."""
+    cell: str = ""
+    """The cell of a page of fields, which could stand on another one, too."""
     record: Record = field(default_factory=Record, repr=False, compare=False)
     """The page as written, by which kernels are checked; nothing is derived from it."""
 

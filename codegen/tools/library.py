@@ -25,6 +25,7 @@ from softehl.codegen.tools.model_text import ModelFileError
 if TYPE_CHECKING:
     from softehl.codegen.graph.graph import Node
     from softehl.codegen.language.definition import Definition
+    from softehl.codegen.language.pages import On, Page
 
 
 @dataclass(frozen=True)
@@ -41,25 +42,43 @@ class Library:
     compiled: Mapping[str, float]
 
 
-def folder_of(source: Path | Definition) -> Path:
-    """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived)."""
+def folder_of(
+    source: Path | Definition | Page, cell: str | None = None, geometry: str | None = None
+) -> Path:
+    """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
+
+    cell, geometry: where pages of fields stand.
+    """
+    cells = () if cell is None else (cell,)
     if not isinstance(source, Path):
-        return library([source]).folder
-    key = _file_key(source)
-    files = store.recall(key)
+        return library(_definitions(source, cells, geometry)).folder
+    anywhere, here = _file_key(source), _file_key(source, *cells, geometry or "")
+    files = store.recall(anywhere) or store.recall(here)
     if files is None:
+        from softehl.codegen.language.pages import On
         from softehl.codegen.tools import user
 
-        return library(user.definitions(source), key).folder
+        found = user.definitions(source, On(cells, geometry))
+        return library(found, here if any(d.cell for d in found) else anywhere).folder
     return compiled(files)[0]
 
 
-def of_files(paths: Sequence[Path]) -> tuple[list[Definition], Library]:
+def _definitions(
+    source: Definition | Page, cells: tuple[str, ...], geometry: str | None
+) -> list[Definition]:
+    from softehl.codegen.language.pages import On, Page
+
+    return source.definitions(On(cells, geometry)) if isinstance(source, Page) else [source]
+
+
+def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definition], Library]:
     """The models of some files, which are run, and their library."""
+    from softehl.codegen.language.pages import NOWHERE
     from softehl.codegen.tools import user
 
-    keys = [_file_key(p) for p in paths]
-    found = [d for p in paths for d in user.definitions(p)]
+    on = on or NOWHERE
+    keys = [_file_key(p, *on.told()) for p in paths]
+    found = [d for p in paths for d in user.definitions(p, on)]
     user.check_names(" ".join(p.name for p in paths), found)
     return found, library(found, keys[0] if len(keys) == 1 else None)
 
@@ -126,8 +145,8 @@ def _content_of(folder: Path, files: Mapping[str, str]) -> str | None:
         return None
 
 
-def _file_key(path: Path) -> str:
-    return store.digest("file", generator(), model_text.digest(path))
+def _file_key(path: Path, *on: str) -> str:
+    return store.digest("file", generator(), model_text.digest(path), *on)
 
 
 _CODEGEN = Path(__file__).parents[1]

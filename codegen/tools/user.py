@@ -3,8 +3,9 @@
 A model file is ordinary Python and is *run* to obtain its models: run only files you trust, as you
 would with any script.  Its models are
 
-- the functions of the file that take no argument and are annotated `-> Definition`, and
-- the names of the file that hold a `Definition`,
+- the functions of the file that take no argument and are annotated `-> Definition`,
+- the names of the file that hold a `Definition`, and
+- the functions decorated by `softehl.page`, on each cell that is asked for,
 
 in the order in which they are written; where the file has a mapping or list `MODELS` (of such
 functions or definitions), those alone.  Names that begin with an underscore are left out.
@@ -30,9 +31,13 @@ from softehl.codegen.language import names
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
+from softehl.codegen.language.pages import NOWHERE, On, Page
 from softehl.codegen.tools.model_text import ModelFileError, read
 
-_RECIPE = "write `def my_model() -> Definition:` that ends in `return m.finish()`"
+_RECIPE = (
+    "write `def my_model() -> Definition:` that ends in `return m.finish()`, or `@softehl.page` "
+    "above `def my_page(m):`"
+)
 _TRUTH = (
     "a condition on symbols is neither true nor false while the page is read: write a branch as "
     "sp.Piecewise((value, condition), (other, True))"
@@ -46,19 +51,22 @@ _IN_SYMPY = {"fabs": "Abs", "abs": "Abs", "absolute": "Abs", "pow": "Pow", "powe
 }
 
 
-def definitions(path: Path) -> list[Definition]:
-    """The models of a file, which is run; raises `ModelFileError`."""
+def definitions(path: Path, on: On = NOWHERE) -> list[Definition]:
+    """The models of a file, which is run; raises `ModelFileError`.
+
+    on: where its pages of fields stand.
+    """
     path = path.resolve()
     text = read(path)
     with _imports_from(path.parent), _errors_of(path):
-        found = [_made(entry) for entry in _entries(path, _run(path, text))]
+        found = [d for entry in _entries(path, _run(path, text)) for d in _made(entry, on)]
     if not found:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
     check_names(path.name, found)
     return found
 
 
-def written_out(path: Path, seconds: float = math.inf) -> dict[str, Definition]:
+def written_out(path: Path, seconds: float = math.inf, on: On = NOWHERE) -> dict[str, Definition]:
     """The models of a file that is run again, with names as `language.names.Written`.
 
     A page that loses a dependence through a name, because SymPy took it for a constant, says
@@ -67,7 +75,7 @@ def written_out(path: Path, seconds: float = math.inf) -> dict[str, Definition]:
     """
     try:
         with names.written_out(), redirect_stdout(StringIO()), _at_most(seconds):
-            return {d.name: d for d in definitions(path)}
+            return {d.name: d for d in definitions(path, on)}
     except (ModelFileError, RecursionError, _Over):
         return {}
 
@@ -118,7 +126,7 @@ def _entries(path: Path, module: ModuleType) -> list[Any]:
     if chosen is not None:
         return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
     public = [(k, v) for k, v in vars(module).items() if not k.startswith("_")]
-    found = [v for _, v in public if isinstance(v, Definition) or _makes_a_model(module, v)]
+    found = [v for _, v in public if isinstance(v, Definition | Page) or _makes_a_model(module, v)]
     if not found:
         bare = [k for k, v in public if _own_function(module, v) and _annotation(v) is None]
         if bare:
@@ -149,7 +157,9 @@ def _makes_a_model(module: ModuleType, value: Any) -> bool:
     return annotation is Definition
 
 
-def _made(entry: Any) -> Definition:
+def _made(entry: Any, on: On) -> list[Definition]:
+    if isinstance(entry, Page):
+        return entry.definitions(on)
     made = entry() if callable(entry) else entry
     if not isinstance(made, Definition):
         label = getattr(entry, "__name__", repr(entry))
@@ -157,7 +167,7 @@ def _made(entry: Any) -> Definition:
         where = f"{Path(code.co_filename).name}:{code.co_firstlineno}: " if code else ""
         what = "a Model that is not finished" if isinstance(made, Model) else type(made).__name__
         raise ModelFileError(f"{where}{label} gives {what}, not a Definition: {_RECIPE}")
-    return made
+    return [made]
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,16 @@ from softehl.runtime.mesh.mesh import Mesh, Predicate
 from softehl.runtime.statement.given import datum, known, parameter
 from softehl.runtime.statement.records import Block, StudyError
 
+GEOMETRIES = {1: ("solid",), 2: ("plane strain", "axisymmetric"), 3: ("solid",)}
+"""Geometries of meshes by their dimension, the default first."""
 Elements = tuple[str, Integers]
 """Kind of cells or faces and their nodes (n, k)."""
+
+
+def kind_of(mesh: Mesh, cells: str | None) -> str | None:
+    """The kind of cells of a mesh or of a group of it; None where it has several."""
+    kinds = mesh.cells_of(cells)
+    return next(iter(kinds)) if len(kinds) == 1 else None
 
 
 def elements_of(
@@ -113,3 +122,26 @@ def _initial(block: str, kernel: Kernel, given: Mapping[str, Any], centres: Arra
     columns = [datum(block, name, given.get(name, 0.0), centres) for name in kernel.point_data]
     points = len(kernel.default_rule.weights)
     return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
+
+
+def require_geometry(mesh: Mesh, geometry: str | None) -> None:
+    """Raise StudyError for a geometry that the mesh cannot have."""
+    allowed = GEOMETRIES[mesh.dimension]
+    if geometry is not None and geometry not in allowed:
+        words = " or ".join(f'"{g}"' for g in allowed)
+        raise StudyError(
+            f"geometry = {geometry!r} of a mesh in {mesh.dimension}-D: allowed is {words}"
+        )
+
+
+def require_page(source: object) -> None:
+    """Raise StudyError for what cannot be loaded."""
+    if isinstance(source, str | Path) or hasattr(source, "at_point"):
+        return
+    if callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):
+        name = getattr(source, "__name__", type(source).__name__)
+        hint = f", or what {name} returns when it is called" if callable(source) else ""
+        raise StudyError(
+            f"{type(source).__name__} is no page: give a model file, a function under "
+            f"@softehl.page, a kernel, a Definition that m.finish() made{hint}"
+        )

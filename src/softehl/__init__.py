@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from softehl.codegen.language.elements import quadrature, shapes
     from softehl.codegen.language.elements.cells import element
     from softehl.codegen.language.model import Model
+    from softehl.codegen.language.pages import Page, page
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
     from softehl.runtime.fem.checks import ProblemError
     from softehl.runtime.fem.dofs import DofLayout
@@ -73,6 +74,7 @@ _MODELLING = {
     "Model": "softehl.codegen.language.model",
     "element": "softehl.codegen.language.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
+    "page": "softehl.codegen.language.pages",
     "quadrature": "softehl.codegen.language.elements.quadrature:",
     "shapes": "softehl.codegen.language.elements.shapes:",
 }
@@ -107,6 +109,7 @@ __all__ = [
     "kinematics",
     "load_kernel",
     "main",
+    "page",
     "processes",
     "quadrature",
     "run_oring",
@@ -149,15 +152,23 @@ def with_sympy() -> Iterator[None]:
         ) from None
 
 
-def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "Kernel":
+def load_kernel(
+    source: "str | Path | Definition | Page",
+    name: str | None = None,
+    *,
+    cell: str | None = None,
+    geometry: str | None = None,
+) -> "Kernel":
     """A compiled kernel, by any of
 
     - the name of one that ships: `load_kernel("solid_q4")`;
     - a model file: `load_kernel("my_model.py")`, with `name` where it has several models.  It is
       derived and compiled if the cache does not have it; the file is run then;
     - a folder that `softehl generate` wrote: `load_kernel("generated/my_model")`;
-    - a `Definition`, for notebooks.
+    - a `Definition` or a function decorated by `softehl.page`, for notebooks.
 
+    cell, geometry: where a page of fields stands, as in `load_kernel(page, cell="hex8")`; the
+    geometry is "plane strain" (the default), "axisymmetric" or "solid". Others ignore them.
     Raises `runtime.kernels.KernelError`, or what is wrong with the model or the compiler.
     """
     from softehl.runtime import kernels
@@ -172,5 +183,5 @@ def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "
 
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
-        folder = library.folder_of(place)
+        folder = library.folder_of(place, cell, geometry)
     return kernels.kernel_in(folder, name)

@@ -1,0 +1,124 @@
+"""`@softehl.page`: a function of fields that becomes the definition of an element of any cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, overload
+
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.elements.cells import Element, element
+from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.codegen.language.fields import AXISYMMETRIC, GEOMETRIES, Fields, order_of
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.site import PointForm, Site
+from softehl.codegen.language.whole import Whole
+
+Write = Callable[[Fields], Any]
+
+
+@dataclass(frozen=True)
+class On:
+    """Where pages of fields are to stand: cells by name, and the geometry (None: the usual one)."""
+
+    cells: tuple[str, ...] = ()
+    geometry: str | None = None
+
+    def told(self) -> tuple[str, ...]:
+        """All of it as texts, for a digest."""
+        return (*self.cells, self.geometry or "")
+
+
+NOWHERE = On()
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of fields: `write` says its mathematics.
+
+    degree: of polynomials that the quadrature integrates on the parent cell; None: the rule of the
+    cell, or on triangles and tetrahedra one that integrates products of values, where they occur.
+    """
+
+    name: str
+    write: Write
+    degree: int | None = None
+    doc: str = ""
+
+    def definition(self, cell: str, geometry: str | None = None) -> Definition:
+        """The model of an element of a cell, by its name, in a geometry (None: the usual one)."""
+        kind = element(cell)
+        chosen = geometry_of(kind.dimension, geometry)
+        name = f"{self.name}_{cell}" + ("_axisymmetric" if chosen == AXISYMMETRIC else "")
+        point = self._at_point(name, kind, chosen)
+        whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
+        self.write(whole)
+        return whole.finish()
+
+    def definitions(self, on: On) -> list[Definition]:
+        """Its models on all cells that are wanted."""
+        if not on.cells:
+            raise ModelError(
+                f"{self.name} is a page of fields, which stands on any cell: say which, as in "
+                'softehl.load_kernel(page, cell="hex8") or softehl generate --cell hex8'
+            )
+        return [self.definition(cell, on.geometry) for cell in on.cells]
+
+    def at_point(self, cell: str, geometry: str | None = None) -> PointForm:
+        """The model at a point of a cell."""
+        kind = element(cell)
+        return self._at_point(self.name, kind, geometry_of(kind.dimension, geometry))
+
+    def _at_point(self, name: str, kind: Element, geometry: str) -> PointForm:
+        site = Site(name, kind, geometry, self.doc)
+        self.write(site)
+        return site.form()
+
+    def rule(self, cell: Element, form: PointForm) -> QuadratureRule:
+        """The quadrature on a cell."""
+        if self.degree is not None:
+            return rule_of(cell, self.degree)
+        order = order_of(cell)
+        values = any(q.axis is None and q.component.order == order for q in form.unknowns)
+        simplex = len(cell.nodes) in ((3, 6) if cell.dimension == 2 else (4, 10))
+        return rule_of(cell, 2 * order) if values and simplex else cell.rule
+
+
+def rule_of(cell: Element, degree: int) -> QuadratureRule:
+    """A rule of a cell for polynomials of a degree (in each direction of a square or cube)."""
+    name = cell.name.rstrip("0123456789")
+    if name == "tri":
+        return quadrature.triangle(degree)
+    if name == "tet":
+        return quadrature.tetrahedron(degree)
+    if name == "wedge":
+        return quadrature.wedge(degree)
+    return quadrature.gauss(degree // 2 + 1, cell.dimension)
+
+
+def geometry_of(dimension: int, geometry: str | None) -> str:
+    """The geometry of a mesh, checked.  Raises ModelError."""
+    allowed = GEOMETRIES[dimension]
+    if geometry is not None and geometry not in allowed:
+        raise ModelError(
+            f"geometry = {geometry!r} of a mesh in {dimension}-D; allowed is "
+            + " or ".join(f'"{g}"' for g in allowed)
+        )
+    return geometry or allowed[0]
+
+
+@overload
+def page(write: Write, /) -> Page: ...
+@overload
+def page(*, degree: int | None = None) -> Callable[[Write], Page]: ...
+def page(write: Write | None = None, /, *, degree: int | None = None) -> Any:
+    """Make a page of fields of a function that gets m, a `Fields`: `@softehl.page`.
+
+    degree: as in `Page`.
+    """
+
+    def made(function: Write) -> Page:
+        return Page(function.__name__, function, degree, function.__doc__ or "")
+
+    return made if write is None else made(write)

@@ -1,0 +1,91 @@
+"""Pages of fields in a study: one page on every kind of cell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import softehl
+from softehl.runtime.arrays import Array
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.study import Study, StudyError
+
+AFFINE = np.array([[0.08, 0.05, -0.02], [-0.03, 0.1, 0.04], [0.02, -0.06, 0.07]])
+"""Displacement gradient of the patch tests."""
+
+
+@softehl.page
+def rubber(m):  # type: ignore[no-untyped-def]
+    """Compressible neo-Hooke."""
+    u = m.vector("u")
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + K / 2 * (J - 1) ** 2
+    m.minimise(W)
+    m.fields(J=J, W=W)
+
+
+def moved(mesh: Mesh) -> Mesh:
+    """The mesh with its inner nodes moved: cells are no more alike, straight or parallel."""
+    size = mesh.points.max()
+    inside = np.all((mesh.points > 1e-9) & (mesh.points < size - 1e-9), axis=1)
+    shift = 0.04 * np.sin(7.0 * mesh.points @ np.ones((mesh.dimension, mesh.dimension)) + 1.0)
+    points = mesh.points + shift * inside[:, None]
+    return Mesh(points=points, cells=mesh.cells, groups=mesh.groups, sides=mesh.sides)
+
+
+def patch(mesh: Mesh, geometry: str | None, gradient: Array) -> tuple[float, Array]:
+    """Largest error of the displacements, and J, where the boundary is moved by a gradient."""
+    study = Study(mesh, geometry=geometry)
+    study.add("rubber", rubber, mu=0.4, K=0.9)
+    size = mesh.dimension
+    A = gradient[:size, :size]
+    for side in mesh.sides:
+        for axis, row in zip("xyz", A, strict=False):
+            study.fix(side, **{f"u_{axis}": lambda x, t, row=row: x @ row})
+    result = study.solve()
+    errors = [
+        np.abs(result.values(f"u_{axis}") - mesh.points @ row).max()
+        for axis, row in zip("xyz", A, strict=False)
+    ]
+    return float(max(errors)), result.fields("rubber")["J"]
+
+
+@pytest.mark.parametrize(("shape", "order"), [("triangle", 1)])
+def test_a_patch_of_plane_cells_deforms_affinely(shape: str, order: int) -> None:
+    mesh = moved(Mesh.rectangle(1, 1, cells=(2, 2), order=order, shape=shape))  # type: ignore[arg-type]
+    error, J = patch(mesh, None, AFFINE)
+    assert error < 1e-12
+    assert np.allclose(J, np.linalg.det(np.eye(2) + AFFINE[:2, :2]), rtol=1e-12)
+
+
+def test_an_axisymmetric_body_is_stretched_around_the_x_axis() -> None:
+    mesh = Mesh.rectangle(1, 1, cells=(2, 2), shape="triangle")
+    error, J = patch(mesh, "axisymmetric", np.diag([0.1, 0.05, 0.0]))
+    assert error < 1e-12
+    assert np.allclose(J, 1.1 * 1.05**2, rtol=1e-12)
+
+
+def test_a_geometry_that_the_mesh_cannot_have_is_refused() -> None:
+    with pytest.raises(StudyError, match='"plane strain" or "axisymmetric"'):
+        Study(Mesh.rectangle(1, 1, cells=(1, 1)), geometry="solid")
+
+
+def test_a_file_may_hold_a_page_of_fields(tmp_path: Path) -> None:
+    path = tmp_path / "laplace.py"
+    path.write_text(
+        "import softehl\n@softehl.page\ndef laplace(m):\n"
+        "    T = m.scalar('T')\n    (k,) = m.parameters(k='conductivity [W/(mm K)]')\n"
+        "    m.weak(k * m.grad(T), m.grad(T))\n"
+    )
+    study = Study(Mesh.rectangle(2, 1, cells=(2, 1), shape="triangle"))
+    study.add("plate", path, k=3.0)
+    study.fix("left", T=0)
+    study.fix("right", T=4)
+    result = study.solve()
+    assert result.at((1.0, 0.5))["T"] == pytest.approx(2.0, rel=1e-12)
+    assert result.reaction("right")["T"] == pytest.approx(3.0 * 4 / 2, rel=1e-12)
