@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from types import ModuleType
 
 from softehl.codegen.abi import DESIGN, ROLLED, Target
+from softehl.codegen.derive import points as at_points
 from softehl.codegen.derive import structure, variants
 from softehl.codegen.derive.outputs import Entry, placed
 from softehl.codegen.derive.structure import Structure
@@ -36,6 +37,9 @@ from softehl.codegen.emit import simd as emit_simd
 from softehl.codegen.emit import source as emit_source
 from softehl.codegen.emit import ufcx as emit_ufcx
 from softehl.codegen.emit.order import arranged
+from softehl.codegen.emit.points import family as emit_points
+from softehl.codegen.emit.points.function import Outputs
+from softehl.codegen.emit.points.layout import Layout
 from softehl.codegen.emit.runs import arranged_plan
 from softehl.codegen.emit.schedule import Schedule, is_straight, schedule, straight_line
 from softehl.codegen.graph.graph import Routine
@@ -100,6 +104,8 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     tasks = variants.tasks(definition)
     if target is Target.UFCX:
         tasks = emit_ufcx.tasks(definition, tasks)
+    if target is Target.SIMD and stands_at_points(definition):
+        return _at_points(definition, tasks)
     functions = {t: compile_task(definition, t, target) for t in tasks}
     if target is Target.UFCX:
         texts = [f.text for f in functions.values()]
@@ -108,6 +114,44 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     others = [f for t, f in functions.items() if t not in DESIGN]
     text, more = _file(definition, others), _file(definition, design) if design else ""
     return KernelSource(definition, text, functions, more)
+
+
+def stands_at_points(d: Definition) -> bool:
+    """Whether the kernels of a page of fields are loops around the function of a point."""
+    return d.point is not None and d.unroll is not True
+
+
+def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
+    """All kernels of a page of fields, as loops around functions of the point."""
+    assert d.point is not None
+    layout = Layout(d, d.point)
+    functions = {t: _at_point(layout, t) for t in tasks}
+    files = []
+    for some in ([t for t in tasks if t not in DESIGN], [t for t in tasks if t in DESIGN]):
+        texts = [functions[t].text for t in some]
+        called = dict.fromkeys(r for t in some for r in functions[t].routines)
+        routines = emit_lane_routines.texts(layout.site, called)
+        before = emit_lanes.wrappers("".join([*routines, *texts]))
+        before += [*routines, *emit_points.constants(layout, texts)]
+        files.append(emit_source.source(d, texts, before) if texts else "")
+    return KernelSource(d, files[0], functions, files[1])
+
+
+def _at_point(layout: Layout, task: str) -> Function:
+    """One kernel of a page of fields: the function of a point and the loops of the cell."""
+    site = layout.site
+    way = Variant("at a point", at_points.outputs(site, task))
+    chosen = _attempt(site, way, unrolled=True)
+    entries, plan = chosen.entries, chosen.plan
+    called = tuple(emit_routines.called([x.node for x in entries]))
+    if is_straight(plan):
+        roots, order = arranged(site.graph, [x.node for x in entries])
+        entries, plan = placed(entries, roots), straight_line(order)
+    else:
+        plan = arranged_plan(site.graph, plan, [x.node for x in entries])
+    outputs = Outputs(entries, site.conservative)
+    text, temporaries = emit_points.text(layout, task, outputs, plan)
+    return Function(text, plan, temporaries, None, (chosen,), chosen, "points", called)
 
 
 def _file(d: Definition, functions: Sequence[Function]) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.language.definition import Component
 from softehl.codegen.language.elements.cells import Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import Entries
@@ -27,19 +28,6 @@ GEOMETRIES = {1: (SOLID,), 2: (PLANE, AXISYMMETRIC), 3: (SOLID,)}
 """Geometries of meshes by their dimension, the default first."""
 AXES = "xyz"
 _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or m.weak"
-
-
-@dataclass(frozen=True)
-class Component:
-    """A scalar that varies in the cell.
-
-    name: as of its unknowns; of what was at the step before name_old, of a rate name_rate. order:
-    of its shape functions. given: whether it is data, not an unknown.
-    """
-
-    name: str
-    order: int
-    given: bool = False
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, overload
 
-from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.definition import Definition, PointForm
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.cells import Element, element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.fields import AXISYMMETRIC, GEOMETRIES, Fields, order_of
 from softehl.codegen.language.lower import ModelError
-from softehl.codegen.language.site import PointForm, Site
+from softehl.codegen.language.site import Site
 from softehl.codegen.language.whole import Whole
 
 Write = Callable[[Fields], Any]
@@ -54,7 +54,7 @@ class Page:
         point = self._at_point(name, kind, chosen)
         whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
         self.write(whole)
-        return whole.finish()
+        return replace(whole.finish(), point=point)
 
     def definitions(self, on: On) -> list[Definition]:
         """Its models on all cells that are wanted."""

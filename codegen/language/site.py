@@ -5,40 +5,18 @@ Its residual is the fluxes, its tangent the moduli; nothing of a cell is in it b
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import sympy as sp
 
 from softehl.codegen.graph.graph import Input, Node
 from softehl.codegen.graph.traverse import reachable
-from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.definition import Component, PointForm, Quantity
 from softehl.codegen.language.elements.cells import Element
 from softehl.codegen.language.elements.quadrature import point_rule
-from softehl.codegen.language.fields import Component, Fields, Traced
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Value of a component at the point (axis None), or its slope along an axis."""
-
-    component: Component
-    axis: int | None
-
-
-@dataclass(frozen=True)
-class PointForm:
-    """A page at a point: `definition` is its model, with one node, the point itself.
-
-    unknowns: the meaning of every unknown that occurs, in the order of `definition.directions`;
-    all: of every one, by its number. data: of those data that are interpolated, by their number.
-    """
-
-    definition: Definition
-    unknowns: tuple[Quantity, ...]
-    all: tuple[Quantity, ...]
-    data: Mapping[int, Quantity]
+from softehl.codegen.language.fields import AXISYMMETRIC, Fields, Traced
 
 
 class Site(Fields):
@@ -57,7 +35,13 @@ class Site(Fields):
         directions = tuple(n for n in d.directions if n in used)
         unknowns = tuple(self._quantities[_index(n)] for n in directions)
         d = replace(d, directions=directions)
-        return PointForm(d, unknowns, tuple(self._quantities), dict(self._given_at_point))
+        return PointForm(
+            definition=d,
+            unknowns=unknowns,
+            all=tuple(self._quantities),
+            data=dict(self._given_at_point),
+            axisymmetric=self.geometry == AXISYMMETRIC,
+        )
 
     def _components_of(self, components: Sequence[Component]) -> list[Traced]:
         traced = []

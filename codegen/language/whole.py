@@ -9,11 +9,11 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.language import kinematics
-from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.definition import Component, Definition
 from softehl.codegen.language.elements.cells import ELEMENTS, Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.elements.shapes import interpolate
-from softehl.codegen.language.fields import AXISYMMETRIC, Component, Fields, Traced
+from softehl.codegen.language.fields import AXISYMMETRIC, Fields, Traced
 from softehl.codegen.language.model import Model
 
 CORNERS = {

@@ -160,8 +160,8 @@ def generator() -> str:
 
 
 def fingerprint(definition: Definition) -> str:
-    """Digest of everything that a definition says, its graph included."""
-    return store.digest(_told(definition))
+    """Digest of everything that a definition says, its graphs included."""
+    return store.digest(_told(definition), _told(definition.point))
 
 
 def _told(value: Any) -> str:
