@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from softehl.codegen.emit import simd
-from softehl.codegen.emit.points import function, loops, tables
+from softehl.codegen.emit.points import function, loops, pairs, tables
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout, orders
 from softehl.codegen.emit.schedule import Schedule
@@ -32,9 +33,12 @@ def constants(layout: Layout, texts: Sequence[str]) -> list[str]:
         for b in found.values():
             if a.line is not None and b.line is not None:
                 out.append(tables.pairs(f"{name}_C{a.order}{b.order}", a.line, b.line))
+    places = pairs.stored(layout)
+    numbers = ", ".join(map(str, places))
+    out.append(f"static const unsigned short {name}_K[{len(places)}] = {{{numbers}}};")
     called = "".join(texts)
     single = [piece for text in out for piece in text.split("\n\n") if piece.strip()]
-    return [p.strip() + "\n" for p in single if f"{_name(p)}[" in called]
+    return [p.strip() + "\n" for p in single if re.search(rf"\b{_name(p)}\b", called)]
 
 
 def _name(declaration: str) -> str:

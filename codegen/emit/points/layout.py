@@ -70,6 +70,12 @@ class Layout:
         assert all(n == numbers[0] + stride * a for a, n in enumerate(numbers))
         return Place(numbers[0], stride)
 
+    def field(self, c: Component) -> int:
+        """Unknowns before those of the field that a component belongs to."""
+        place = self.place(c)
+        inside = [self.place(o).start for o in self.components if self.place(o).stride == place.stride]
+        return min(s for s in inside if place.start - s in range(place.stride))
+
     def shape(self, order: int) -> Shape:
         """Shape functions of an order."""
         if order not in self._shapes:

@@ -418,12 +418,23 @@ class Group:
             count = size if self.spread else 1
             store(out, "R", "r", count, str(count))
         if self.task == Task.TANGENT:
-            store(out, "K", "k_lanes", size * size, str(size * size))
+            self._store_tangent(size * size)
         out.open("if (softehl_any(failed))")
         out.add(f"softehl_spoil(failed, R, {self.widths['values']});")
         if self.task == Task.TANGENT:
             out.add(f"softehl_spoil(failed, K, {size * size});")
         out.close()
+
+
+    def _store_tangent(self, count: int) -> None:
+        out, whole, name = self.out, count - count % 4, self.layout.d.name
+        out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
+        out.add(f"const unsigned short *const at = {name}_K + k;")
+        values = ", ".join(f"k_lanes[at[{i}]]" for i in range(4))
+        out.add(f"softehl_store4(K + k, {count}, {values});")
+        out.close()
+        for k in range(whole, count):
+            out.add(f"softehl_store1(K + {k}, {count}, k_lanes[{name}_K[{k}]]);")
 
 
 def _components(quantities: Iterable[Quantity]) -> list[Component]:

@@ -152,12 +152,32 @@ class Pair:
         return [pair for pair in every if pair in met]
 
     def store(self, out: Lines, i: Component, j: Component, a: str, b: str, value: str) -> None:
-        """Write an entry of the tangent, and its mirror."""
+        """Write an entry of the tangent; of a symmetric one that above the diagonal."""
         size = len(self.layout.d.unknowns)
         row, column = self.layout.place(i).at(a), self.layout.place(j).at(b)
+        if self.parent.symmetric and self.layout.field(i) > self.layout.field(j):
+            row, column = column, row
         out.add(f"k_lanes[({row}) * {size} + {column}] = {value};")
-        if self.parent.symmetric and not (self.half and a == b):
-            out.add(f"k_lanes[({column}) * {size} + {row}] = {value};")
+
+
+def stored(layout: Layout) -> list[int]:
+    """Place in k_lanes of every entry of the tangent, row by row.
+
+    Of a symmetric one that of the two mirrored entries which is computed.
+    """
+    names = {c.name: c for c in layout.components}
+    size = len(layout.d.places)
+    ranks = []
+    for n, (name, node) in enumerate(layout.d.places):
+        c = names[name]
+        line = layout.shape(c.order).line
+        along = line.places[node or 0][::-1] if line is not None else (node,)
+        ranks.append((layout.field(c), along, n))
+    pairs = product(range(size), repeat=2)
+    upper = layout.site.conservative
+    return [
+        j * size + i if upper and ranks[j] < ranks[i] else i * size + j for i, j in pairs
+    ]
 
 
 def assembled(out: Lines, layout: Layout, outputs: Outputs) -> None:

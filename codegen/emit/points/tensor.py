@@ -7,9 +7,11 @@ slope along that direction becomes a value.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from softehl.codegen.emit.points.pairs import Pair
+from softehl.codegen.emit.points.tables import Line
 from softehl.codegen.language.definition import Component, Quantity
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ def assembled(out: Lines, pair: Pair) -> None:
         n = pair.parent.number(row, column)
         if n is not None:
             found[row.component, row.axis, column.component, column.axis] = str(n)
-    _level(out, pair, pair.layout.dimension - 1, "S", found)
+    _Level(out, pair, pair.layout.dimension - 1, "S").write(found, alike=pair.half)
 
 
 def _both(pair: Pair) -> list[tuple[Quantity, Quantity]]:
@@ -35,66 +37,85 @@ def _both(pair: Pair) -> list[tuple[Quantity, Quantity]]:
     return [(a, b) for a in rows for b in columns]
 
 
-def _level(out: Lines, pair: Pair, axis: int, source: str, moduli: dict[Key, str]) -> None:
-    """Sum over the points along an axis; moduli: their places in `source`, a row for each point."""
-    lines = [pair.layout.shape(order).line for order in pair.order]
-    assert lines[0] is not None and lines[1] is not None
-    size, along = len(lines[0].values), [len(x.values[0]) for x in lines if x is not None]
-    half = pair.half and axis == pair.layout.dimension - 1
-    out.open(f"for (int b{axis} = 0; b{axis} < {along[1]}; ++b{axis})")
-    last = f"b{axis}" if half else str(along[0] - 1)
-    out.open(f"for (int a{axis} = 0; a{axis} <= {last}; ++a{axis})")
-    targets: dict[Key, list[tuple[int, str]]] = {}
-    for (i, k, j, m), place in moduli.items():
-        kept = (i, None if k == axis else k, j, None if m == axis else m)
-        targets.setdefault(kept, []).append((2 * (k == axis) + (m == axis), place))
-    numbers = {key: str(n) for n, key in enumerate(targets)}
-    if axis:
-        out.add(f"V T{axis}[{size**axis}][{len(targets)}];")
-        out.open(f"for (int p = 0; p < {size**axis}; ++p)")
-    _sums(out, pair, axis, source, targets, size)
-    if axis:
-        for key, n in numbers.items():
-            out.add(f"T{axis}[p][{n}] = t{n};")
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """The sums over the points along an axis of what stands in the array `source`."""
+
+    out: Lines
+    pair: Pair
+    axis: int
+    source: str
+
+    @property
+    def lines(self) -> list[Line]:
+        """Shape functions along a direction, of rows and of columns."""
+        found = [self.pair.layout.shape(order).line for order in self.pair.order]
+        return [line for line in found if line is not None]
+
+    def write(self, moduli: dict[Key, str], *, alike: bool) -> None:
+        """Loops over pairs of nodes along the axis; moduli: places in the source.
+
+        alike: the nodes of the pair are the same along the directions that are done, so that what
+        stands in the source is symmetric, and one of two mirrored pairs is enough.
+        """
+        out, axis = self.out, self.axis
+        rows, columns = (len(line.values[0]) for line in self.lines)
+        out.open(f"for (int b{axis} = 0; b{axis} < {columns}; ++b{axis})")
+        if alike:
+            out.open("")
+            out.add(f"const int a{axis} = b{axis};")
+            self._one(moduli, alike=True)
+            out.close()
+        out.open(f"for (int a{axis} = 0; a{axis} < {f'b{axis}' if alike else rows}; ++a{axis})")
+        self._one(moduli, alike=False)
         out.close()
-        _level(out, pair, axis - 1, f"T{axis}", numbers)
-    else:
-        _stores(out, pair, along, numbers)
-    out.close()
-    out.close()
-
-
-def _sums(
-    out: Lines,
-    pair: Pair,
-    axis: int,
-    source: str,
-    targets: dict[Key, list[tuple[int, str]]],
-    size: int,
-) -> None:
-    """The sums t0, t1, ..., those of a pair of components at a time."""
-    table = f"{pair.layout.d.name}_C{pair.order[0]}{pair.order[1]}"
-    point = f"p * {size} + s" if axis else "s"
-    numbers = {key: n for n, key in enumerate(targets)}
-    for i, j in pair.entries:
-        here = [key for key in targets if (key[0], key[2]) == (i, j)]
-        out.add(f"V {', '.join(f't{numbers[key]} = softehl_splat(0.0)' for key in here)};")
-        out.open(f"for (int s = 0; s < {size}; ++s)")
-        out.add(f"const double *const c = {table}[s][a{axis}][b{axis}];")
-        out.add(f"const V *const m = {source}[{point}];")
-        for key in here:
-            for c, place in targets[key]:
-                out.add(f"t{numbers[key]} += m[{place}] * c[{c}];")
         out.close()
 
+    def _one(self, moduli: dict[Key, str], *, alike: bool) -> None:
+        """What is done for one pair of nodes along the axis."""
+        out, axis, size = self.out, self.axis, len(self.lines[0].values)
+        targets: dict[Key, list[tuple[int, str]]] = {}
+        for (i, k, j, m), place in moduli.items():
+            kept = (i, None if k == axis else k, j, None if m == axis else m)
+            targets.setdefault(kept, []).append((2 * (k == axis) + (m == axis), place))
+        mirrored = {(i, k, j, m): (j, m, i, k) for i, k, j, m in targets}
+        if alike:
+            place = {key: n for n, key in enumerate(targets)}
+            targets = {key: t for key, t in targets.items() if place[key] <= place[mirrored[key]]}
+        numbers = {key: str(n) for n, key in enumerate(targets)}
+        if axis:
+            out.add(f"V T{axis}[{size**axis}][{len(targets)}];")
+            out.open(f"for (int p = 0; p < {size**axis}; ++p)")
+        self._sums(targets, size)
+        if axis:
+            for n in numbers.values():
+                out.add(f"T{axis}[p][{n}] = t{n};")
+            out.close()
+            every = {**numbers, **({mirrored[key]: n for key, n in numbers.items()} if alike else {})}
+            _Level(out, self.pair, axis - 1, f"T{axis}").write(every, alike=alike)
+        else:
+            self._stores(numbers)
 
-def _stores(out: Lines, pair: Pair, along: list[int], numbers: dict[Key, str]) -> None:
-    """Entries of the tangent of the nodes that the pairs along the directions make."""
-    name, D = pair.layout.d.name, pair.layout.dimension
-    for side, letter in enumerate("ab"):
-        index = f"{letter}0"
-        for k in range(1, D):
-            index = f"({index}) * {along[side]} + {letter}{k}"
-        out.add(f"const int {letter} = {name}_nodes{pair.order[side]}[{index}];")
-    for (i, _, j, _), n in numbers.items():
-        pair.store(out, i, j, "a", "b", f"t{n}")
+    def _sums(self, targets: dict[Key, list[tuple[int, str]]], size: int) -> None:
+        """The sums t0, t1, ... over the points."""
+        out, axis = self.out, self.axis
+        table = f"{self.pair.layout.d.name}_C{self.pair.order[0]}{self.pair.order[1]}"
+        for s in range(size):
+            point = f"p * {size} + {s}" if axis else str(s)
+            out.add(f"const double *const c{s} = {table}[{s}][a{axis}][b{axis}];")
+            out.add(f"const V *const m{s} = {self.source}[{point}];")
+        for n, terms in enumerate(targets.values()):
+            total = [f"m{s}[{k}] * c{s}[{c}]" for s in range(size) for c, k in terms]
+            out.add(f"const V t{n} = {' + '.join(total)};")
+
+    def _stores(self, numbers: dict[Key, str]) -> None:
+        """Entries of the tangent of the nodes that the pairs along the directions make."""
+        out, pair = self.out, self.pair
+        for side, letter in enumerate("ab"):
+            index = f"{letter}0"
+            for k in range(1, pair.layout.dimension):
+                index = f"({index}) * {len(self.lines[side].values[0])} + {letter}{k}"
+            nodes = f"{pair.layout.d.name}_nodes{pair.order[side]}"
+            out.add(f"const int {letter} = {nodes}[{index}];")
+        for (i, _, j, _), n in numbers.items():
+            pair.store(out, i, j, "a", "b", f"t{n}")
