@@ -20,10 +20,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import ModuleType
 
-from softehl.codegen.abi import DESIGN, ROLLED, Target
+from softehl.codegen.abi import DESIGN, ROLLED, Target, Task
 from softehl.codegen.derive import points as at_points
 from softehl.codegen.derive import structure, variants
 from softehl.codegen.derive.outputs import Entry, placed
@@ -37,7 +37,9 @@ from softehl.codegen.emit import simd as emit_simd
 from softehl.codegen.emit import source as emit_source
 from softehl.codegen.emit import ufcx as emit_ufcx
 from softehl.codegen.emit.order import arranged
+from softehl.codegen.emit.points import constants as emit_constants
 from softehl.codegen.emit.points import family as emit_points
+from softehl.codegen.emit.points.choice import Choice, choose
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout
 from softehl.codegen.emit.runs import arranged_plan
@@ -73,7 +75,8 @@ class Function:
     """One kernel: its C text and how it came about.
 
     `found` is what was found in the potential (None: nothing, or the task differentiates nothing);
-    of the `attempts` one was `chosen`; `plan` is its schedule in the printed order.
+    of the `attempts` one was `chosen`; `plan` is its schedule in the printed order. shared: names
+    and texts of files that other kernels may have, too.
     """
 
     text: str
@@ -84,19 +87,22 @@ class Function:
     chosen: Attempt
     printer: str
     routines: tuple[Routine, ...] = ()
+    shared: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class KernelSource:
     """A kernel family: its model, its C file and its functions by task.
 
-    design: a second C file with the tasks of sensitivities, empty where none is offered.
+    design: a second C file with the tasks of sensitivities, empty where none is offered. shared:
+    files that other families may have, too, by name.
     """
 
     definition: Definition
     text: str
     functions: Mapping[str, Function]
     design: str = ""
+    shared: Mapping[str, str] = field(default_factory=dict)
 
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
@@ -104,7 +110,7 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     tasks = variants.tasks(definition)
     if target is Target.UFCX:
         tasks = emit_ufcx.tasks(definition, tasks)
-    if target is Target.SIMD and stands_at_points(definition):
+    if target is Target.SIMD and form(definition).at_points:
         return _at_points(definition, tasks)
     functions = {t: compile_task(definition, t, target) for t in tasks}
     if target is Target.UFCX:
@@ -116,9 +122,18 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     return KernelSource(definition, text, functions, more)
 
 
-def stands_at_points(d: Definition) -> bool:
-    """Whether the kernels of a page of fields are loops around the function of a point."""
-    return d.point is not None and d.unroll is not True
+def form(d: Definition) -> Choice:
+    """Whether the kernels of a page are loops around functions of a point, and why."""
+    if d.point is None:
+        return Choice(False, "no page of fields")
+    attempt = _moduli(d.point.definition, Task.TANGENT)
+    outputs = Outputs(attempt.entries, d.point.definition.conservative)
+    return choose(Layout(d, d.point), outputs, attempt.operations, SHORT)
+
+
+def _moduli(site: Definition, task: str) -> Attempt:
+    """Outputs of a task at a point."""
+    return _attempt(site, Variant("at a point", at_points.outputs(site, task)), unrolled=True)
 
 
 def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
@@ -132,16 +147,16 @@ def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
         called = dict.fromkeys(r for t in some for r in functions[t].routines)
         routines = emit_lane_routines.texts(layout.site, called)
         before = emit_lanes.wrappers("".join([*routines, *texts]))
-        before += [*routines, *emit_points.constants(layout, texts)]
+        before += [*routines, *emit_constants.used(layout, "".join(texts))]
         files.append(emit_source.source(d, texts, before) if texts else "")
-    return KernelSource(d, files[0], functions, files[1])
+    shared = dict(pair for f in functions.values() for pair in f.shared)
+    return KernelSource(d, files[0], functions, files[1], shared)
 
 
 def _at_point(layout: Layout, task: str) -> Function:
     """One kernel of a page of fields: the function of a point and the loops of the cell."""
     site = layout.site
-    way = Variant("at a point", at_points.outputs(site, task))
-    chosen = _attempt(site, way, unrolled=True)
+    chosen = _moduli(site, task)
     entries, plan = chosen.entries, chosen.plan
     called = tuple(emit_routines.called([x.node for x in entries]))
     if is_straight(plan):
@@ -150,8 +165,11 @@ def _at_point(layout: Layout, task: str) -> Function:
     else:
         plan = arranged_plan(site.graph, plan, [x.node for x in entries])
     outputs = Outputs(entries, site.conservative)
-    text, temporaries = emit_points.text(layout, task, outputs, plan)
-    return Function(text, plan, temporaries, None, (chosen,), chosen, "points", called)
+    made = emit_points.kernel(layout, task, outputs, plan)
+    shared = () if made.shared is None else (made.shared,)
+    return Function(
+        made.text, plan, made.temporaries, None, (chosen,), chosen, "points", called, shared
+    )
 
 
 def _file(d: Definition, functions: Sequence[Function]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, overload
+from typing import Any, Literal, get_args, overload
 
 from softehl.codegen.language.definition import Definition, PointForm
 from softehl.codegen.language.elements import quadrature
@@ -16,6 +16,7 @@ from softehl.codegen.language.site import Site
 from softehl.codegen.language.whole import Whole
 
 Write = Callable[[Fields], Any]
+Form = Literal["whole", "point"]
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,14 @@ class Page:
 
     degree: of polynomials that the quadrature integrates on the parent cell; None: the rule of the
     cell, or on triangles and tetrahedra one that integrates products of values, where they occur.
+    form: of its kernels, "whole" element or loops around a "point"; None: the faster one.
     """
 
     name: str
     write: Write
     degree: int | None = None
     doc: str = ""
+    form: Form | None = None
 
     def definition(self, cell: str, geometry: str | None = None) -> Definition:
         """The model of an element of a cell, by its name, in a geometry (None: the usual one)."""
@@ -54,7 +57,9 @@ class Page:
         point = self._at_point(name, kind, chosen)
         whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
         self.write(whole)
-        return replace(whole.finish(), point=point)
+        unroll = False if self.form == "point" else None
+        at = None if self.form == "whole" else point
+        return replace(whole.finish(), point=at, unroll=unroll)
 
     def definitions(self, on: On) -> list[Definition]:
         """Its models on all cells that are wanted."""
@@ -111,14 +116,18 @@ def geometry_of(dimension: int, geometry: str | None) -> str:
 @overload
 def page(write: Write, /) -> Page: ...
 @overload
-def page(*, degree: int | None = None) -> Callable[[Write], Page]: ...
-def page(write: Write | None = None, /, *, degree: int | None = None) -> Any:
+def page(*, degree: int | None = None, form: Form | None = None) -> Callable[[Write], Page]: ...
+def page(
+    write: Write | None = None, /, *, degree: int | None = None, form: Form | None = None
+) -> Any:
     """Make a page of fields of a function that gets m, a `Fields`: `@softehl.page`.
 
-    degree: as in `Page`.
+    degree, form: as in `Page`, for `@softehl.page(degree=4)`.
     """
+    if form is not None and form not in get_args(Form):
+        raise ModelError(f'form = {form!r}: allowed are "whole" and "point"')
 
     def made(function: Write) -> Page:
-        return Page(function.__name__, function, degree, function.__doc__ or "")
+        return Page(function.__name__, function, degree, function.__doc__ or "", form)
 
     return made if write is None else made(write)

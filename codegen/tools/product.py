@@ -19,6 +19,7 @@ def files(kernels: Iterable[KernelSource]) -> dict[str, str]:
     declarations = [abi.declaration(k.definition.name, t) for k in kernels for t in k.functions]
     out = {f"{k.definition.name}.c": k.text for k in kernels}
     out |= {f"{k.definition.name}_design.c": k.design for k in kernels if k.design}
+    out |= {name: text for k in kernels for name, text in k.shared.items()}
     out[source.HEADER] = source.header(declarations)
     out["signature.c"] = SIGNATURE_C
     manifest = {k.definition.name: _manifest(k) for k in kernels}

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from softehl.codegen.emit.points.lines import Lines
 from softehl.codegen.emit.points.pairs import Pair
 from softehl.codegen.language.definition import Component, Quantity
-
-if TYPE_CHECKING:
-    from softehl.codegen.emit.points.loops import Lines
 
 Columns = dict[tuple[Quantity, Component], int]
 
@@ -40,7 +36,7 @@ def _factor(q: Quantity, node: str) -> str:
 
 
 def _factors(out: Lines, pair: Pair, side: int, node: str, index: str) -> None:
-    name, order = pair.layout.d.name, pair.order[side]
+    name, order = pair.layout.d.cell, pair.order[side]
     some = [q for q in pair.parent.quantities if q.component.order == order]
     for axis in sorted({-1 if q.axis is None else q.axis for q in some}):
         table = (

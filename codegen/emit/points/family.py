@@ -1,46 +1,35 @@
-"""The C of a family whose mathematics stands at a point, task by task, and its tables."""
+"""One kernel of a family whose mathematics stands at a point."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from dataclasses import dataclass
 
+from softehl.codegen.abi import Task
 from softehl.codegen.emit import simd
-from softehl.codegen.emit.points import function, loops, pairs, tables
+from softehl.codegen.emit.points import assembly, function, loops
 from softehl.codegen.emit.points.function import Outputs
-from softehl.codegen.emit.points.layout import Layout, orders
+from softehl.codegen.emit.points.layout import Layout
+from softehl.codegen.emit.points.pairs import Parent
 from softehl.codegen.emit.schedule import Schedule
 
 
-def text(layout: Layout, task: str, outputs: Outputs, plan: Schedule) -> tuple[str, int]:
-    """C text of one kernel: the function of the point, the loops, the batch."""
+@dataclass(frozen=True)
+class Written:
+    """C text of a kernel, the number of its temporaries, and a file that pages share, if any."""
+
+    text: str
+    temporaries: int
+    shared: tuple[str, str] | None
+
+
+def kernel(layout: Layout, task: str, outputs: Outputs, plan: Schedule) -> Written:
+    """The function of the point, the loops of the cell around it, and the batch."""
     point, temporaries = function.text(layout, task, outputs, plan)
-    group = loops.Group(layout, task, outputs).text()
-    return "\n".join([point, group, simd.batch(layout.d, task)]), temporaries
-
-
-def constants(layout: Layout, texts: Sequence[str]) -> list[str]:
-    """Tables of those constants that the kernels use."""
-    name, form = layout.d.name, layout.form
-    every = [*form.all, *form.data.values()]
-    found = {**{o: layout.shape(o) for o in orders(every)}, layout.geometry.order: layout.geometry}
-    out = [tables.weights(name, layout.d.rule)]
-    for shape in found.values():
-        out.append(shape.text(name))
-        if shape.line is not None:
-            out.append(tables.nodes(f"{name}_nodes{shape.order}", shape.line))
-    for a in found.values():
-        for b in found.values():
-            if a.line is not None and b.line is not None:
-                out.append(tables.pairs(f"{name}_C{a.order}{b.order}", a.line, b.line))
-    places = pairs.stored(layout)
-    numbers = ", ".join(map(str, places))
-    out.append(f"static const unsigned short {name}_K[{len(places)}] = {{{numbers}}};")
-    called = "".join(texts)
-    single = [piece for text in out for piece in text.split("\n\n") if piece.strip()]
-    return [p.strip() + "\n" for p in single if re.search(rf"\b{_name(p)}\b", called)]
-
-
-def _name(declaration: str) -> str:
-    """Name of a table."""
-    return declaration.partition("[")[0].rpartition(" ")[2]
+    pieces, name, shared = [point], "", None
+    if task == Task.TANGENT:
+        name, text = assembly.file(layout, outputs)
+        shared = (f"{name.removeprefix('softehl_')}.c", text)
+        pieces.insert(0, f"{assembly.declaration(name, Parent(layout, outputs).size)};\n")
+    pieces.append(loops.Group(layout, task, outputs, name).text())
+    pieces.append(simd.batch(layout.d, task))
+    return Written("\n".join(pieces), temporaries, shared)

@@ -1,4 +1,4 @@
-"""Where the unknowns, data and quantities of a page of fields stand, in the cell and at the point."""
+"""Where unknowns, data and quantities of a page of fields stand, in the cell and at the point."""
 
 from __future__ import annotations
 
@@ -73,7 +73,9 @@ class Layout:
     def field(self, c: Component) -> int:
         """Unknowns before those of the field that a component belongs to."""
         place = self.place(c)
-        inside = [self.place(o).start for o in self.components if self.place(o).stride == place.stride]
+        inside = [
+            self.place(o).start for o in self.components if self.place(o).stride == place.stride
+        ]
         return min(s for s in inside if place.start - s in range(place.stride))
 
     def shape(self, order: int) -> Shape:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
 
 from softehl.codegen import abi
 from softehl.codegen.abi import Task
@@ -11,61 +10,20 @@ from softehl.codegen.emit import simd
 from softehl.codegen.emit.points import function, pairs
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout, Needs, orders
+from softehl.codegen.emit.points.lines import Lines, load, store
 from softehl.codegen.emit.printer import design_width
 from softehl.codegen.language.definition import Component, Quantity
 
 Rows = tuple[int, ...]
 
 
-@dataclass
-class Lines:
-    """Lines of C."""
-
-    lines: list[str] = field(default_factory=list)
-    depth: int = 1
-
-    def add(self, text: str) -> None:
-        """One line."""
-        self.lines.append("    " * self.depth + text)
-
-    def open(self, head: str) -> None:
-        """A block begins."""
-        self.add(f"{head} {{")
-        self.depth += 1
-
-    def close(self) -> None:
-        """A block ends."""
-        self.depth -= 1
-        self.add("}")
-
-
-def load(out: Lines, to: str, source: str, count: int, width: str) -> None:
-    """Values of every lane from rows of the elements: `to`[k] = `source`[k]."""
-    for k in range(0, count, 4):
-        size = min(4, count - k)
-        pointers = ", ".join(f"&{to}[{k + i}]" for i in range(size))
-        out.add(f"softehl_load{size}({source} + {k}, {width}, {pointers});")
-
-
-def store(out: Lines, to: str, source: str, count: int, width: str) -> None:
-    """Values of every lane to rows of the elements."""
-    whole = count - count % 4
-    if whole > 64:
-        out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
-        values = ", ".join(f"{source}[k + {i}]" for i in range(4))
-        out.add(f"softehl_store4({to} + k, {width}, {values});")
-        out.close()
-    for k in range(whole if whole > 64 else 0, count, 4):
-        size = min(4, count - k)
-        values = ", ".join(f"{source}[{k + i}]" for i in range(size))
-        out.add(f"softehl_store{size}({to} + {k}, {width}, {values});")
-
-
 class Group:
     """The function that handles one group of elements in a task."""
 
-    def __init__(self, layout: Layout, task: str, outputs: Outputs) -> None:
-        self.layout, self.task, self.outputs = layout, task, outputs
+    def __init__(self, layout: Layout, task: str, outputs: Outputs, pairs: str = "") -> None:
+        """pairs: name of the function that makes tangents of moduli."""
+        self.layout, self.pairs = layout, pairs
+        self.task, self.outputs = task, outputs
         self.needs = Needs.of(outputs.entries)
         self.out = Lines()
         self.D = layout.dimension
@@ -86,7 +44,7 @@ class Group:
         self._call()
         self.out.close()
         if self.task == Task.TANGENT:
-            pairs.assembled(self.out, self.layout, self.outputs)
+            self.out.add(f"{self.pairs}(S, K);")
         self._finish()
         name = abi.function_name(self.layout.d.name, self.task)
         idle = ", ".join(f"(void){n}" for _, n in simd.GROUP)
@@ -116,7 +74,6 @@ class Group:
         if self.task == Task.TANGENT:
             size = pairs.Parent(self.layout, self.outputs).size
             out.add(f"V S[{self.layout.points}][{size}];")
-            out.add(f"V k_lanes[{len(d.unknowns) ** 2}];")
 
     def _moving(self) -> int:
         """Entries of `direction` of an element."""
@@ -147,7 +104,7 @@ class Group:
             self._moved_geometry()
         if self.spread or self.task == Task.ENERGY:
             ring = " * (6.283185307179586 * X1)" if self.ring else ""
-            out.add(f"const V w = det * {self.layout.d.name}_W[q]{ring};")
+            out.add(f"const V w = det * {self.layout.d.cell}_W[q]{ring};")
 
     def _placed(self) -> bool:
         return bool(self.needs["coordinates"]) or self.ring
@@ -156,7 +113,7 @@ class Group:
         """Sums over the nodes of an order: name -> value at the node n, factor N, D0, D1 or D2."""
         if not sums:
             return
-        out, name = self.out, self.layout.d.name
+        out = self.out
         nodes = self.layout.shape(order).nodes
         out.add(f"V {', '.join(f'{k} = softehl_splat(0.0)' for k in sums)};")
         out.open(f"for (int n = 0; n < {nodes}; ++n)")
@@ -170,7 +127,7 @@ class Group:
         out.close()
 
     def _factors(self, order: int, wanted: Iterable[str], node: str) -> None:
-        name = self.layout.d.name
+        name = self.layout.d.cell
         for f in sorted(wanted):
             entry = "" if f == "N" else f"[{f[1:]}]"
             table = "N" if f == "N" else "D"
@@ -209,7 +166,7 @@ class Group:
 
     def _inputs(self) -> None:
         """The arrays x, g, e, b, t of the function of the point."""
-        out, site, form = self.out, self.layout.site, self.layout.form
+        site, form = self.layout.site, self.layout.form
         known = self._interpolated("us", {k: form.all[k] for k in self._read("dofs")}, "g")
         data = {k: form.data[k] for k in self._read("data") if k in form.data}
         known |= self._interpolated("es", data, "e")
@@ -339,7 +296,7 @@ class Group:
                 moved[entry] = start + self._drag(quantities, k - first, "g")
         return moved
 
-    def _drag(self, quantities: dict[int, Quantity], k: int, array: str) -> str:
+    def _drag(self, quantities: Mapping[int, Quantity], k: int, array: str) -> str:
         """What a slope loses because the places move: - (slopes) L."""
         q = quantities[k]
         if q.axis is None:
@@ -417,24 +374,11 @@ class Group:
         if self.spread or self.task == Task.ENERGY:
             count = size if self.spread else 1
             store(out, "R", "r", count, str(count))
-        if self.task == Task.TANGENT:
-            self._store_tangent(size * size)
         out.open("if (softehl_any(failed))")
         out.add(f"softehl_spoil(failed, R, {self.widths['values']});")
         if self.task == Task.TANGENT:
             out.add(f"softehl_spoil(failed, K, {size * size});")
         out.close()
-
-
-    def _store_tangent(self, count: int) -> None:
-        out, whole, name = self.out, count - count % 4, self.layout.d.name
-        out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
-        out.add(f"const unsigned short *const at = {name}_K + k;")
-        values = ", ".join(f"k_lanes[at[{i}]]" for i in range(4))
-        out.add(f"softehl_store4(K + k, {count}, {values});")
-        out.close()
-        for k in range(whole, count):
-            out.add(f"softehl_store1(K + {k}, {count}, k_lanes[{name}_K[{k}]]);")
 
 
 def _components(quantities: Iterable[Quantity]) -> list[Component]:

@@ -10,14 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING
 
 from softehl.codegen.emit.points.function import Outputs
-from softehl.codegen.emit.points.layout import Layout, orders
+from softehl.codegen.emit.points.layout import Layout
+from softehl.codegen.emit.points.lines import Lines
 from softehl.codegen.language.definition import Component, Quantity
-
-if TYPE_CHECKING:
-    from softehl.codegen.emit.points.loops import Lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,28 +172,4 @@ def stored(layout: Layout) -> list[int]:
         ranks.append((layout.field(c), along, n))
     pairs = product(range(size), repeat=2)
     upper = layout.site.conservative
-    return [
-        j * size + i if upper and ranks[j] < ranks[i] else i * size + j for i, j in pairs
-    ]
-
-
-def assembled(out: Lines, layout: Layout, outputs: Outputs) -> None:
-    """The tangent k_lanes from the moduli S."""
-    from softehl.codegen.emit.points import dense, tensor
-
-    parent = Parent(layout, outputs)
-    found = orders(parent.quantities)
-    pairs = []
-    for n, e in enumerate(found):
-        for f in found[n if parent.symmetric else 0 :]:
-            pairs.append(Pair(parent, (e, f), e == f and parent.symmetric))
-    covered = {entry for pair in pairs for entry in pair.entries}
-    if parent.symmetric:
-        covered |= {(j, i) for i, j in covered}
-    if len(covered) < len(layout.components) ** 2:
-        out.add(f"for (int k = 0; k < {len(layout.d.unknowns) ** 2}; ++k)")
-        out.add("    k_lanes[k] = softehl_splat(0.0);")
-    for pair in pairs:
-        if pair.entries:
-            lines = [layout.shape(order).line for order in pair.order]
-            (tensor if all(lines) else dense).assembled(out, pair)
+    return [j * size + i if upper and ranks[j] < ranks[i] else i * size + j for i, j in pairs]

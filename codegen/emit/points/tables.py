@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -53,6 +54,7 @@ class Shape:
         return f"{N}\n{_array(f'{name}_D{self.order}', self.slopes)}"
 
 
+@cache
 def shape(order: int, cell: Element, rule: QuadratureRule) -> Shape:
     """Shape functions of a cell at the points of a rule."""
     values, slopes = _evaluated(cell.shape, rule.points, cell.dimension)

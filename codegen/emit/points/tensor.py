@@ -8,14 +8,11 @@ slope along that direction becomes a value.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from softehl.codegen.emit.points.lines import Lines
 from softehl.codegen.emit.points.pairs import Pair
 from softehl.codegen.emit.points.tables import Line
 from softehl.codegen.language.definition import Component, Quantity
-
-if TYPE_CHECKING:
-    from softehl.codegen.emit.points.loops import Lines
 
 Key = tuple[Component, int | None, Component, int | None]
 """A modulus: component and direction (None: value) of the row and of the column."""
@@ -80,8 +77,8 @@ class _Level:
             targets.setdefault(kept, []).append((2 * (k == axis) + (m == axis), place))
         mirrored = {(i, k, j, m): (j, m, i, k) for i, k, j, m in targets}
         if alike:
-            place = {key: n for n, key in enumerate(targets)}
-            targets = {key: t for key, t in targets.items() if place[key] <= place[mirrored[key]]}
+            turn = {key: n for n, key in enumerate(targets)}
+            targets = {key: t for key, t in targets.items() if turn[key] <= turn[mirrored[key]]}
         numbers = {key: str(n) for n, key in enumerate(targets)}
         if axis:
             out.add(f"V T{axis}[{size**axis}][{len(targets)}];")
@@ -91,7 +88,10 @@ class _Level:
             for n in numbers.values():
                 out.add(f"T{axis}[p][{n}] = t{n};")
             out.close()
-            every = {**numbers, **({mirrored[key]: n for key, n in numbers.items()} if alike else {})}
+            every = {
+                **numbers,
+                **({mirrored[key]: n for key, n in numbers.items()} if alike else {}),
+            }
             _Level(out, self.pair, axis - 1, f"T{axis}").write(every, alike=alike)
         else:
             self._stores(numbers)
@@ -99,7 +99,7 @@ class _Level:
     def _sums(self, targets: dict[Key, list[tuple[int, str]]], size: int) -> None:
         """The sums t0, t1, ... over the points."""
         out, axis = self.out, self.axis
-        table = f"{self.pair.layout.d.name}_C{self.pair.order[0]}{self.pair.order[1]}"
+        table = f"{self.pair.layout.d.cell}_C{self.pair.order[0]}{self.pair.order[1]}"
         for s in range(size):
             point = f"p * {size} + {s}" if axis else str(s)
             out.add(f"const double *const c{s} = {table}[{s}][a{axis}][b{axis}];")
@@ -115,7 +115,7 @@ class _Level:
             index = f"{letter}0"
             for k in range(1, pair.layout.dimension):
                 index = f"({index}) * {len(self.lines[side].values[0])} + {letter}{k}"
-            nodes = f"{pair.layout.d.name}_nodes{pair.order[side]}"
+            nodes = f"{pair.layout.d.cell}_nodes{pair.order[side]}"
             out.add(f"const int {letter} = {nodes}[{index}];")
         for (i, _, j, _), n in numbers.items():
             pair.store(out, i, j, "a", "b", f"t{n}")
