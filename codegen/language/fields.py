@@ -161,7 +161,7 @@ class Fields(Model):
         self._densities += 1
         volume, density, frozen = self._volume(), sp.Integer(0), []
         for factor, value in zip(left.values, right.values, strict=True):
-            label = f"flux_{self._factors}"
+            label = f"weak_flux_{self._factors}"
             self._factors += 1
             frozen.append(self.define(label, factor * volume, interface=True))
             density += frozen[-1] * value

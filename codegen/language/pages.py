@@ -68,7 +68,12 @@ class Page:
                 f"{self.name} is a page of fields, which stands on any cell: say which, as in "
                 'softehl.load_kernel(page, cell="hex8") or softehl generate --cell hex8'
             )
-        return [self.definition(cell, on.geometry) for cell in on.cells]
+        try:
+            return [self.definition(cell, on.geometry) for cell in on.cells]
+        except ModelError:
+            raise
+        except ValueError as error:  # no such cell
+            raise ModelError(str(error)) from None
 
     def at_point(self, cell: str, geometry: str | None = None) -> PointForm:
         """The model at a point of a cell."""

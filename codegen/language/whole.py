@@ -40,6 +40,16 @@ class Whole(Fields):
         self._map = kinematics.isoparametric(self, self._X, cell.gradient(*self._at))
         self._shapes: dict[int, tuple[list[Any], list[list[Any]]]] = {}
 
+    def point(self) -> list[sp.Symbol]:
+        """Parent coordinates, under names that a page does not use."""
+        names = (f"parent_{k}" for k in range(self.rule.dimension))
+        return [self._input(s, "rule", k, varying=True) for k, s in enumerate(names)]
+
+    @property
+    def weight(self) -> sp.Symbol:
+        """Weight of the quadrature point, under such a name, too."""
+        return self._input("parent_weight", "rule", self.rule.dimension, varying=True)
+
     def finish(self) -> Definition:
         """The frozen definition, which knows its cell."""
         return replace(super().finish(), cell=self.cell.name)
@@ -49,13 +59,13 @@ class Whole(Fields):
         if order not in self._shapes:
             cell = self.cell if order == self.order else ELEMENTS[CORNERS[self.cell.name]]
             label = "" if order == self.order else f"_of_order_{order}"
-            N = [self.define(f"N{label}_{a}", v) for a, v in enumerate(cell.shape(*self._at))]
+            N = [self.define(f"shape{label}_{a}", v) for a, v in enumerate(cell.shape(*self._at))]
             dN = self._map.dN
             if order != self.order:
                 inverse = self._map.inverse
                 parent = [sp.Matrix([list(g)]) * inverse for g in cell.gradient(*self._at)]
                 dN = [
-                    [self.define(f"dN{label}_{a}{k}", v) for k, v in enumerate(row)]
+                    [self.define(f"slope{label}_{a}{k}", v) for k, v in enumerate(row)]
                     for a, row in enumerate(parent)
                 ]
                 self.measure(self._map.detJ, [v for row in dN for v in row])
@@ -86,7 +96,7 @@ class Whole(Fields):
 
     def _volume(self) -> Any:
         if self.geometry == AXISYMMETRIC:
-            return self.define("volume", 2 * sp.pi * self._place()[1] * self._map.detJ)
+            return self.define("volume_of_ring", 2 * sp.pi * self._place()[1] * self._map.detJ)
         return self._map.detJ
 
     def _total_of(self, name: str, density: Any) -> Any:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
+from softehl.codegen.language.pages import On
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cache, product, targets
 from softehl.codegen.tools import files as cli_files
@@ -29,11 +30,12 @@ def generate(
     target: str = Target.SIMD,
     out: Path | None = None,
     seconds: float = SECONDS,
+    on: tuple[tuple[str, ...], str | None] = ((), None),
 ) -> int:
-    """See `_generate`; says what is wrong in one line."""
+    """See `_generate`; says what is wrong in one line.  on: cells and geometry of pages."""
     try:
         _require_printable(*models, *([out] if out else []))
-        return _generate(models, check, trace, Target(target), out, seconds)
+        return _generate(models, check, trace, Target(target), out, seconds, On(*on))
     except (ModelFileError, NoStateError, BuildError, CacheError) as error:
         return _refused(str(error))
     except OSError as error:
@@ -60,6 +62,7 @@ def _generate(
     target: Target,
     out: Path | None,
     seconds: float,
+    on: On,
 ) -> int:
     """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1).
 
@@ -70,10 +73,10 @@ def _generate(
         if check or trace is not None:
             return _refused(f"--check and --trace know target simd, not {target}")
         if models:
-            return cli_files.write_target(models, target, out)
+            return cli_files.write_target(models, target, out, on)
         return targets.write((make() for make in ALL.values()), target, out)
     if models:
-        return cli_files.generate(models, out=out, check=check, trace=trace, seconds=seconds)
+        return cli_files.generate(models, out=out, check=check, trace=trace, seconds=seconds, on=on)
     if out is not None:
         return _refused("--out needs a MODEL.py or a --target")
     if trace is not None:

@@ -55,12 +55,67 @@ def patch(mesh: Mesh, geometry: str | None, gradient: Array) -> tuple[float, Arr
     return float(max(errors)), result.fields("rubber")["J"]
 
 
-@pytest.mark.parametrize(("shape", "order"), [("triangle", 1)])
-def test_a_patch_of_plane_cells_deforms_affinely(shape: str, order: int) -> None:
-    mesh = moved(Mesh.rectangle(1, 1, cells=(2, 2), order=order, shape=shape))  # type: ignore[arg-type]
+def box(shape: str, order: int, cells: int = 2) -> Mesh:
+    """A unit square or cube."""
+    if shape in ("triangle", "quad"):
+        return Mesh.rectangle(1, 1, cells=(cells, cells), order=order, shape=shape)  # type: ignore[arg-type]
+    return Mesh.box((1, 1, 1), cells=(cells,) * 3, order=order, shape=shape)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("shape", "order"),
+    [
+        ("triangle", 1),
+        ("quad", 2),
+        ("tetrahedron", 1),
+        ("hex", 1),
+        pytest.param("triangle", 2, marks=pytest.mark.slow),
+        pytest.param("quad", 1, marks=pytest.mark.slow),
+        pytest.param("tetrahedron", 2, marks=pytest.mark.slow),
+        pytest.param("wedge", 1, marks=pytest.mark.slow),
+        pytest.param("serendipity", 2, marks=pytest.mark.slow),
+        pytest.param("hex", 2, marks=pytest.mark.slow),
+    ],
+)
+def test_a_patch_of_any_cells_deforms_affinely(shape: str, order: int) -> None:
+    mesh = moved(box(shape, order))
+    size = mesh.dimension
     error, J = patch(mesh, None, AFFINE)
     assert error < 1e-12
-    assert np.allclose(J, np.linalg.det(np.eye(2) + AFFINE[:2, :2]), rtol=1e-12)
+    assert np.allclose(J, np.linalg.det(np.eye(size) + AFFINE[:size, :size]), rtol=1e-12)
+
+
+def test_a_patch_that_is_not_affine_is_seen() -> None:
+    mesh = moved(box("triangle", 1))
+    study = Study(mesh)
+    study.add("rubber", rubber, mu=0.4, K=0.9)
+    for side in mesh.sides:
+        study.fix(side, u_x=lambda x, t: 0.1 * x[:, 1] ** 2, u_y=0)
+    assert np.ptp(study.solve().fields("rubber")["J"]) > 1e-3
+
+
+@softehl.page
+def poisson(m):  # type: ignore[no-untyped-def]
+    """- div grad T = q with T = sin(pi x) sin(pi y)."""
+    T = m.scalar("T")
+    x, y = m.position
+    q = 2 * sp.pi**2 * sp.sin(sp.pi * x) * sp.sin(sp.pi * y)
+    m.weak(m.grad(T), m.grad(T))
+    m.weak(-q, T)
+    m.fields(error=(T - sp.sin(sp.pi * x) * sp.sin(sp.pi * y)) ** 2)
+
+
+@pytest.mark.parametrize(("shape", "order"), [("triangle", 1), ("quad", 2)])
+def test_errors_fall_with_the_order_of_the_cell(shape: str, order: int) -> None:
+    errors = []
+    for cells in (4, 8):
+        mesh = box(shape, order, cells)
+        study = Study(mesh)
+        study.add("plate", poisson)
+        for side in mesh.sides:
+            study.fix(side, T=0)
+        errors.append(np.sqrt(study.solve().fields("plate")["error"].mean()))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order + 1, abs=0.25)
 
 
 def test_an_axisymmetric_body_is_stretched_around_the_x_axis() -> None:

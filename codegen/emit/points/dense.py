@@ -44,7 +44,7 @@ def _factors(out: Lines, pair: Pair, side: int, node: str, index: str) -> None:
         )
         factor = f"N{node}" if axis < 0 else f"D{node}{axis}"
         out.add(f"const double {factor} = {table};")
-        out.add(f"(void){factor};")
+        out.idle(factor)
 
 
 def _columns(out: Lines, pair: Pair, columns: Columns) -> None:

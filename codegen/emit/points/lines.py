@@ -16,6 +16,10 @@ class Lines:
         """One line."""
         self.lines.append("    " * self.depth + text)
 
+    def idle(self, *names: str) -> None:
+        """Variables that may be left unread."""
+        self.add(" ".join(f"(void){n};" for n in names))
+
     def open(self, head: str) -> None:
         """A block begins."""
         self.add(f"{head} {{")

@@ -90,7 +90,7 @@ def pulled_back(out: Lines, layout: Layout, outputs: Outputs) -> None:
     parent, D = Parent(layout, outputs), range(layout.dimension)
     for k in D:
         out.add(f"const V {', '.join(f'wI{k}{m} = w * I{k}{m}' for m in D)};")
-        out.add(" ".join(f"(void)wI{k}{m};" for m in D))
+        out.idle(*(f"wI{k}{m}" for m in D))
     half: dict[tuple[Quantity, Quantity], str] = {}
     for (row, column), n in parent.numbers.items():
         terms = []
