@@ -136,15 +136,18 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
     )
 
 
-def kernel_in(directory: Path, name: str | None = None) -> Kernel:
+def kernel_in(directory: Path, name: str | None = None, cell: str | None = None) -> Kernel:
     """The kernel of a folder of generated C; `name` is needed if it holds several.
 
+    cell: on which a page of fields of that name stands.
     Raises `KernelError`, also when the folder has changed since this process loaded it.
     """
     entries = manifest(directory)
     if name is None and len(entries) > 1:
         raise MissingKernelsError(f"{directory.name} holds {', '.join(entries)}: name one of them")
-    kernel = load_kernel(name or next(iter(entries)), directory)
+    named = [n for n in (f"{name}_{cell}", f"{name}_{cell}_axisymmetric") if n in entries]
+    chosen = name if name in entries or not named else named[0]
+    kernel = load_kernel(chosen or next(iter(entries)), directory)
     if not kernel.library.current:
         raise StaleKernelsError(
             f"{directory.name}/ has changed since it was loaded: start Python anew, or load the "

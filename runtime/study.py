@@ -82,8 +82,9 @@ class Study:
     def add(
         self,
         name: str,
-        source: Source,
+        source: Source = None,
         *,
+        material: Source = None,
         on: str | Predicate | None = None,
         cells: str | None = None,
         model: str | None = None,
@@ -93,9 +94,10 @@ class Study:
         """Elements of a page on all cells, on a group of cells, or `on` a side.
 
         source: a page (file or function), a folder that `softehl generate` wrote, a Definition, a
-        kernel, or the name of one that ships; a page of fields stands on any kind of cell. model:
-        which, where the page has several. shared: unknowns without a node that are one for all
-        elements, not one for each. given: parameters of the
+        kernel, or the name of one that ships; a page of fields stands on any kind of cell.
+        material: instead, a stress law (file or function) for a body of it. model: which, where
+        there are several. shared: unknowns without a node that are one for all elements, not one
+        for each. given: parameters of the
         page (numbers, or functions of the load factor) and its data (a number, (n,) numbers or a
         function of the elements' centres (n, dim)). Two are not given: `dt` is the length of a step
         of `march`, `rate` comes from `Model.rates`. On a side, a page of one node has an element at
@@ -104,7 +106,11 @@ class Study:
         blocks = self._statement.blocks
         if name in blocks:
             raise StudyError(f"block {name!r} is there already; blocks: {listed(blocks)}")
-        kernel = source if isinstance(source, Kernel) else self._load(source, model, on, cells)
+        if (source is None) == (material is None):
+            raise StudyError(f"{name!r}: give a page or material=..., one of them")
+        kind = None if on is not None else kind_of(self.mesh, cells)
+        law = material is not None
+        kernel = self._loaded(material if law else source, model, kind, law=law)
         elements = elements_of(self.mesh, name, kernel, on, cells)
         blocks[name] = page_on(self.mesh, name, kernel, elements, shared, given)
 
@@ -319,15 +325,20 @@ class Study:
         """Equations of the study.  Raises StudyError for what does not fit together."""
         return equations(self._statement)
 
-    def _load(
-        self, source: Source, model: str | None, on: str | Predicate | None, cells: str | None
-    ) -> Kernel:
+    def _loaded(self, source: Source, model: str | None, kind: str | None, *, law: bool) -> Kernel:
         """By the front door, which knows when the generator is needed: this room does not."""
+        if isinstance(source, Kernel):
+            return source
         require_page(source)
         import softehl
 
-        kind = None if on is not None else kind_of(self.mesh, cells)
-        return softehl.load_kernel(source, model, cell=kind, geometry=self.geometry)  # type: ignore[arg-type]
+        return softehl.load_kernel(
+            source,  # type: ignore[arg-type]
+            model,
+            cell=kind,
+            geometry=self.geometry,
+            materials=law,
+        )
 
     def _add_force(
         self,

@@ -51,6 +51,7 @@ class Fields(Model):
         self.order = order_of(cell)
         self._traced: dict[Any, Traced] = {}
         self._densities = 0
+        self._energies: dict[tuple[Any, Any], Any] = {}
 
     # what Whole and Site do differently ---------------------------------------------------------
 
@@ -149,10 +150,11 @@ class Fields(Model):
         Both are scalars, lists or matrices of the same shape, such as a flux and m.grad(T) of an
         unknown field T. Further ones, and what is minimised, add up.
         """
-        energy = getattr(flux, "energy_of", lambda _: None)(varied)
-        if energy is not None:
-            return self.minimise(energy)
         left, right = Entries.of(flux), Entries.of(varied)
+        energy = self._energies.get((tuple(left.values), tuple(right.values)))
+        if energy is not None:
+            self.minimise(energy)
+            return
         if left.suffixes != right.suffixes:
             raise ModelError(
                 f"weak: a flux of {len(left.values)} entries times the variation of "
@@ -161,6 +163,8 @@ class Fields(Model):
         self._densities += 1
         volume, density, frozen = self._volume(), sp.Integer(0), []
         for factor, value in zip(left.values, right.values, strict=True):
+            if sp.sympify(value).is_number:
+                continue
             label = f"weak_flux_{self._factors}"
             self._factors += 1
             frozen.append(self.define(label, factor * volume, interface=True))
@@ -174,7 +178,10 @@ class Fields(Model):
         `m.weak(m.stress(material, F), F)` is its equilibrium; where the material has an energy,
         that is minimised, so that the tangent is symmetric.
         """
-        return material.at(self, F)
+        P, energy = material.at(self, F)
+        if energy is not None:
+            self._energies[tuple(P), tuple(F)] = energy
+        return P
 
     # what belongs to whole elements -------------------------------------------------------------
 

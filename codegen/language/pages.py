@@ -21,14 +21,18 @@ Form = Literal["whole", "point"]
 
 @dataclass(frozen=True)
 class On:
-    """Where pages of fields are to stand: cells by name, and the geometry (None: the usual one)."""
+    """Where pages of fields are to stand: cells by name, and the geometry (None: the usual one).
+
+    materials: whether only the stress laws of a file are wanted, as bodies.
+    """
 
     cells: tuple[str, ...] = ()
     geometry: str | None = None
+    materials: bool = False
 
     def told(self) -> tuple[str, ...]:
         """All of it as texts, for a digest."""
-        return (*self.cells, self.geometry or "")
+        return (*self.cells, self.geometry or "", "materials" if self.materials else "")
 
 
 NOWHERE = On()

@@ -15,7 +15,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from softehl.codegen import abi
 from softehl.codegen.tools import build, model_text
@@ -25,7 +25,12 @@ from softehl.codegen.tools.model_text import ModelFileError
 if TYPE_CHECKING:
     from softehl.codegen.graph.graph import Node
     from softehl.codegen.language.definition import Definition
+    from softehl.codegen.language.law import Material
     from softehl.codegen.language.pages import On, Page
+
+
+Where: TypeAlias = "tuple[tuple[str, ...], str, bool]"
+"""Cells and geometry ("": the usual one) of pages of fields, and whether materials are wanted."""
 
 
 @dataclass(frozen=True)
@@ -42,33 +47,36 @@ class Library:
     compiled: Mapping[str, float]
 
 
-def folder_of(
-    source: Path | Definition | Page, cell: str | None = None, geometry: str | None = None
-) -> Path:
+def folder_of(source: Path | Definition | Page | Material, where: Where = ((), "", False)) -> Path:
     """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
 
-    cell, geometry: where pages of fields stand.
+    where: cells and geometry of pages of fields, and whether materials are wanted.
     """
-    cells = () if cell is None else (cell,)
+    cells, geometry, materials = where
     if not isinstance(source, Path):
-        return library(_definitions(source, cells, geometry)).folder
-    anywhere, here = _file_key(source), _file_key(source, *cells, geometry or "")
-    files = store.recall(anywhere) or store.recall(here)
+        return library(_definitions(source, where)).folder
+    anywhere = _file_key(source)
+    here = _file_key(source, *cells, geometry, "materials" if materials else "")
+    files = (None if materials else store.recall(anywhere)) or store.recall(here)
     if files is None:
         from softehl.codegen.language.pages import On
         from softehl.codegen.tools import user
 
-        found = user.definitions(source, On(cells, geometry))
+        found = user.definitions(source, On(cells, geometry or None, materials))
         return library(found, here if any(d.cell for d in found) else anywhere).folder
     return compiled(files)[0]
 
 
-def _definitions(
-    source: Definition | Page, cells: tuple[str, ...], geometry: str | None
-) -> list[Definition]:
+def _definitions(source: Definition | Page | Material, where: Where) -> list[Definition]:
+    from softehl.codegen.language.law import Material
     from softehl.codegen.language.pages import On, Page
 
-    return source.definitions(On(cells, geometry)) if isinstance(source, Page) else [source]
+    cells, geometry, _ = where
+    if isinstance(source, Material):
+        source = source.page()
+    if isinstance(source, Page):
+        return source.definitions(On(cells, geometry or None))
+    return [source]
 
 
 def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definition], Library]:

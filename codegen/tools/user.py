@@ -7,8 +7,10 @@ would with any script.  Its models are
 - the names of the file that hold a `Definition`, and
 - the functions decorated by `softehl.page`, on each cell that is asked for,
 
-in the order in which they are written; where the file has a mapping or list `MODELS` (of such
-functions or definitions), those alone.  Names that begin with an underscore are left out.
+in the order in which they are written.  Where there is none of these, or where they are asked for,
+the models are bodies of its functions decorated by `softehl.material`.  Where the file has a
+mapping or list `MODELS` (of such functions or definitions), those alone.  Names that begin with an
+underscore are left out.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ from typing import Any
 
 from softehl.codegen.language import names
 from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.law import Material
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.pages import NOWHERE, On, Page
@@ -59,7 +62,8 @@ def definitions(path: Path, on: On = NOWHERE) -> list[Definition]:
     path = path.resolve()
     text = read(path)
     with _imports_from(path.parent), _errors_of(path):
-        found = [d for entry in _entries(path, _run(path, text)) for d in _made(entry, on)]
+        entries = _entries(path, _run(path, text), materials=on.materials)
+        found = [d for entry in entries for d in _made(entry, on)]
     if not found:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
     check_names(path.name, found)
@@ -121,12 +125,19 @@ def _run(path: Path, text: str) -> ModuleType:
     return module
 
 
-def _entries(path: Path, module: ModuleType) -> list[Any]:
+def _entries(path: Path, module: ModuleType, *, materials: bool) -> list[Any]:
     chosen = getattr(module, "MODELS", None)
     if chosen is not None:
         return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
     public = [(k, v) for k, v in vars(module).items() if not k.startswith("_")]
     found = [v for _, v in public if isinstance(v, Definition | Page) or _makes_a_model(module, v)]
+    laws = [v for _, v in public if isinstance(v, Material)]
+    if laws and (materials or not found):
+        return [law.page() for law in laws]
+    if materials:
+        raise ModelFileError(
+            f"{path.name} has no material: write `@softehl.material` above `def my_law(m):`"
+        )
     if not found:
         bare = [k for k, v in public if _own_function(module, v) and _annotation(v) is None]
         if bare:

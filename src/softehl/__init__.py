@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.elements import quadrature, shapes
     from softehl.codegen.language.elements.cells import element
+    from softehl.codegen.language.law import Material, material
     from softehl.codegen.language.model import Model
     from softehl.codegen.language.pages import Page, page
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
@@ -74,6 +75,7 @@ _MODELLING = {
     "Model": "softehl.codegen.language.model",
     "element": "softehl.codegen.language.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
+    "material": "softehl.codegen.language.law",
     "page": "softehl.codegen.language.pages",
     "quadrature": "softehl.codegen.language.elements.quadrature:",
     "shapes": "softehl.codegen.language.elements.shapes:",
@@ -109,6 +111,7 @@ __all__ = [
     "kinematics",
     "load_kernel",
     "main",
+    "material",
     "page",
     "processes",
     "quadrature",
@@ -153,11 +156,12 @@ def with_sympy() -> Iterator[None]:
 
 
 def load_kernel(
-    source: "str | Path | Definition | Page",
+    source: "str | Path | Definition | Page | Material",
     name: str | None = None,
     *,
     cell: str | None = None,
     geometry: str | None = None,
+    materials: bool = False,
 ) -> "Kernel":
     """A compiled kernel, by any of
 
@@ -165,10 +169,11 @@ def load_kernel(
     - a model file: `load_kernel("my_model.py")`, with `name` where it has several models.  It is
       derived and compiled if the cache does not have it; the file is run then;
     - a folder that `softehl generate` wrote: `load_kernel("generated/my_model")`;
-    - a `Definition` or a function decorated by `softehl.page`, for notebooks.
+    - a `Definition` or a function decorated by `softehl.page` or `softehl.material`, for notebooks.
 
     cell, geometry: where a page of fields stands, as in `load_kernel(page, cell="hex8")`; the
     geometry is "plane strain" (the default), "axisymmetric" or "solid". Others ignore them.
+    materials: take the stress laws of a file, as bodies, and not its pages.
     Raises `runtime.kernels.KernelError`, or what is wrong with the model or the compiler.
     """
     from softehl.runtime import kernels
@@ -183,5 +188,6 @@ def load_kernel(
 
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
-        folder = library.folder_of(place, cell, geometry)
-    return kernels.kernel_in(folder, name)
+        where = (() if cell is None else (cell,), geometry or "", materials)
+        folder = library.folder_of(place, where)
+    return kernels.kernel_in(folder, name, cell)
