@@ -123,7 +123,7 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
 
 
 def form(d: Definition) -> Choice:
-    """Whether the kernels of a page are loops around functions of a point, and why."""
+    """Form of the kernels of a page: whole elements, or loops around functions of a point."""
     if d.point is None:
         return Choice(False, "no page of fields")
     attempt = _moduli(d.point.definition, Task.TANGENT)

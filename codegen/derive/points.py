@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softehl.codegen.abi import DESIGN, Task
+from softehl.codegen.abi import Task
 from softehl.codegen.derive import variants
 from softehl.codegen.derive.outputs import Entry, Slot
 from softehl.codegen.derive.variants import moved_arguments, moved_unknowns
@@ -26,8 +26,3 @@ def outputs(d: Definition, task: str) -> list[Entry]:
     seeds = {**moved_arguments(d), **moved_unknowns(d, first)}
     rates = directional(d.graph, [x.node for x in rows], seeds, d.given)
     return rows + [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]
-
-
-def moves(task: str) -> bool:
-    """Whether a task follows a variation of the element, the place of the point included."""
-    return task in DESIGN

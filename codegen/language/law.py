@@ -18,7 +18,7 @@ _SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
 class Law:
-    """What the function of a material gets: the deformation, and what a page has besides fields.
+    """Argument of the function of a material: the deformation, and what a page has but fields.
 
     F: deformation gradient (3, 3), of names. It says energies or stresses, which add up.
     """

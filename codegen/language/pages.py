@@ -21,7 +21,7 @@ Form = Literal["whole", "point"]
 
 @dataclass(frozen=True)
 class On:
-    """Where pages of fields are to stand: cells by name, and the geometry (None: the usual one).
+    """Places for pages of fields: cells by name, and the geometry (None: the usual one).
 
     materials: whether only the stress laws of a file are wanted, as bodies.
     """

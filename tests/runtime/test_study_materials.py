@@ -131,7 +131,7 @@ def test_a_file_of_materials_gives_bodies_of_them(tmp_path: Path) -> None:
 
 
 def test_what_a_material_cannot_say_is_told() -> None:
-    with pytest.raises(ModelError, match="neither m.energy"):
+    with pytest.raises(ModelError, match=r"neither m\.energy"):
         sheared(material=Material("empty", lambda m: None))
     with pytest.raises(ModelError, match="shape no matrix, must be"):
         sheared(material=Material("scalar", lambda m: m.stress(1)))

@@ -21,7 +21,7 @@ LARGE = 12_000
 
 @dataclass(frozen=True)
 class Choice:
-    """Whether the kernels stand at points, and why."""
+    """The chosen form of a page, and why."""
 
     at_points: bool
     why: str

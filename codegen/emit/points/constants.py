@@ -9,7 +9,7 @@ from softehl.codegen.emit.points.layout import Layout, orders
 
 
 def used(layout: Layout, text: str) -> list[str]:
-    """Those tables of the cell that a text names."""
+    """The tables of the cell that a text names."""
     name, form = layout.d.cell, layout.form
     every = [*form.all, *form.data.values()]
     found = {**{o: layout.shape(o) for o in orders(every)}, layout.geometry.order: layout.geometry}

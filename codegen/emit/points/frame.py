@@ -1,4 +1,4 @@
-"""What all parts of the loops of a cell share: the task, its lines, sums over nodes."""
+"""Frame of the loops of a cell: the task, its lines, sums over nodes."""
 
 from __future__ import annotations
 

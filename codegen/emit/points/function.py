@@ -21,7 +21,7 @@ _NAMES = {"coordinates": "X", "dofs": "d", "data": "a", "point data": "b", "dire
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """Where the outputs of a task go: the arrays P and A of the function.
+    """Outputs of a task and their places: the arrays P and A of the function.
 
     moduli: number in A by row and column, of those that are not zero; of symmetric ones the upper
     triangle alone.
@@ -32,7 +32,7 @@ class Outputs:
 
     @property
     def rows(self) -> list[Entry]:
-        """What stands in P."""
+        """The outputs in P."""
         return [x for x in self.entries if x.column is None and x.row.position < RATES]
 
     @property
@@ -109,5 +109,5 @@ def _statements(
 
 
 def used(task: str) -> bool:
-    """Whether the function of a task has fluxes, which are spread over the nodes."""
+    """True for a task with fluxes, which are spread over the nodes."""
     return task not in (Task.ENERGY, *abi.AT_POINTS)

@@ -1,4 +1,4 @@
-"""What the function of a point reads: fields and slopes, data, history, and how they move."""
+"""Inputs of the function of a point: fields and slopes, data, history, and how they move."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ class Inputs:
         return moved
 
     def _drag(self, quantities: Mapping[int, Quantity], k: int, array: str) -> str:
-        """What a slope loses because the places move: - (slopes) L."""
+        """Loss of a slope because the places move: - (slopes) L."""
         q = quantities[k]
         if q.axis is None:
             return ""

@@ -1,4 +1,4 @@
-"""Where unknowns, data and quantities of a page of fields stand, in the cell and at the point."""
+"""Places of unknowns, data and quantities of a page of fields, in the cell and at the point."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Layout:
         return list(dict.fromkeys(q.component for q in self.form.all))
 
     def place(self, c: Component) -> Place:
-        """Where a component stands among the unknowns, or the data, of the element."""
+        """Place of a component among the unknowns, or the data, of the element."""
         if c.given:
             names = [a.name for a in self.d.data]
             numbers = [names.index(f"{c.name}{a + 1}") for a in range(self.shape(c.order).nodes)]
@@ -98,13 +98,13 @@ class Layout:
 
 @dataclass(frozen=True)
 class Needs:
-    """What the outputs of a task read at a point: numbers of entries by array."""
+    """Inputs of a task at a point: numbers of entries by array."""
 
     arrays: dict[str, tuple[int, ...]]
 
     @staticmethod
     def of(entries: Iterable[Entry]) -> Needs:
-        """What some outputs read."""
+        """Inputs of some outputs."""
         found: dict[str, set[int]] = {}
         for n in reachable([x.node for x in entries]):
             if isinstance(n.payload, Input):

@@ -26,7 +26,7 @@ class Parent:
 
     @property
     def symmetric(self) -> bool:
-        """Whether the upper triangle alone is there."""
+        """True if the upper triangle alone is there."""
         return self.outputs.symmetric
 
     @cached_property

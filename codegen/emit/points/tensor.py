@@ -69,7 +69,7 @@ class _Level:
         out.close()
 
     def _one(self, moduli: dict[Key, str], *, alike: bool) -> None:
-        """What is done for one pair of nodes along the axis."""
+        """The sums of one pair of nodes along the axis."""
         out, axis, size = self.out, self.axis, len(self.lines[0].values)
         targets: dict[Key, list[tuple[int, str]]] = {}
         for (i, k, j, m), place in moduli.items():
