@@ -23,10 +23,12 @@ def creeping(m):
     inverse = C.adjugate() / J**2
     now = [E[0, 0], E[1, 1], E[2, 2], E[0, 1], E[1, 2], E[0, 2]]
     new = m.implicit(
-        "V", lambda v: [a - b - dt / tau * (e - a) for a, b, e in zip(v, V, now)], start=list(V)
+        "V",
+        lambda v: [a - b - dt / tau * (e - a) for a, b, e in zip(v, V, now, strict=True)],
+        start=list(V),
     )
     xx, yy, zz, xy, yz, xz = new
     viscous = sp.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     one = sp.eye(3)
     m.second_stress(mu * (one - inverse) + K * J * (J - 1) * inverse + 2 * G * (E - viscous))
-    m.history(**{f"V_{name}": v for name, v in zip(names, new)})
+    m.history(**{f"V_{name}": v for name, v in zip(names, new, strict=True)})
