@@ -35,9 +35,9 @@ from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement import given as read
 from softehl.runtime.statement.pages import (
     elements_of,
+    geometry_of,
     kind_of,
     page_on,
-    require_geometry,
     require_page,
 )
 from softehl.runtime.statement.records import (
@@ -74,7 +74,7 @@ class Study:
     def __post_init__(self) -> None:
         """Raises MeshError for a cell that is turned inside out, StudyError for a geometry."""
         self.mesh.check()
-        require_geometry(self.mesh, self.geometry)
+        geometry_of(self.mesh, self.geometry)
         self._statement = Statement(self.mesh)
 
     # the problem --------------------------------------------------------------------------------
@@ -108,7 +108,7 @@ class Study:
             raise StudyError(f"block {name!r} is there already; blocks: {listed(blocks)}")
         if (source is None) == (material is None):
             raise StudyError(f"{name!r}: give a page or material=..., one of them")
-        kind = None if on is not None else kind_of(self.mesh, cells)
+        kind = kind_of(self.mesh, on, cells)
         law = material is not None
         kernel = self._loaded(material if law else source, model, kind, law=law)
         elements = elements_of(self.mesh, name, kernel, on, cells)
@@ -336,7 +336,7 @@ class Study:
             source,  # type: ignore[arg-type]
             model,
             cell=kind,
-            geometry=self.geometry,
+            geometry=geometry_of(self.mesh, self.geometry),
             materials=law,
         )
 

@@ -24,8 +24,9 @@ from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 
 PLANE, AXISYMMETRIC, SOLID = "plane strain", "axisymmetric", "solid"
-GEOMETRIES = {1: (SOLID,), 2: (PLANE, AXISYMMETRIC), 3: (SOLID,)}
-"""Geometries of meshes by their dimension, the default first."""
+GEOMETRIES = {1: (SOLID, PLANE, AXISYMMETRIC), 2: (PLANE, AXISYMMETRIC, SOLID), 3: (SOLID,)}
+"""Geometries by the dimension of a cell, the default first; the last of two dimensions and those
+but the first of one are of sides."""
 AXES = "xyz"
 _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or m.weak"
 
@@ -53,7 +54,7 @@ class Fields(Model):
         self._densities = 0
         self._energies: dict[tuple[Any, Any], Any] = {}
 
-    # what Whole and Site do differently ---------------------------------------------------------
+    # what Whole, Side and Site do differently ---------------------------------------------------
 
     @abstractmethod
     def _components_of(self, components: Sequence[Component]) -> list[Traced]:
@@ -109,6 +110,15 @@ class Fields(Model):
         if isinstance(value, sp.MatrixBase):
             return sp.Matrix(rows)
         return sp.Matrix(rows[0])
+
+    @property
+    def normal(self) -> Any:
+        """Unit normal (dimension, 1) of an undeformed side, outwards; a cell has none."""
+        raise ModelError(f"normal: {self.cell.name} is a cell here, only sides have normals")
+
+    def area_vector(self, u: Any) -> Any:
+        """Area vector of a side displaced by u per undeformed area: see `normal`."""
+        raise ModelError(f"area_vector({u}): {self.cell.name} is a cell here, no side")
 
     @property
     def position(self) -> Any:

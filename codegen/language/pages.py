@@ -10,8 +10,9 @@ from softehl.codegen.language.definition import Definition, PointForm
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.cells import Element, element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
-from softehl.codegen.language.fields import AXISYMMETRIC, GEOMETRIES, Fields, order_of
+from softehl.codegen.language.fields import AXISYMMETRIC, GEOMETRIES, SOLID, Fields, order_of
 from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.side import Side
 from softehl.codegen.language.site import Site
 from softehl.codegen.language.whole import Whole
 
@@ -54,10 +55,19 @@ class Page:
     form: Form | None = None
 
     def definition(self, cell: str, geometry: str | None = None) -> Definition:
-        """The model of an element of a cell, by its name, in a geometry (None: the usual one)."""
+        """The model of an element of a cell, by its name, in a geometry (None: the usual one).
+
+        It is a side where the geometry has one dimension more: quad4 of a solid, line2 in plane
+        strain.
+        """
         kind = element(cell)
         chosen = geometry_of(kind.dimension, geometry)
         name = f"{self.name}_{cell}" + ("_axisymmetric" if chosen == AXISYMMETRIC else "")
+        if space_of(chosen, kind.dimension) > kind.dimension:
+            degree = self.degree or 2 * order_of(kind)
+            side = Side(name, kind, chosen, rule_of(kind, degree), self.doc)
+            self.write(side)
+            return side.finish()
         point = self._at_point(name, kind, chosen)
         whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
         self.write(whole)
@@ -95,8 +105,8 @@ class Page:
             return rule_of(cell, self.degree)
         order = order_of(cell)
         values = any(q.axis is None and q.component.order == order for q in form.unknowns)
-        simplex = len(cell.nodes) in ((3, 6) if cell.dimension == 2 else (4, 10))
-        return rule_of(cell, 2 * order) if values and simplex else cell.rule
+        short = cell.name.startswith(("line", "tri", "tet"))
+        return rule_of(cell, 2 * order) if values and short else cell.rule
 
 
 def rule_of(cell: Element, degree: int) -> QuadratureRule:
@@ -111,12 +121,19 @@ def rule_of(cell: Element, degree: int) -> QuadratureRule:
     return quadrature.gauss(degree // 2 + 1, cell.dimension)
 
 
+def space_of(geometry: str, dimension: int) -> int:
+    """Dimensions of the mesh in which a cell of a dimension has this geometry."""
+    if geometry != SOLID:
+        return 2
+    return 3 if dimension > 1 else 1
+
+
 def geometry_of(dimension: int, geometry: str | None) -> str:
     """The geometry of a mesh, checked.  Raises ModelError."""
     allowed = GEOMETRIES[dimension]
     if geometry is not None and geometry not in allowed:
         raise ModelError(
-            f"geometry = {geometry!r} of a mesh in {dimension}-D; allowed is "
+            f"geometry = {geometry!r} of a cell in {dimension}-D; allowed is "
             + " or ".join(f'"{g}"' for g in allowed)
         )
     return geometry or allowed[0]

@@ -11,7 +11,7 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.unknowns import Slot, slots
 from softehl.runtime.kernels import Kernel
-from softehl.runtime.mesh.mesh import Mesh, Predicate
+from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.statement.given import datum, known, parameter
 from softehl.runtime.statement.records import Block, StudyError
 
@@ -21,9 +21,19 @@ Elements = tuple[str, Integers]
 """Kind of cells or faces and their nodes (n, k)."""
 
 
-def kind_of(mesh: Mesh, cells: str | None) -> str | None:
-    """The kind of cells of a mesh or of a group of it; None where it has several."""
-    kinds = mesh.cells_of(cells)
+def _faces(mesh: Mesh, on: str | Predicate, kernel: Kernel) -> Mapping[str, Integers]:
+    """Faces of a side; those of a page of fields have an outside, where its normals go."""
+    return mesh.outer_faces(on) if kernel.cell else mesh.faces(on)
+
+
+def kind_of(mesh: Mesh, on: str | Predicate | None, cells: str | None) -> str | None:
+    """The kind of cells or faces that are meant; None where there are several."""
+    try:
+        kinds = mesh.faces(on) if on is not None else mesh.cells_of(cells)
+    except MeshError:
+        if on is None:
+            raise
+        return None  # nodes without faces: for a page of one node
     return next(iter(kinds)) if len(kinds) == 1 else None
 
 
@@ -35,7 +45,7 @@ def elements_of(
         raise StudyError(f"{name!r}: give cells=... or on=..., not both")
     if on is not None and kernel.nodes == 1:
         return "point1", mesh.nodes(on)[:, None]
-    there = mesh.faces(on) if on is not None else mesh.cells_of(cells)
+    there = _faces(mesh, on, kernel) if on is not None else mesh.cells_of(cells)
     fit = {kind: nodes for kind, nodes in there.items() if nodes.shape[1] == kernel.nodes}
     if len(fit) != 1 or (cells is None and len(there) > 1):
         kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in there.items())
@@ -124,14 +134,15 @@ def _initial(block: str, kernel: Kernel, given: Mapping[str, Any], centres: Arra
     return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
 
 
-def require_geometry(mesh: Mesh, geometry: str | None) -> None:
-    """Raise StudyError for a geometry that the mesh cannot have."""
+def geometry_of(mesh: Mesh, geometry: str | None) -> str:
+    """The geometry of a mesh (None: the usual one).  Raises StudyError for one it cannot have."""
     allowed = GEOMETRIES[mesh.dimension]
     if geometry is not None and geometry not in allowed:
         words = " or ".join(f'"{g}"' for g in allowed)
         raise StudyError(
             f"geometry = {geometry!r} of a mesh in {mesh.dimension}-D: allowed is {words}"
         )
+    return geometry or allowed[0]
 
 
 def require_page(source: object) -> None:

@@ -226,8 +226,12 @@ def test_what_a_page_cannot_say_is_told(write: Callable[[Fields], Any], words: s
 
 
 def test_cells_geometries_and_forms_are_checked() -> None:
-    with pytest.raises(ModelError, match='allowed is "plane strain" or "axisymmetric"'):
+    with pytest.raises(ModelError, match='in 3-D; allowed is "solid"'):
+        field_pages.rubber.definition("hex8", "plane strain")
+    with pytest.raises(ModelError, match="on a side there are values of fields"):
         field_pages.rubber.definition("quad4", "solid")
+    with pytest.raises(ModelError, match="only sides have normals"):
+        Page("wrong", lambda m: m.normal).definition("quad4")
     with pytest.raises(ValueError, match="no element 'hex9'; there are"):
         field_pages.rubber.definition("hex9")
     with pytest.raises(ModelError, match="say which, as in"):

@@ -144,3 +144,72 @@ def test_a_file_may_hold_a_page_of_fields(tmp_path: Path) -> None:
     result = study.solve()
     assert result.at((1.0, 0.5))["T"] == pytest.approx(2.0, rel=1e-12)
     assert result.reaction("right")["T"] == pytest.approx(3.0 * 4 / 2, rel=1e-12)
+
+
+@softehl.page
+def laplace(m):  # type: ignore[no-untyped-def]
+    """- div k grad T = 0."""
+    T = m.scalar("T")
+    (k,) = m.parameters(k="conductivity [W/(mm K)]")
+    m.weak(k * m.grad(T), m.grad(T))
+
+
+@softehl.page
+def followed(m):  # type: ignore[no-untyped-def]
+    """A pressure that follows the side."""
+    u = m.vector("u")
+    (p,) = m.parameters(p="pressure [MPa]")
+    m.weak(p * m.area_vector(u), u)
+
+
+@softehl.page
+def convection(m):  # type: ignore[no-untyped-def]
+    """Heat that leaves through a side, and a flux of given direction."""
+    T = m.scalar("T")
+    h, q = m.parameters(h="transfer [W/(mm^2 K)]", q="flux along x [W/mm^2]")
+    m.weak(h * T + q * m.normal[0], T)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "geometry"),
+    [
+        (Mesh.rectangle(1, 1, cells=(2, 2), shape="triangle", order=2), "plane strain"),
+        (Mesh.box((1, 1, 1), cells=(1, 1, 1), shape="tetrahedron"), "solid"),
+    ],
+)
+def test_a_page_on_a_side_is_the_pressure_that_follows_it(mesh: Mesh, geometry: str) -> None:
+    def solved(page: bool) -> Array:
+        study = Study(mesh, geometry=geometry)
+        study.add("rubber", rubber, mu=0.4, K=0.9)
+        for axis in "xyz"[: mesh.dimension]:
+            study.fix("left", **{f"u_{axis}": 0})
+        if page:
+            study.add("pressure", followed, on="right", p=lambda t: 0.1 * t)
+        else:
+            study.pressure("right", 0.1)
+        return study.solve(steps=2).values("u_x")
+
+    assert np.abs(solved(True) - solved(False)).max() < 1e-12
+    assert np.ptp(solved(False)) > 1e-2
+
+
+def test_an_axisymmetric_side_has_the_pressure_of_a_thick_tube() -> None:
+    mesh = Mesh.rectangle(1, 1, cells=(1, 8), order=2).map(lambda x: x + [0.0, 1.0])
+    study = Study(mesh, geometry="axisymmetric")
+    study.add("rubber", rubber, mu=0.4, K=0.9)
+    study.add("pressure", followed, on="bottom", p=1e-5)
+    for side in ("left", "right"):
+        study.fix(side, u_x=0)
+    moved = study.solve().at((0.5, 1.0))["u_y"]
+    lame = 0.9
+    inner = 1e-5 / 3 * (1 / (2 * (0.4 + lame)) * 1.0 + 4 / (2 * 0.4))
+    assert moved == pytest.approx(inner, rel=1e-4)
+
+
+def test_sides_have_outward_normals_and_values() -> None:
+    study = Study(Mesh.rectangle(2, 1, cells=(4, 2), shape="triangle"))
+    study.add("plate", laplace, k=3.0)
+    study.fix("left", T=4)
+    study.add("loss", convection, on="right", h=0.5, q=1.0)
+    # 3 dT/dx = - (T / 2 + 1) on the right: T = 4 - a x with 3 a = (4 - 2 a) / 2 + 1
+    assert study.solve().at((2.0, 0.5))["T"] == pytest.approx(4 - 2 * 3 / 4, rel=1e-12)

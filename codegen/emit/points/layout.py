@@ -13,7 +13,7 @@ from softehl.codegen.graph.graph import Input
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Component, Definition, PointForm, Quantity
 from softehl.codegen.language.elements.cells import ELEMENTS
-from softehl.codegen.language.whole import CORNERS
+from softehl.codegen.language.nodal import CORNERS
 
 
 @dataclass(frozen=True)
