@@ -78,7 +78,8 @@ class Fields(Model):
         """A vector field u with the unknowns u_x, u_y, u_z, as many as the mesh has dimensions.
 
         Its value at the point is a matrix (dimension, 1). order: 1 on a quadratic cell gives it
-        unknowns at the corners only; left out, it is that of the cell.
+        unknowns at the corners only, 0 one value of its own in every cell; left out, it is that of
+        the cell.
         """
         names = [f"{name}_{axis}" for axis in AXES[: self.dimension]]
         return sp.Matrix(self._declared_fields(names, order, given=False))
@@ -209,8 +210,8 @@ class Fields(Model):
 
     def _declared_fields(self, names: Sequence[str], order: int | None, given: bool) -> list[Any]:
         chosen = self.order if order is None else order
-        if chosen not in (1, self.order):
-            allowed = "1" if self.order == 1 else f"1 or {self.order}"
+        if chosen not in (0, 1, self.order):
+            allowed = "0 or 1" if self.order == 1 else f"0, 1 or {self.order}"
             raise ModelError(
                 f"{names[0]}: order = {order!r} on {self.cell.name}; allowed is {allowed}"
             )
@@ -227,6 +228,8 @@ class Fields(Model):
             if traced is None or traced.component.given:
                 raise ModelError(f"{value} is no field: give what m.vector or m.scalar returned")
             component = traced.component
+            if not component.order:
+                raise ModelError(f"{value} has order 0: steps before are known at nodes only")
             name = f"{component.name}_{suffix}"
             known = [t.value for t in self._traced.values() if t.component.name == name]
             found += known or self._declared_fields([name], component.order, given=True)

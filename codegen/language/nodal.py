@@ -73,7 +73,7 @@ class Nodal(Fields):
         """Shape functions of an order."""
         if order not in self._values:
             label = "" if order == self.order else f"_of_order_{order}"
-            values = self._element(order).shape(*self._at)
+            values = self._element(order).shape(*self._at) if order else [sp.Integer(1)]
             named = [self.define(f"shape{label}_{a}", v) for a, v in enumerate(values)]
             self._values[order] = named
         return self._values[order]
@@ -81,16 +81,19 @@ class Nodal(Fields):
     def _components_of(self, components: Sequence[Component]) -> list[Traced]:
         N = self._shape(components[0].order)
         names = [c.name for c in components]
-        if components[0].given:
+        if not components[0].order:
+            columns: Any = [[self.unknown(name)] for name in names]
+        elif components[0].given:
             columns = self.nodal_data(*names, nodes=len(N))
         else:
             columns = self.nodal_unknowns(*names, nodes=len(N))
         traced = []
         for component, column in zip(components, columns, strict=True):
             name = component.name
-            value = self.define(name, interpolate(N, column))
-            slopes = enumerate(self._slopes_of(component, column))
-            named = tuple(self.define(f"grad_{name}_{k}", v) for k, v in slopes)
+            value = column[0] if not component.order else self.define(name, interpolate(N, column))
+            zero = [sp.Integer(0)] * self.dimension
+            slopes = self._slopes_of(component, column) if component.order else zero
+            named = tuple(self.define(f"grad_{name}_{k}", v) for k, v in enumerate(slopes))
             traced.append(Traced(component, value, named))
         return traced
 

@@ -34,6 +34,18 @@ def mixed(m: Fields) -> None:
 
 
 @softehl.page
+def constant_pressure(m: Fields) -> None:
+    """A pressure of every cell, declared first."""
+    p, u = m.scalar("p", order=0), m.vector("u")
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + p * (J - 1) - p**2 / (2 * K))
+    m.fields(pressure=p)
+    m.offer(product=True, pseudo_load=True, fields_rate=True, derivatives=[K])
+
+
+@softehl.page
 def heat(m: Fields) -> None:
     """Weak forms without symmetry, rates, data of elements and the place of the point."""
     T = m.scalar("T")

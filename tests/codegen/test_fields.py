@@ -66,6 +66,7 @@ def called(kernel: Kernel, task: str, X: Array, dofs: Array, given: Any) -> list
     ("page", "cell", "geometry"),
     [
         (field_pages.mixed, "tri6", "plane strain"),
+        (field_pages.constant_pressure, "quad4", "plane strain"),
         (field_pages.heat, "hex8", "solid"),
         (field_pages.creep, "quad4", "axisymmetric"),
         pytest.param(field_pages.mixed, "quad9", "axisymmetric", marks=pytest.mark.slow),
@@ -210,7 +211,8 @@ def test_tangents_of_moduli_are_one_file_for_all_pages() -> None:
 @pytest.mark.parametrize(
     ("write", "words"),
     [
-        (lambda m: m.minimise(m.scalar("p", order=2)), "order = 2 on quad4; allowed is 1"),
+        (lambda m: m.minimise(m.scalar("p", order=2)), "order = 2 on quad4; allowed is 0 or 1"),
+        (lambda m: m.rate(m.scalar("p", order=0)), "steps before are known at nodes only"),
         (lambda m: m.weak(m.grad(m.scalar("T")), m.scalar("S")), "a flux of 2 entries"),
         (lambda m: m.grad(m.parameters(k="a")[0]), "grad of k: it is no field"),
         (lambda m: m.grad(m.scalar("T") * m.data(q="a")[0]), "grad of T*q: q is no field"),

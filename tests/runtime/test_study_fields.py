@@ -94,6 +94,28 @@ def test_a_patch_that_is_not_affine_is_seen() -> None:
     assert np.ptp(study.solve().fields("rubber")["J"]) > 1e-3
 
 
+def test_a_pressure_of_every_cell_holds_the_volume() -> None:
+    study = Study(Mesh.rectangle(1, 1, cells=(4, 4)))
+    study.add("rubber", constant_pressure, mu=0.4, K=4e4)
+    study.fix("bottom", u_x=0, u_y=0)
+    study.fix("top", u_x=0.2, u_y=0.1)
+    result = study.solve(steps=2)
+    J = result.fields("rubber")["J"].mean(axis=1)
+    assert np.abs(J - 1).max() < 1e-4
+    assert len(result.values("p")) == 16
+
+
+@softehl.page
+def constant_pressure(m):  # type: ignore[no-untyped-def]
+    """Displacements and a pressure of every cell."""
+    u, p = m.vector("u"), m.scalar("p", order=0)
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + p * (J - 1) - p**2 / (2 * K))
+    m.fields(J=J)
+
+
 @softehl.page
 def poisson(m):  # type: ignore[no-untyped-def]
     """- div grad T = q with T = sin(pi x) sin(pi y)."""
@@ -194,7 +216,7 @@ def test_a_page_on_a_side_is_the_pressure_that_follows_it(mesh: Mesh, geometry: 
 
 
 def test_an_axisymmetric_side_has_the_pressure_of_a_thick_tube() -> None:
-    mesh = Mesh.rectangle(1, 1, cells=(1, 8), order=2).map(lambda x: x + [0.0, 1.0])
+    mesh = Mesh.rectangle(1, 1, cells=(1, 8), order=2).map(lambda x: x + np.array([0.0, 1.0]))
     study = Study(mesh, geometry="axisymmetric")
     study.add("rubber", rubber, mu=0.4, K=0.9)
     study.add("pressure", followed, on="bottom", p=1e-5)

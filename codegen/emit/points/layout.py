@@ -80,6 +80,8 @@ class Layout:
 
     def shape(self, order: int) -> Shape:
         """Shape functions of an order."""
+        if order == 0:
+            return tables.constant(self.points, self.dimension)
         if order not in self._shapes:
             corner = order == 1 and self.d.cell in CORNERS
             cell = ELEMENTS[CORNERS[self.d.cell] if corner else self.d.cell]

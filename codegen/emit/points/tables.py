@@ -61,6 +61,11 @@ def shape(order: int, cell: Element, rule: QuadratureRule) -> Shape:
     return Shape(order, values, slopes, _line(cell, rule))
 
 
+def constant(points: int, dimension: int) -> Shape:
+    """The one shape function of what is the same in the whole cell."""
+    return Shape(0, ((1.0,),) * points, (((0.0,) * dimension,),) * points, None)
+
+
 def _evaluated(function: Any, points: Sequence[Sequence[Any]], dimension: int) -> tuple[Any, Any]:
     at = sp.symbols(f"x:{dimension}", real=True)
     N = [sp.sympify(v) for v in function(*at)]
