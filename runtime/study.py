@@ -36,7 +36,7 @@ from softehl.runtime.statement import given as read
 from softehl.runtime.statement.pages import (
     elements_of,
     geometry_of,
-    kind_of,
+    kinds_of,
     page_on,
     require_page,
 )
@@ -97,9 +97,10 @@ class Study:
         kernel, or the name of one that ships; a page of fields stands on any kind of cell.
         material: instead, a stress law (file or function) for a body of it. model: which, where
         there are several. shared: unknowns without a node that are one for all elements, not one
-        for each. given: parameters of the
-        page (numbers, or functions of the load factor) and its data (a number, (n,) numbers or a
-        function of the elements' centres (n, dim)). Two are not given: `dt` is the length of a step
+        for each. given: parameters of the page (numbers, or functions of the load factor) and its
+        data (a number, (n,) numbers or a function of the elements' centres (n, dim)). A page of
+        fields on several kinds of cells makes a block of each, "body:quad4", "body:tri3". Two
+        are not given: `dt` is the length of a step
         of `march`, `rate` comes from `Model.rates`. On a side, a page of one node has an element at
         each node. Raises StudyError, MeshError, or what is wrong with the page.
         """
@@ -108,11 +109,16 @@ class Study:
             raise StudyError(f"block {name!r} is there already; blocks: {listed(blocks)}")
         if (source is None) == (material is None):
             raise StudyError(f"{name!r}: give a page or material=..., one of them")
-        kind = kind_of(self.mesh, on, cells)
         law = material is not None
-        kernel = self._loaded(material if law else source, model, kind, law=law)
-        elements = elements_of(self.mesh, name, kernel, on, cells)
-        blocks[name] = page_on(self.mesh, name, kernel, elements, shared, given)
+        page = material if law else source
+        kinds = kinds_of(self.mesh, on, cells)
+        kernels = [self._loaded(page, model, kinds[0] if kinds else None, law=law)]
+        if kernels[0].cell and not isinstance(page, Kernel):
+            kernels += [self._loaded(page, model, kind, law=law) for kind in kinds[1:]]
+        for kernel in kernels:
+            label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
+            elements = elements_of(self.mesh, label, kernel, on, cells)
+            blocks[label] = page_on(self.mesh, label, kernel, elements, shared, given)
 
     def load(self, where: Where, **components: Amount) -> None:
         """Dead loads per reference length or area of a side, or forces at a place or nodes.

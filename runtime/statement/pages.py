@@ -26,15 +26,14 @@ def _faces(mesh: Mesh, on: str | Predicate, kernel: Kernel) -> Mapping[str, Inte
     return mesh.outer_faces(on) if kernel.cell else mesh.faces(on)
 
 
-def kind_of(mesh: Mesh, on: str | Predicate | None, cells: str | None) -> str | None:
-    """The kind of cells or faces that are meant; None where there are several."""
+def kinds_of(mesh: Mesh, on: str | Predicate | None, cells: str | None) -> tuple[str, ...]:
+    """The kinds of cells or faces that are meant."""
+    if on is None:
+        return tuple(mesh.cells_of(cells))
     try:
-        kinds = mesh.faces(on) if on is not None else mesh.cells_of(cells)
+        return tuple(mesh.faces(on))
     except MeshError:
-        if on is None:
-            raise
-        return None  # nodes without faces: for a page of one node
-    return next(iter(kinds)) if len(kinds) == 1 else None
+        return ()  # nodes without faces: for a page of one node
 
 
 def elements_of(
@@ -46,6 +45,8 @@ def elements_of(
     if on is not None and kernel.nodes == 1:
         return "point1", mesh.nodes(on)[:, None]
     there = _faces(mesh, on, kernel) if on is not None else mesh.cells_of(cells)
+    if kernel.cell in there:
+        return kernel.cell, there[kernel.cell]
     fit = {kind: nodes for kind, nodes in there.items() if nodes.shape[1] == kernel.nodes}
     if len(fit) != 1 or (cells is None and len(there) > 1):
         kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in there.items())

@@ -85,6 +85,24 @@ def test_a_patch_of_any_cells_deforms_affinely(shape: str, order: int) -> None:
     assert np.allclose(J, np.linalg.det(np.eye(size) + AFFINE[:size, :size]), rtol=1e-12)
 
 
+def test_a_page_stands_on_several_kinds_of_cells_at_once() -> None:
+    points = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0.9, 0.4]], dtype=float)
+    cells = {
+        "quad4": np.array([[1, 2, 5, 4]]),
+        "tri3": np.array([[0, 1, 6], [1, 4, 6], [4, 3, 6], [3, 0, 6]]),
+    }
+    mesh = Mesh(points=points, cells=cells)
+    study = Study(mesh)
+    study.add("rubber", rubber, mu=0.4, K=0.9)
+    A = AFFINE[:2, :2]
+    edge = [0, 1, 2, 3, 4, 5]
+    study.fix(edge, u_x=lambda x, t: x @ A[0], u_y=lambda x, t: x @ A[1])
+    result = study.solve()
+    assert np.abs(result.values("u_y") - points @ A[1]).max() < 1e-12
+    for block in ("rubber:quad4", "rubber:tri3"):
+        assert np.allclose(result.fields(block)["J"], np.linalg.det(np.eye(2) + A), rtol=1e-12)
+
+
 def test_a_patch_that_is_not_affine_is_seen() -> None:
     mesh = moved(box("triangle", 1))
     study = Study(mesh)
