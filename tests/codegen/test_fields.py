@@ -19,10 +19,10 @@ from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.pages import Form, Page
 from softehl.codegen.tools import build, library, verify
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels import Kernel, load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from tests.codegen import field_pages
-from tests.codegen.workshop import compiled
+from tests.codegen.workshop import compiled, write
 
 N = 11
 """Elements: a full group of lanes and a remainder, with four lanes and with eight."""
@@ -89,6 +89,23 @@ def test_loops_around_a_point_are_the_whole_element(
         for a, b in pairs:
             assert np.abs(a).max() > 0.0
             assert np.abs(a - b).max() < 1e-13 * max(1.0, np.abs(a).max()), task
+
+
+@pytest.mark.parametrize("lanes", [1, 4])
+def test_groups_of_one_and_of_four_elements_are_the_same(
+    lanes: int, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    d = replace(field_pages.creep, form="point").definition("tri3")
+    folders = [tmp_path / "usual", tmp_path / "other"]
+    usual = compiled(d, folders[0])
+    write(d, folders[1])
+    build.build(folders[1], extra=(*build.STRICT, "-O1", f"-DSOFTEHL_LANES={lanes}"))
+    other = load_kernel(d.name, folders[1])
+    X, dofs, given = state(usual, "tri3", rng)
+    for task in usual.tasks:
+        pairs = (called(k, task, X, dofs, given) for k in (usual, other))
+        for a, b in zip(*pairs, strict=True):
+            assert np.abs(a - b).max() < 1e-13 * np.abs(a).max(), task
 
 
 def test_a_local_iteration_that_fails_spoils_its_element_alone(

@@ -17,6 +17,8 @@ from softehl.codegen.emit.source import HEADER
 
 STEM = "pairs_"
 """Beginning of the names of such files."""
+_SHORT = 65536
+"""Entries of a tangent that a short number counts."""
 _NAME = f"{PREFIX}_{STEM}"
 
 
@@ -62,9 +64,10 @@ def _body(layout: Layout, outputs: Outputs) -> str:
 def _store(out: Lines, layout: Layout, count: int) -> None:
     whole, name = count - count % 4, f"{layout.d.cell}_K"
     places = ", ".join(map(str, stored(layout)))
-    out.add(f"static const unsigned short {name}[{count}] = {{{places}}};")
+    kind = "unsigned short" if count <= _SHORT else "unsigned"
+    out.add(f"static const {kind} {name}[{count}] = {{{places}}};")
     out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
-    out.add(f"const unsigned short *const at = {name} + k;")
+    out.add(f"const {kind} *const at = {name} + k;")
     values = ", ".join(f"k_lanes[at[{i}]]" for i in range(4))
     out.add(f"softehl_store4(K + k, {count}, {values});")
     out.close()
