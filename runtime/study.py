@@ -64,7 +64,7 @@ class Study:
 
     mesh: on which it lives; a cell that is turned inside out is a MeshError. geometry: what a page
     of fields knows of dimensions that the mesh does not have: in 2-D "plane strain" (the default)
-    or "axisymmetric", around the x axis.
+    or "axisymmetric", around the x axis: then loads and pressures of sides act on whole rings.
     """
 
     mesh: Mesh
@@ -133,7 +133,8 @@ class Study:
             value = read.amount(words, name, given)
             if isinstance(where, str) or callable(where):
                 for kind, faces in self.mesh.faces(where).items():
-                    self._add_force("load", where, DeadLoad(CELLS[kind], value), faces, (name,))
+                    kernel = DeadLoad(CELLS[kind], value, self._ring)
+                    self._add_force("load", where, kernel, faces, (name,))
             else:
                 nodes = read.nodes_of(self.mesh, where)
                 self._add_force("load", where, NodalForce(value), nodes[:, None], (name,))
@@ -157,7 +158,8 @@ class Study:
                 f"{self.mesh.dimension} coordinates is needed, in 2-D or 3-D"
             )
         for kind, faces in self.mesh.outer_faces(where).items():
-            self._add_force("pressure", where, Pressure(CELLS[kind], value), faces, names)
+            kernel = Pressure(CELLS[kind], value, self._ring)
+            self._add_force("pressure", where, kernel, faces, names)
 
     def spring(self, where: Where, **stiffness: float) -> None:
         """Springs to the ground at the nodes of a side, each of this stiffness."""
@@ -330,6 +332,11 @@ class Study:
     def system(self) -> System:
         """Equations of the study.  Raises StudyError for what does not fit together."""
         return equations(self._statement)
+
+    @property
+    def _ring(self) -> bool:
+        """Whether sides are those of rings."""
+        return self.geometry == "axisymmetric"
 
     def _loaded(self, source: Source, model: str | None, kind: str | None, *, law: bool) -> Kernel:
         """By the front door, which knows when the generator is needed: this room does not."""

@@ -11,6 +11,7 @@ import sympy as sp
 import softehl
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.result import Result
 from softehl.runtime.study import Study, StudyError
 
 AFFINE = np.array([[0.08, 0.05, -0.02], [-0.03, 0.1, 0.04], [0.02, -0.06, 0.07]])
@@ -244,6 +245,28 @@ def test_an_axisymmetric_side_has_the_pressure_of_a_thick_tube() -> None:
     lame = 0.9
     inner = 1e-5 / 3 * (1 / (2 * (0.4 + lame)) * 1.0 + 4 / (2 * 0.4))
     assert moved == pytest.approx(inner, rel=1e-4)
+
+
+def test_loads_and_pressures_of_an_axisymmetric_study_act_on_rings() -> None:
+    mesh = Mesh.rectangle(1, 1, cells=(2, 2), order=2).map(lambda x: x + np.array([0.0, 1.0]))
+
+    def solved(how: str) -> Result:
+        study = Study(mesh, geometry="axisymmetric")
+        study.add("rubber", rubber, mu=0.4, K=0.9)
+        study.fix("left", u_x=0, u_y=0)
+        if how == "page":
+            study.add("pressure", followed, on="right", p=lambda t: 0.1 * t)
+        elif how == "pressure":
+            study.pressure("right", 0.1)
+        else:
+            study.load("right", u_x=-0.1)
+        return study.solve(steps=2)
+
+    results = {how: solved(how) for how in ("page", "pressure", "load")}
+    assert np.abs(results["page"].x - results["pressure"].x).max() < 1e-12
+    total = results["load"].reaction("left")["u_x"]
+    assert total == pytest.approx(0.1 * np.pi * (2**2 - 1), rel=1e-9)
+    assert results["pressure"].iterations == results["page"].iterations
 
 
 def test_sides_have_outward_normals_and_values() -> None:

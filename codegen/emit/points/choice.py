@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout, orders
 from softehl.codegen.emit.points.pairs import Pair, Parent
+from softehl.codegen.graph.graph import Op
+from softehl.codegen.graph.traverse import reachable
 
 SAVED = 0.35
 """Part of the operations that whole-element code saves: 0.25 to 0.45 on tri3 to tet10."""
@@ -37,7 +39,8 @@ def choose(layout: Layout, tangent: Outputs, operations: int, short: int) -> Cho
         return Choice(d.unroll is False, "the page asks for it")
     work = layout.points * (2 * multiply_adds(layout, tangent) + operations)
     whole = round((1 - SAVED) * work)
-    local = any(n.op == "call" for x in tangent.entries for n in x.node.args) or bool(d.history)
+    below = reachable([x.node for x in tangent.entries])
+    local = bool(d.history) or any(n.op is Op.CALL for n in below)
     simple = d.cell.startswith(("tri", "tet", "wedge"))
     limit = LARGE if simple and not local else short
     told = f"about {whole} operations of the whole element"
