@@ -127,7 +127,7 @@ def form(d: Definition) -> Choice:
     if d.point is None:
         return Choice(False, "no page of fields")
     attempt = _moduli(d.point.definition, Task.TANGENT)
-    outputs = Outputs(attempt.entries, d.point.definition.conservative)
+    outputs = Outputs(attempt.entries)
     return choose(Layout(d, d.point), outputs, attempt.operations, SHORT)
 
 
@@ -164,7 +164,7 @@ def _at_point(layout: Layout, task: str) -> Function:
         entries, plan = placed(entries, roots), straight_line(order)
     else:
         plan = arranged_plan(site.graph, plan, [x.node for x in entries])
-    outputs = Outputs(entries, site.conservative)
+    outputs = Outputs(entries)
     made = emit_points.kernel(layout, task, outputs, plan)
     shared = () if made.shared is None else (made.shared,)
     return Function(

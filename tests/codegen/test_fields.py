@@ -209,6 +209,25 @@ def test_small_elements_stay_whole_and_large_ones_do_not() -> None:
     assert at_points("quad4", field_pages.creep)
 
 
+def test_moduli_of_a_weak_form_that_are_symmetric_are_found_to_be() -> None:
+    def symmetric(write: Callable[[Fields], Any]) -> bool:
+        d = Page("flow", write, form="point").definition("quad9")
+        shared = pipeline.compile_model(d).shared
+        (text,) = shared.values()
+        return "V (*restrict S)[3]" in text
+
+    def flux(m: Fields, power: int) -> None:
+        g = m.grad(m.scalar("T"))
+        m.weak(g * g.dot(g) ** power, g)
+
+    def turned(m: Fields) -> None:
+        g = m.grad(m.scalar("T"))
+        m.weak(sp.Matrix([g[0] + g[1], g[1]]), g)
+
+    assert symmetric(lambda m: flux(m, 2))
+    assert not symmetric(turned)
+
+
 def test_tangents_of_moduli_are_one_file_for_all_pages() -> None:
     @softehl.page
     def other(m: Fields) -> None:

@@ -57,13 +57,13 @@ def _body(layout: Layout, outputs: Outputs) -> str:
         if pair.entries:
             lines = [layout.shape(order).line for order in pair.order]
             (tensor if all(lines) else dense).assembled(out, pair)
-    _store(out, layout, count)
+    _store(out, layout, count, symmetric=parent.symmetric)
     return "\n".join(out.lines)
 
 
-def _store(out: Lines, layout: Layout, count: int) -> None:
+def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
     whole, name = count - count % 4, f"{layout.d.cell}_K"
-    places = ", ".join(map(str, stored(layout)))
+    places = ", ".join(map(str, stored(layout, symmetric=symmetric)))
     kind = "unsigned short" if count <= _SHORT else "unsigned"
     out.add(f"static const {kind} {name}[{count}] = {{{places}}};")
     out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")

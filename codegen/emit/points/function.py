@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from softehl.codegen import abi
 from softehl.codegen.abi import Task
@@ -28,7 +29,13 @@ class Outputs:
     """
 
     entries: Sequence[Entry]
-    symmetric: bool
+
+    @cached_property
+    def symmetric(self) -> bool:
+        """True if every modulus and its mirror are one and the same value."""
+        pairs = ((x.row, x.column, x.node) for x in self.entries if x.column is not None)
+        found = {(i.position, j.position): n for i, j, n in pairs}
+        return all(found.get((j, i)) is n for (i, j), n in found.items())
 
     @property
     def rows(self) -> list[Entry]:

@@ -157,7 +157,7 @@ class Pair:
         out.add(f"k_lanes[({row}) * {size} + {column}] = {value};")
 
 
-def stored(layout: Layout) -> list[int]:
+def stored(layout: Layout, *, symmetric: bool) -> list[int]:
     """Place in k_lanes of every entry of the tangent, row by row.
 
     Of a symmetric one that of the two mirrored entries which is computed.
@@ -171,5 +171,4 @@ def stored(layout: Layout) -> list[int]:
         along = line.places[node or 0][::-1] if line is not None else (node,)
         ranks.append((layout.field(c), along, n))
     pairs = product(range(size), repeat=2)
-    upper = layout.site.conservative
-    return [j * size + i if upper and ranks[j] < ranks[i] else i * size + j for i, j in pairs]
+    return [j * size + i if symmetric and ranks[j] < ranks[i] else i * size + j for i, j in pairs]
