@@ -14,6 +14,9 @@
                 compute one after another
     routines    local iterations and functions of stretches as C functions of their own
 
+A page of fields on a large cell goes another way (`form`): all of this for the function of a point
+alone, and loops over points and nodes around it (`emit.points`).
+
 `softehl generate --trace KERNEL` shows what each of them did.
 """
 

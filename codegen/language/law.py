@@ -9,6 +9,7 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.language.definition import PointForm
+from softehl.codegen.language.entries import applied
 from softehl.codegen.language.fields import AXES, Fields
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.pages import Page
@@ -85,7 +86,7 @@ class Material:
     def at(self, m: Fields, F: Any) -> tuple[Any, Any]:
         """P (3, 3) at F on a page, and the energy or None."""
         law = Law(self.name, m, F)
-        self.write(law)
+        applied(self.name, self.write, law)
         return law.finished()
 
     def page(self) -> Page:

@@ -10,6 +10,7 @@ from softehl.codegen.language.definition import Definition, PointForm
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.cells import Element, element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.codegen.language.entries import applied
 from softehl.codegen.language.fields import AXISYMMETRIC, GEOMETRIES, SOLID, Fields, order_of
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.side import Side
@@ -66,11 +67,11 @@ class Page:
         if space_of(chosen, kind.dimension) > kind.dimension:
             degree = self.degree or 2 * order_of(kind)
             side = Side(name, kind, chosen, rule_of(kind, degree), self.doc)
-            self.write(side)
+            applied(self.name, self.write, side)
             return side.finish()
         point = self._at_point(name, kind, chosen)
         whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
-        self.write(whole)
+        applied(self.name, self.write, whole)
         unroll = False if self.form == "point" else None
         at = None if self.form == "whole" else point
         return replace(whole.finish(), point=at, unroll=unroll)
@@ -96,7 +97,7 @@ class Page:
 
     def _at_point(self, name: str, kind: Element, geometry: str) -> PointForm:
         site = Site(name, kind, geometry, self.doc)
-        self.write(site)
+        applied(self.name, self.write, site)
         return site.form()
 
     def rule(self, cell: Element, form: PointForm) -> QuadratureRule:

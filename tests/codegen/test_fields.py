@@ -256,6 +256,7 @@ def test_tangents_of_moduli_are_one_file_for_all_pages() -> None:
         (lambda m: m.deformation_gradient(m.scalar("T")), "a vector of 2 is needed"),
         (lambda m: m.integral("I", 1), "element-wide integrals need softehl.Model"),
         (lambda m: m.vector("u"), "neither a potential nor a weak form"),
+        (lambda: None, "wrong: its function gets 1 argument, and cannot take it"),
     ],
 )
 def test_what_a_page_cannot_say_is_told(write: Callable[[Fields], Any], words: str) -> None:
