@@ -144,11 +144,15 @@ def kernel_in(directory: Path, name: str | None = None, cell: str | None = None)
     Raises `KernelError`, also when the folder has changed since this process loaded it.
     """
     entries = manifest(directory)
-    if name is None and len(entries) > 1:
+    stands = [n for n, entry in entries.items() if cell and entry.get("cell") == cell]
+    if name is None and len(entries) > 1 and len(stands) != 1:
         raise MissingKernelsError(f"{directory.name} holds {', '.join(entries)}: name one of them")
-    named = [n for n in (f"{name}_{cell}", f"{name}_{cell}_axisymmetric") if n in entries]
-    chosen = name if name in entries or not named else named[0]
-    kernel = load_kernel(chosen or next(iter(entries)), directory)
+    if name is None:
+        chosen = stands[0] if len(stands) == 1 else next(iter(entries))
+    else:
+        named = [n for n in stands if n in (f"{name}_{cell}", f"{name}_{cell}_axisymmetric")]
+        chosen = name if name in entries or not named else named[0]
+    kernel = load_kernel(chosen, directory)
     if not kernel.library.current:
         raise StaleKernelsError(
             f"{directory.name}/ has changed since it was loaded: start Python anew, or load the "

@@ -21,6 +21,13 @@ Write = Callable[[Fields], Any]
 Form = Literal["whole", "point"]
 
 
+class PlaceError(ModelError):
+    """A page of fields cannot stand there; no line of it is wrong."""
+
+    def __init__(self, message: str) -> None:
+        ValueError.__init__(self, message)
+
+
 @dataclass(frozen=True)
 class On:
     """Places for pages of fields: cells by name, and the geometry (None: the usual one).
@@ -79,7 +86,7 @@ class Page:
     def definitions(self, on: On) -> list[Definition]:
         """Its models on all cells that are wanted."""
         if not on.cells:
-            raise ModelError(
+            raise PlaceError(
                 f"{self.name} is a page of fields, which stands on any cell: say which, as in "
                 'softehl.load_kernel(page, cell="hex8") or softehl generate --cell hex8'
             )
@@ -88,7 +95,7 @@ class Page:
         except ModelError:
             raise
         except ValueError as error:  # no such cell
-            raise ModelError(str(error)) from None
+            raise PlaceError(str(error)) from None
 
     def at_point(self, cell: str, geometry: str | None = None) -> PointForm:
         """The model at a point of a cell."""
@@ -133,7 +140,7 @@ def geometry_of(dimension: int, geometry: str | None) -> str:
     """The geometry of a mesh, checked.  Raises ModelError."""
     allowed = GEOMETRIES[dimension]
     if geometry is not None and geometry not in allowed:
-        raise ModelError(
+        raise PlaceError(
             f"geometry = {geometry!r} of a cell in {dimension}-D; allowed is "
             + " or ".join(f'"{g}"' for g in allowed)
         )

@@ -75,6 +75,10 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
 
 def _cost(f: Function, points: int) -> dict[str, int]:
     once, per_point = f.plan.operations_once, f.plan.operations_per_point
+    if (
+        f.printer == "points"
+    ):  # the function of a point is called at each; its loops are not counted
+        once, per_point = 0, once
     return {
         "operations": once + points * per_point,
         "operations_once": once,

@@ -183,7 +183,7 @@ def load_kernel(
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
         return kernels.load_kernel(source)
     if isinstance(source, (str, Path)) and folder_given:
-        return kernels.kernel_in(Path(source).resolve(), name)
+        return kernels.kernel_in(Path(source).resolve(), name, cell)
     from softehl.codegen.tools import library
 
     place = Path(source) if isinstance(source, str) else source
