@@ -39,13 +39,13 @@ def choose(layout: Layout, tangent: Outputs, operations: int, short: int) -> Cho
         return Choice(d.unroll is False, "the page asks for it")
     work = layout.points * (2 * multiply_adds(layout, tangent) + operations)
     whole = round((1 - SAVED) * work)
-    below = reachable([x.node for x in tangent.entries])
-    local = bool(d.history) or any(n.op is Op.CALL for n in below)
-    simple = d.cell.startswith(("tri", "tet", "wedge"))
-    limit = LARGE if simple and not local else short
     told = f"about {whole} operations of the whole element"
-    if local and layout.points > 1:
-        return Choice(True, f"local unknowns or history at {layout.points} points, {told}")
+    if any(n.op is Op.CALL for n in reachable([x.node for x in tangent.entries])):
+        return Choice(True, f"local unknowns or functions of stretches, {told}")
+    if d.history and layout.points > 1:
+        return Choice(True, f"history at {layout.points} points, {told}")
+    simple = d.cell.startswith(("tri", "tet", "wedge"))
+    limit = LARGE if simple and not d.history else short
     return Choice(whole > limit, f"{told}, limit {limit}")
 
 
