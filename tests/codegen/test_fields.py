@@ -14,6 +14,7 @@ import sympy as sp
 
 import softehl
 from softehl.codegen import pipeline
+from softehl.codegen.derive import structure
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.pages import Form, Page
@@ -207,6 +208,15 @@ def test_small_elements_stay_whole_and_large_ones_do_not() -> None:
     assert not any(map(at_points, ("tri3", "tri6", "quad4", "tet4", "wedge6")))
     assert all(map(at_points, ("quad9", "hex8", "tet10")))
     assert at_points("tri3", field_pages.creep)
+
+
+def test_invariants_are_looked_for_in_the_plane_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    searched = []
+    monkeypatch.setattr(structure, "through_invariants", lambda *given: searched.append(given))
+    structure.found_in(field_pages.rubber.definition("tet4"))
+    assert not searched
+    structure.found_in(field_pages.rubber.definition("tri3"))
+    assert searched
 
 
 def test_moduli_of_a_weak_form_that_are_symmetric_are_found_to_be() -> None:
