@@ -335,7 +335,7 @@ class Study:
 
     @property
     def _ring(self) -> bool:
-        """Whether sides are those of rings."""
+        """True if sides are those of rings."""
         return self.geometry == "axisymmetric"
 
     def _loaded(self, source: Source, model: str | None, kind: str | None, *, law: bool) -> Kernel:
