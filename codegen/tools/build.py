@@ -24,6 +24,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from time import perf_counter
 
+from softehl.codegen.abi import VERSION
 from softehl.codegen.emit import support
 from softehl.codegen.tools import cache
 
@@ -126,7 +127,7 @@ def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str
 
     It knows of the header only what is the same in all of them.
     """
-    told = (text, support.TEXT, shlex.join(command), identification(flags))
+    told = (text, support.TEXT, str(VERSION), shlex.join(command), identification(flags))
     key = cache.digest("shared", *told)
 
     def complete(folder: Path) -> bool:
