@@ -236,13 +236,13 @@ class Fields(Model):
         return entries.arrange(found)
 
     def _slopes(self, value: Any) -> list[Any]:
-        """Slopes of an expression of fields along the axes."""
+        """Slopes of an expression of fields along the axes, names of m.define included."""
         expression = sp.sympify(value)
-        fields = [t for v, t in self._traced.items() if expression.has(v)]
-        others = expression.free_symbols - {t.value for t in fields}
-        below = {s for t in fields for s in t.value.free_symbols}
-        constants = {sp.Symbol(a.name, real=True) for a in self._arguments["parameters"]}
-        strange = sorted(str(s) for s in others - below - constants)
+        met = expression.free_symbols
+        fields = [t for v, t in self._traced.items() if v in met or expression.has(v)]
+        known = {s for t in fields for s in (t.value, *_leaves(t.value))}
+        known |= {sp.Symbol(a.name, real=True) for a in self._arguments["parameters"]}
+        strange = sorted(str(s) for s in _leaves(expression) - known)
         if strange or not fields:
             raise ModelError(
                 f"grad of {value}: {strange[0] if strange else 'it'} is no field; gradients are "
@@ -252,6 +252,12 @@ class Fields(Model):
         for k in range(self.dimension):
             slopes.append(sp.Add(*(expression.diff(t.value) * t.slopes[k] for t in fields)))
         return slopes
+
+
+def _leaves(expression: Any) -> set[Any]:
+    """Symbols of an expression that stand for nothing else."""
+    symbols = expression.free_symbols
+    return {s for s in symbols if getattr(s, "definition", None) is None}
 
 
 def order_of(cell: Element) -> int:

@@ -33,6 +33,7 @@ def made(page: Page, cell: str, geometry: str | None, form: Form, folder: Path) 
     """A kernel in one of the two forms."""
     d = replace(page, form=form, name=f"{page.name}_{form}").definition(cell, geometry)
     assert pipeline.form(d).at_points is (form == "point")
+    folder.mkdir(exist_ok=True)
     return compiled(d, folder / form)
 
 
@@ -249,6 +250,31 @@ def test_tangents_of_moduli_are_one_file_for_all_pages() -> None:
     shared = [set(library.derive([p.definition("quad9")])[0]) for p in pages]
     (name,) = {n for n in shared[0] if n.startswith(build.SHARED)}
     assert name in shared[1]
+
+
+def test_gradients_go_through_names(tmp_path: Path, rng: np.random.Generator) -> None:
+    def named(m: Fields) -> None:
+        T = m.scalar("T")
+        (k,) = m.parameters(k="factor")
+        heat = m.define("heat", k * T**3)
+        m.weak(m.grad(heat), m.grad(T))
+
+    def written(m: Fields) -> None:
+        T = m.scalar("T")
+        (k,) = m.parameters(k="factor")
+        m.weak(3 * k * T**2 * m.grad(T), m.grad(T))
+
+    ways: list[tuple[Callable[[Fields], None], Form]]
+    ways = [(named, "whole"), (named, "point"), (written, "whole")]
+    kernels = [
+        made(Page(write.__name__, write), "tri3", None, form, tmp_path / write.__name__)
+        for write, form in ways
+    ]
+    X, dofs, given = state(kernels[0], "tri3", rng)
+    results = [k.tangent(X, dofs, **given) for k in kernels]
+    for other in results[1:]:
+        for a, b in zip(results[0], other, strict=True):
+            assert np.abs(a - b).max() < 1e-13 * np.abs(a).max()
 
 
 # --------------------------------------------------------------------------------------- errors
