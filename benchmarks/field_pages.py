@@ -7,7 +7,7 @@ from typing import Any
 import sympy as sp
 
 import softehl
-from softehl.codegen.language.law import Law
+from softehl.codegen.language.material import Material
 
 NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")
 
@@ -24,7 +24,7 @@ def entries(a: sp.Matrix) -> list[Any]:
 
 
 @softehl.material
-def neo_hooke(m: Law) -> None:
+def neo_hooke(m: Material) -> None:
     """Compressible neo-Hooke."""
     mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
     J = m.define("J", m.F.det())
@@ -32,11 +32,11 @@ def neo_hooke(m: Law) -> None:
 
 
 @softehl.material
-def plastic(m: Law) -> None:
+def plastic(m: Material) -> None:
     """J2 plasticity of small strains with linear hardening, by radial return."""
     G, K, H, limit = m.parameters(G="shear modulus", K="bulk modulus", H="hardening", limit="yield")
     old = m.point_data(**{f"p_{name}": "plastic strain" for name in NAMES}, a_old="hardening")
-    strain = m.define("strain", (m.F + m.F.T) / 2 - sp.eye(3) - symmetric(old[:6]))
+    strain = m.define("elastic", m.strain - symmetric(old[:6]))
     trial = m.define("trial", 2 * G * (strain - sp.eye(3) * strain.trace() / 3))
     size = m.define("size", m.norm(trial))
     root = sp.sqrt(sp.Rational(2, 3))
@@ -50,7 +50,7 @@ def plastic(m: Law) -> None:
 
 
 @softehl.material
-def viscous(m: Law) -> None:
+def viscous(m: Material) -> None:
     """Finite viscoelasticity with six local unknowns."""
     mu, K, G, tau, dt = m.parameters(
         mu="shear modulus", K="bulk modulus", G="second modulus", tau="time", dt="step"
@@ -83,7 +83,7 @@ SYSTEMS = [
 
 
 @softehl.material
-def crystal(m: Law) -> None:
+def crystal(m: Material) -> None:
     """Viscous slip on twelve systems, twelve local unknowns."""
     mu, K, rate, limit, dt = m.parameters(
         mu="shear modulus", K="bulk modulus", rate="of slip", limit="slip resistance", dt="step"
@@ -95,7 +95,7 @@ def crystal(m: Law) -> None:
     ]
 
     def elastic(v: Any) -> sp.Matrix:
-        return m.strain - sum((a * P for a, P in zip(v, schmid, strict=True)), sp.zeros(3, 3))
+        return m.green - sum((a * P for a, P in zip(v, schmid, strict=True)), sp.zeros(3, 3))
 
     def flow(v: Any) -> list[Any]:
         T = 2 * mu * elastic(v)

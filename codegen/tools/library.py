@@ -25,7 +25,7 @@ from softehl.codegen.tools.model_text import ModelFileError
 if TYPE_CHECKING:
     from softehl.codegen.graph.graph import Node
     from softehl.codegen.language.definition import Definition
-    from softehl.codegen.language.law import Material
+    from softehl.codegen.language.material import Law
     from softehl.codegen.language.pages import On, Page
 
 
@@ -47,7 +47,7 @@ class Library:
     compiled: Mapping[str, float]
 
 
-def folder_of(source: Path | Definition | Page | Material, where: Where = ((), "", False)) -> Path:
+def folder_of(source: Path | Definition | Page | Law, where: Where = ((), "", False)) -> Path:
     """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
 
     where: cells and geometry of pages of fields, and whether materials are wanted.
@@ -67,12 +67,12 @@ def folder_of(source: Path | Definition | Page | Material, where: Where = ((), "
     return compiled(files)[0]
 
 
-def _definitions(source: Definition | Page | Material, where: Where) -> list[Definition]:
-    from softehl.codegen.language.law import Material
+def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:
+    from softehl.codegen.language.material import Law
     from softehl.codegen.language.pages import On, Page
 
     cells, geometry, _ = where
-    if isinstance(source, Material):
+    if isinstance(source, Law):
         source = source.page()
     if isinstance(source, Page):
         return source.definitions(On(cells, geometry or None))

@@ -31,8 +31,8 @@ from typing import Any
 
 from softehl.codegen.language import names
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.law import Material
 from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.pages import NOWHERE, On, Page
 from softehl.codegen.tools.model_text import ModelFileError, read
@@ -131,7 +131,7 @@ def _entries(path: Path, module: ModuleType, *, materials: bool) -> list[Any]:
         return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
     public = [(k, v) for k, v in vars(module).items() if not k.startswith("_")]
     found = [v for _, v in public if isinstance(v, Definition | Page) or _makes_a_model(module, v)]
-    laws = [v for _, v in public if isinstance(v, Material)]
+    laws = [v for _, v in public if isinstance(v, Law)]
     if laws and (materials or not found):
         return [law.page() for law in laws]
     if materials:

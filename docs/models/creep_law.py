@@ -17,7 +17,7 @@ def creeping(m):
     )
     names = ("xx", "yy", "zz", "xy", "yz", "xz")
     V = m.point_data(**{f"V_{name}": "viscous strain" for name in names})
-    E = m.strain
+    E = m.green
     C = m.define("C", m.F.T * m.F)
     J = m.define("J", m.F.det())
     inverse = C.adjugate() / J**2

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.elements import quadrature, shapes
     from softehl.codegen.language.elements.cells import element
-    from softehl.codegen.language.law import Material, material
+    from softehl.codegen.language.material import Law, material
     from softehl.codegen.language.model import Model
     from softehl.codegen.language.pages import Page, page
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
@@ -75,7 +75,7 @@ _MODELLING = {
     "Model": "softehl.codegen.language.model",
     "element": "softehl.codegen.language.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
-    "material": "softehl.codegen.language.law",
+    "material": "softehl.codegen.language.material",
     "page": "softehl.codegen.language.pages",
     "quadrature": "softehl.codegen.language.elements.quadrature:",
     "shapes": "softehl.codegen.language.elements.shapes:",
@@ -156,7 +156,7 @@ def with_sympy() -> Iterator[None]:
 
 
 def load_kernel(
-    source: "str | Path | Definition | Page | Material",
+    source: "str | Path | Definition | Page | Law",
     name: str | None = None,
     *,
     cell: str | None = None,

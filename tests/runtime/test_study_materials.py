@@ -9,8 +9,8 @@ import pytest
 import sympy as sp
 
 import softehl
-from softehl.codegen.language.law import Law, Material
 from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.material import Law, Material
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.result import Result
@@ -18,7 +18,7 @@ from softehl.runtime.study import Source, Study, StudyError
 
 
 @softehl.material
-def neo(m: Law) -> None:
+def neo(m: Material) -> None:
     """Compressible neo-Hooke."""
     mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
     J = m.define("J", m.F.det(method="berkowitz"))
@@ -26,7 +26,7 @@ def neo(m: Law) -> None:
 
 
 @softehl.material
-def neo_stress(m: Law) -> None:
+def neo_stress(m: Material) -> None:
     """The same law as a stress."""
     mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
     J = m.define("J", m.F.det(method="berkowitz"))
@@ -35,18 +35,18 @@ def neo_stress(m: Law) -> None:
 
 
 @softehl.material
-def saint_venant(m: Law) -> None:
+def saint_venant(m: Material) -> None:
     """An energy of the strain."""
     mu, lame = m.parameters(mu="shear modulus [MPa]", lame="first Lame parameter [MPa]")
-    E = m.strain
+    E = m.green
     m.energy(lame / 2 * E.trace() ** 2 + mu * (E.T * E).trace())
 
 
 @softehl.material
-def second(m: Law) -> None:
+def second(m: Material) -> None:
     """The same law as a second Piola-Kirchhoff stress."""
     mu, lame = m.parameters(mu="shear modulus [MPa]", lame="first Lame parameter [MPa]")
-    m.second_stress(lame * m.strain.trace() * sp.eye(3) + 2 * mu * m.strain)
+    m.second_stress(lame * m.green.trace() * sp.eye(3) + 2 * mu * m.green)
 
 
 def sheared(geometry: str | None = None, **what: Source | float) -> Result:
@@ -101,13 +101,36 @@ def test_uniaxial_cauchy_stress_in_closed_form() -> None:
     assert np.allclose(result.fields("body")["sigma_xx"], expected, rtol=1e-10)
 
 
+def test_a_law_of_small_strains_is_linear() -> None:
+    @softehl.material
+    def hooke(m: Material) -> None:
+        G, lame = m.parameters(G="shear modulus [MPa]", lame="first Lame parameter [MPa]")
+        m.energy(G * (m.strain * m.strain).trace() + lame / 2 * m.strain.trace() ** 2)
+
+    study = Study(Mesh.rectangle(1, 1, cells=(1, 1)))
+    study.add("body", material=hooke, G=0.4, lame=0.6)
+    study.fix("left", u_x=0)
+    study.fix("bottom", u_y=0)
+    study.fix("right", u_x=0.5)
+    result = study.solve()
+    across = -0.5 * 0.6 / (0.6 + 2 * 0.4)
+    assert result.iterations == 1
+    expected = {
+        "sigma_xx": 1.4 * 0.5 + 0.6 * across,
+        "sigma_yy": 0.0,
+        "sigma_zz": 0.6 * (0.5 + across),
+    }
+    for name, value in expected.items():
+        assert np.allclose(result.fields("body")[name], value, atol=1e-14)
+
+
 FILE = """
 import softehl
 
 @softehl.material
 def stiff(m):
     (c,) = m.parameters(c="modulus [MPa]")
-    m.energy(c * (m.strain.T * m.strain).trace())
+    m.energy(c * (m.green.T * m.green).trace())
 """
 PAGE = """
 @softehl.page
@@ -132,9 +155,9 @@ def test_a_file_of_materials_gives_bodies_of_them(tmp_path: Path) -> None:
 
 def test_what_a_material_cannot_say_is_told() -> None:
     with pytest.raises(ModelError, match=r"neither m\.energy"):
-        sheared(material=Material("empty", lambda m: None))
-    with pytest.raises(ModelError, match="shape no matrix, must be"):
-        sheared(material=Material("scalar", lambda m: m.stress(1)))
+        sheared(material=Law("empty", "", lambda m: None))
+    with pytest.raises(ModelError, match="shape that of a scalar, must be"):
+        sheared(material=Law("scalar", "", lambda m: m.stress(1)))
     with pytest.raises(StudyError, match="one of them"):
         sheared(source=neo, material=neo)
     with pytest.raises(StudyError, match="one of them"):
