@@ -26,7 +26,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 
-from softehl.codegen.abi import DESIGN, ROLLED, Target, Task
+from softehl.codegen.abi import DESIGN, ROLLED, Target, Task, derivative_task
 from softehl.codegen.derive import points as at_points
 from softehl.codegen.derive import structure, variants
 from softehl.codegen.derive.outputs import Entry, placed
@@ -129,7 +129,11 @@ def form(d: Definition) -> Choice:
     """Form of the kernels of a page: whole elements, or loops around functions of a point."""
     if d.point is None:
         return Choice(False, "no page of fields")
-    attempt = _moduli(d.point.definition, Task.TANGENT)
+    site = d.point.definition
+    strange = [t for t, _ in d.derivatives if at_points.argument(site, derivative_task(t)) is None]
+    if strange:
+        return Choice(False, f"a derivative by {strange[0]}, which a point does not know")
+    attempt = _moduli(site, Task.TANGENT)
     outputs = Outputs(attempt.entries)
     return choose(Layout(d, d.point), outputs, attempt.operations, SHORT)
 

@@ -211,6 +211,16 @@ def test_small_elements_stay_whole_and_large_ones_do_not() -> None:
     assert at_points("tri3", field_pages.creep)
 
 
+def test_derivatives_that_are_asked_for_later_are_known_at_the_point() -> None:
+    d = field_pages.rubber.definition("quad9")
+    by = d.graph.input("parameters", 1)
+    kernel = pipeline.compile_model(replace(d, derivatives=(("K", by),)))
+    assert "d_K" in kernel.functions
+    assert kernel.functions["d_K"].printer == "points"
+    place = d.graph.input("coordinates", 4)
+    assert not pipeline.form(replace(d, derivatives=(("X3", place),))).at_points
+
+
 def test_invariants_are_looked_for_in_the_plane_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     searched = []
     monkeypatch.setattr(structure, "through_invariants", lambda *given: searched.append(given))

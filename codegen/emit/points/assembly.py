@@ -12,11 +12,9 @@ from softehl.codegen.emit.points import constants, dense, tensor
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout, orders
 from softehl.codegen.emit.points.lines import Lines
-from softehl.codegen.emit.points.pairs import Pair, Parent, stored
+from softehl.codegen.emit.points.pairs import STEM, Pair, Parent, stored
 from softehl.codegen.emit.source import HEADER
 
-STEM = "pairs_"
-"""Beginning of the names of such files."""
 _SHORT = 65536
 """Entries of a tangent that a short number counts."""
 _NAME = f"{PREFIX}_{STEM}"
@@ -25,7 +23,7 @@ _NAME = f"{PREFIX}_{STEM}"
 def file(layout: Layout, outputs: Outputs) -> tuple[str, str]:
     """Name of the function and text of its file."""
     body = _body(layout, outputs)
-    tables = "\n".join(constants.used(layout, body))
+    tables = "\n".join(constants.used(layout, body, STEM))
     key = hashlib.sha256((tables + body).encode()).hexdigest()[:16]
     name = f"{_NAME}{layout.d.cell}_{key}"
     head = declaration(name, Parent(layout, outputs).size)
@@ -62,7 +60,7 @@ def _body(layout: Layout, outputs: Outputs) -> str:
 
 
 def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
-    whole, name = count - count % 4, f"{layout.d.cell}_K"
+    whole, name = count - count % 4, f"{STEM}{layout.d.cell}_K"
     places = ", ".join(map(str, stored(layout, symmetric=symmetric)))
     kind = "unsigned short" if count <= _SHORT else "unsigned"
     out.add(f"static const {kind} {name}[{count}] = {{{places}}};")

@@ -36,7 +36,7 @@ def _factor(q: Quantity, node: str) -> str:
 
 
 def _factors(out: Lines, pair: Pair, side: int, node: str, index: str) -> None:
-    name, order = pair.layout.d.cell, pair.order[side]
+    name, order = pair.tables, pair.order[side]
     some = [q for q in pair.parent.quantities if q.component.order == order]
     for axis in sorted({-1 if q.axis is None else q.axis for q in some}):
         table = (

@@ -16,6 +16,9 @@ from softehl.codegen.emit.points.layout import Layout
 from softehl.codegen.emit.points.lines import Lines
 from softehl.codegen.language.definition import Component, Quantity
 
+STEM = "pairs_"
+"""Beginning of the names of files that pages share, and of what is in them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Parent:
@@ -135,6 +138,11 @@ class Pair:
     @property
     def layout(self) -> Layout:
         return self.parent.layout
+
+    @property
+    def tables(self) -> str:
+        """Beginning of the names of tables: others than those of the page's own file."""
+        return f"{STEM}{self.layout.d.cell}"
 
     def components(self, side: int) -> list[Component]:
         """Of the rows (0) or columns (1)."""

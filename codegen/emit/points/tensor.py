@@ -99,7 +99,7 @@ class _Level:
     def _sums(self, targets: dict[Key, list[tuple[int, str]]], size: int) -> None:
         """The sums t0, t1, ... over the points."""
         out, axis = self.out, self.axis
-        table = f"{self.pair.layout.d.cell}_C{self.pair.order[0]}{self.pair.order[1]}"
+        table = f"{self.pair.tables}_C{self.pair.order[0]}{self.pair.order[1]}"
         for s in range(size):
             point = f"p * {size} + {s}" if axis else str(s)
             out.add(f"const double *const c{s} = {table}[{s}][a{axis}][b{axis}];")
@@ -115,7 +115,7 @@ class _Level:
             index = f"{letter}0"
             for k in range(1, pair.layout.dimension):
                 index = f"({index}) * {len(self.lines[side].values[0])} + {letter}{k}"
-            nodes = f"{pair.layout.d.cell}_nodes{pair.order[side]}"
+            nodes = f"{pair.tables}_nodes{pair.order[side]}"
             out.add(f"const int {letter} = {nodes}[{index}];")
         for (i, _, j, _), n in numbers.items():
             pair.store(out, i, j, "a", "b", f"t{n}")
