@@ -14,16 +14,20 @@
                 compute one after another
     routines    local iterations and functions of stretches as C functions of their own
 
+A page of fields on a large cell goes another way (`form`): all of this for the function of a point
+alone, and loops over points and nodes around it (`emit.points`).
+
 `softehl generate --trace KERNEL` shows what each of them did.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import ModuleType
 
-from softehl.codegen.abi import DESIGN, ROLLED, Target
+from softehl.codegen.abi import DESIGN, ROLLED, Target, Task, derivative_task
+from softehl.codegen.derive import points as at_points
 from softehl.codegen.derive import structure, variants
 from softehl.codegen.derive.outputs import Entry, placed
 from softehl.codegen.derive.structure import Structure
@@ -36,6 +40,11 @@ from softehl.codegen.emit import simd as emit_simd
 from softehl.codegen.emit import source as emit_source
 from softehl.codegen.emit import ufcx as emit_ufcx
 from softehl.codegen.emit.order import arranged
+from softehl.codegen.emit.points import constants as emit_constants
+from softehl.codegen.emit.points import family as emit_points
+from softehl.codegen.emit.points.choice import Choice, choose
+from softehl.codegen.emit.points.function import Outputs
+from softehl.codegen.emit.points.layout import Layout
 from softehl.codegen.emit.runs import arranged_plan
 from softehl.codegen.emit.schedule import Schedule, is_straight, schedule, straight_line
 from softehl.codegen.graph.graph import Routine
@@ -69,7 +78,8 @@ class Function:
     """One kernel: its C text and how it came about.
 
     `found` is what was found in the potential (None: nothing, or the task differentiates nothing);
-    of the `attempts` one was `chosen`; `plan` is its schedule in the printed order.
+    of the `attempts` one was `chosen`; `plan` is its schedule in the printed order. shared: names
+    and texts of files that other kernels may have, too.
     """
 
     text: str
@@ -80,19 +90,22 @@ class Function:
     chosen: Attempt
     printer: str
     routines: tuple[Routine, ...] = ()
+    shared: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class KernelSource:
     """A kernel family: its model, its C file and its functions by task.
 
-    design: a second C file with the tasks of sensitivities, empty where none is offered.
+    design: a second C file with the tasks of sensitivities, empty where none is offered. shared:
+    files that other families may have, too, by name.
     """
 
     definition: Definition
     text: str
     functions: Mapping[str, Function]
     design: str = ""
+    shared: Mapping[str, str] = field(default_factory=dict)
 
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
@@ -100,6 +113,8 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     tasks = variants.tasks(definition)
     if target is Target.UFCX:
         tasks = emit_ufcx.tasks(definition, tasks)
+    if target is Target.SIMD and form(definition).at_points:
+        return _at_points(definition, tasks)
     functions = {t: compile_task(definition, t, target) for t in tasks}
     if target is Target.UFCX:
         texts = [f.text for f in functions.values()]
@@ -110,6 +125,60 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     others = [f for t, f in functions.items() if t not in DESIGN]
     text, more = _file(definition, others), _file(definition, design) if design else ""
     return KernelSource(definition, text, functions, more)
+
+
+def form(d: Definition) -> Choice:
+    """Form of the kernels of a page: whole elements, or loops around functions of a point."""
+    if d.point is None:
+        return Choice(False, "no page of fields")
+    site = d.point.definition
+    strange = [t for t, _ in d.derivatives if at_points.argument(site, derivative_task(t)) is None]
+    if strange:
+        return Choice(False, f"a derivative by {strange[0]}, which a point does not know")
+    attempt = _moduli(site, Task.TANGENT)
+    outputs = Outputs(attempt.entries)
+    return choose(Layout(d, d.point), outputs, attempt.operations, SHORT)
+
+
+def _moduli(site: Definition, task: str) -> Attempt:
+    """Outputs of a task at a point."""
+    return _attempt(site, Variant("at a point", at_points.outputs(site, task)), unrolled=True)
+
+
+def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
+    """All kernels of a page of fields, as loops around functions of the point."""
+    assert d.point is not None
+    layout = Layout(d, d.point)
+    functions = {t: _at_point(layout, t) for t in tasks}
+    files = []
+    for some in ([t for t in tasks if t not in DESIGN], [t for t in tasks if t in DESIGN]):
+        texts = [functions[t].text for t in some]
+        called = dict.fromkeys(r for t in some for r in functions[t].routines)
+        routines = emit_lane_routines.texts(layout.site, called)
+        before = emit_lanes.wrappers("".join([*routines, *texts]))
+        before += [*routines, *emit_constants.used(layout, "".join(texts))]
+        files.append(emit_source.source(d, texts, before) if texts else "")
+    shared = dict(pair for f in functions.values() for pair in f.shared)
+    return KernelSource(d, files[0], functions, files[1], shared)
+
+
+def _at_point(layout: Layout, task: str) -> Function:
+    """One kernel of a page of fields: the function of a point and the loops of the cell."""
+    site = layout.site
+    chosen = _moduli(site, task)
+    entries, plan = chosen.entries, chosen.plan
+    called = tuple(emit_routines.called([x.node for x in entries]))
+    if is_straight(plan):
+        roots, order = arranged(site.graph, [x.node for x in entries])
+        entries, plan = placed(entries, roots), straight_line(order)
+    else:
+        plan = arranged_plan(site.graph, plan, [x.node for x in entries])
+    outputs = Outputs(entries)
+    made = emit_points.kernel(layout, task, outputs, plan)
+    shared = () if made.shared is None else (made.shared,)
+    return Function(
+        made.text, plan, made.temporaries, None, (chosen,), chosen, "points", called, shared
+    )
 
 
 def _file(d: Definition, functions: Sequence[Function]) -> str:

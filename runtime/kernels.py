@@ -133,18 +133,26 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
         conditions=tuple((n, r, b, w) for n, r, b, w in entry["conditions"]),
         places=tuple((n, a) for n, a in entry.get("places", ())),
         history=tuple(entry.get("history", ())),
+        cell=entry.get("cell", ""),
     )
 
 
-def kernel_in(directory: Path, name: str | None = None) -> Kernel:
+def kernel_in(directory: Path, name: str | None = None, cell: str | None = None) -> Kernel:
     """The kernel of a folder of generated C; `name` is needed if it holds several.
 
+    cell: on which a page of fields of that name stands.
     Raises `KernelError`, also when the folder has changed since this process loaded it.
     """
     entries = manifest(directory)
-    if name is None and len(entries) > 1:
+    stands = [n for n, entry in entries.items() if cell and entry.get("cell") == cell]
+    if name is None and len(entries) > 1 and len(stands) != 1:
         raise MissingKernelsError(f"{directory.name} holds {', '.join(entries)}: name one of them")
-    kernel = load_kernel(name or next(iter(entries)), directory)
+    if name is None:
+        chosen = stands[0] if len(stands) == 1 else next(iter(entries))
+    else:
+        named = [n for n in stands if n in (f"{name}_{cell}", f"{name}_{cell}_axisymmetric")]
+        chosen = name if name in entries or not named else named[0]
+    kernel = load_kernel(chosen, directory)
     if not kernel.library.current:
         raise StaleKernelsError(
             f"{directory.name}/ has changed since it was loaded: start Python anew, or load the "

@@ -33,7 +33,13 @@ from softehl.runtime.names import listed
 from softehl.runtime.result import Result
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement import given as read
-from softehl.runtime.statement.pages import elements_of, page_on
+from softehl.runtime.statement.pages import (
+    elements_of,
+    geometry_of,
+    kinds_of,
+    page_on,
+    require_page,
+)
 from softehl.runtime.statement.records import (
     Condition,
     Datum,
@@ -48,22 +54,27 @@ from softehl.runtime.system import System
 from softehl.runtime.watch import Series, Telling, Watch, watched
 
 Source: TypeAlias = "str | Path | Kernel | object"
-"""A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition."""
+"""A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition, or a
+function decorated by `softehl.page`."""
 
 
 @dataclass(eq=False)
 class Study:
     """A boundary-value problem that is being written down; `solve` solves what is there.
 
-    mesh: on which it lives; a cell that is turned inside out is a MeshError.
+    mesh: on which it lives; a cell that is turned inside out is a MeshError. geometry: what a page
+    of fields knows of dimensions that the mesh does not have: in 2-D "plane strain" (the default)
+    or "axisymmetric", around the x axis: then loads and pressures of sides act on whole rings.
     """
 
     mesh: Mesh
+    geometry: str | None = None
     _statement: Statement = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raises MeshError for a cell that is turned inside out."""
+        """Raises MeshError for a cell that is turned inside out, StudyError for a geometry."""
         self.mesh.check()
+        geometry_of(self.mesh, self.geometry)
         self._statement = Statement(self.mesh)
 
     # the problem --------------------------------------------------------------------------------
@@ -71,8 +82,9 @@ class Study:
     def add(
         self,
         name: str,
-        source: Source,
+        source: Source = None,
         *,
+        material: Source = None,
         on: str | Predicate | None = None,
         cells: str | None = None,
         model: str | None = None,
@@ -81,20 +93,32 @@ class Study:
     ) -> None:
         """Elements of a page on all cells, on a group of cells, or `on` a side.
 
-        source: a page (file), a folder that `softehl generate` wrote, a Definition, a kernel, or
-        the name of one that ships. model: which, where the page has several. shared: unknowns
-        without a node that are one for all elements, not one for each. given: parameters of the
-        page (numbers, or functions of the load factor) and its data (a number, (n,) numbers or a
-        function of the elements' centres (n, dim)). Two are not given: `dt` is the length of a step
+        source: a page (file or function), a folder that `softehl generate` wrote, a Definition, a
+        kernel, or the name of one that ships; a page of fields stands on any kind of cell.
+        material: instead, a stress law (file or function) for a body of it. model: which, where
+        there are several. shared: unknowns without a node that are one for all elements, not one
+        for each. given: parameters of the page (numbers, or functions of the load factor) and its
+        data (a number, (n,) numbers or a function of the elements' centres (n, dim)). A page of
+        fields on several kinds of cells makes a block of each, "body:quad4", "body:tri3". Two
+        are not given: `dt` is the length of a step
         of `march`, `rate` comes from `Model.rates`. On a side, a page of one node has an element at
         each node. Raises StudyError, MeshError, or what is wrong with the page.
         """
         blocks = self._statement.blocks
         if name in blocks:
             raise StudyError(f"block {name!r} is there already; blocks: {listed(blocks)}")
-        kernel = source if isinstance(source, Kernel) else _load(source, model)
-        elements = elements_of(self.mesh, name, kernel, on, cells)
-        blocks[name] = page_on(self.mesh, name, kernel, elements, shared, given)
+        if (source is None) == (material is None):
+            raise StudyError(f"{name!r}: give a page or material=..., one of them")
+        law = material is not None
+        page = material if law else source
+        kinds = kinds_of(self.mesh, on, cells)
+        kernels = [self._loaded(page, model, kinds[0] if kinds else None, law=law)]
+        if kernels[0].cell and not isinstance(page, Kernel):
+            kernels += [self._loaded(page, model, kind, law=law) for kind in kinds[1:]]
+        for kernel in kernels:
+            label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
+            elements = elements_of(self.mesh, label, kernel, on, cells)
+            blocks[label] = page_on(self.mesh, label, kernel, elements, shared, given)
 
     def load(self, where: Where, **components: Amount) -> None:
         """Dead loads per reference length or area of a side, or forces at a place or nodes.
@@ -109,7 +133,8 @@ class Study:
             value = read.amount(words, name, given)
             if isinstance(where, str) or callable(where):
                 for kind, faces in self.mesh.faces(where).items():
-                    self._add_force("load", where, DeadLoad(CELLS[kind], value), faces, (name,))
+                    kernel = DeadLoad(CELLS[kind], value, self._ring)
+                    self._add_force("load", where, kernel, faces, (name,))
             else:
                 nodes = read.nodes_of(self.mesh, where)
                 self._add_force("load", where, NodalForce(value), nodes[:, None], (name,))
@@ -133,7 +158,8 @@ class Study:
                 f"{self.mesh.dimension} coordinates is needed, in 2-D or 3-D"
             )
         for kind, faces in self.mesh.outer_faces(where).items():
-            self._add_force("pressure", where, Pressure(CELLS[kind], value), faces, names)
+            kernel = Pressure(CELLS[kind], value, self._ring)
+            self._add_force("pressure", where, kernel, faces, names)
 
     def spring(self, where: Where, **stiffness: float) -> None:
         """Springs to the ground at the nodes of a side, each of this stiffness."""
@@ -307,6 +333,26 @@ class Study:
         """Equations of the study.  Raises StudyError for what does not fit together."""
         return equations(self._statement)
 
+    @property
+    def _ring(self) -> bool:
+        """True if sides are those of rings."""
+        return self.geometry == "axisymmetric"
+
+    def _loaded(self, source: Source, model: str | None, kind: str | None, *, law: bool) -> Kernel:
+        """By the front door, which knows when the generator is needed: this room does not."""
+        if isinstance(source, Kernel):
+            return source
+        require_page(source)
+        import softehl
+
+        return softehl.load_kernel(
+            source,  # type: ignore[arg-type]
+            model,
+            cell=kind,
+            geometry=geometry_of(self.mesh, self.geometry),
+            materials=law,
+        )
+
     def _add_force(
         self,
         what: str,
@@ -318,22 +364,6 @@ class Study:
         forces = self._statement.forces
         label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {', '.join(names)})"
         forces.append(Force(label, kernel, nodes, names))
-
-
-def _load(source: Source, model: str | None) -> Kernel:
-    """By the front door, which knows when the generator is needed: this room does not."""
-    if isinstance(source, str | Path):
-        pass
-    elif callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):
-        name = getattr(source, "__name__", type(source).__name__)
-        hint = f", or what {name} returns when it is called" if callable(source) else ""
-        raise StudyError(
-            f"{type(source).__name__} is no page: give a model file, a kernel, a Definition that "
-            f"m.finish() made{hint}"
-        )
-    import softehl
-
-    return softehl.load_kernel(source, model)  # type: ignore[arg-type]
 
 
 __all__ = ["MeshError", "Study", "StudyError"]

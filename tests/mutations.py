@@ -52,6 +52,7 @@ class Fault:
 
 
 ORACLE = "tests/codegen/test_oracle.py"
+FIELDS = "tests/codegen/test_fields.py"
 REFERENCE = "tests/physics/test_kernels_against_reference.py"
 
 FAULTS = (
@@ -91,6 +92,30 @@ FAULTS = (
         "(-sign if n.op is Op.SUB else sign, b)",
         "(sign, b)",
         "tests/codegen/test_passes.py",
+    ),
+    Fault(
+        "codegen/emit/points/tensor.py",
+        "if turn[key] <= turn[mirrored[key]]",
+        "if turn[key] < turn[mirrored[key]]",
+        FIELDS,
+    ),
+    Fault(
+        "codegen/emit/points/loops.py",
+        "(-P[{k}]) * L{axis}{m}",
+        "(-P[{k}]) * L{m}{axis}",
+        FIELDS,
+    ),
+    Fault(
+        "codegen/emit/points/inputs.py",
+        'return "".join(f" - {array}',
+        'return "".join(f" + {array}',
+        FIELDS,
+    ),
+    Fault(
+        "codegen/language/side.py",
+        "return [t[1][0], -t[0][0]]",
+        "return [-t[1][0], t[0][0]]",
+        "tests/runtime/test_study_fields.py",
     ),
     Fault(
         "codegen/emit/lanes.py",

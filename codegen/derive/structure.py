@@ -54,9 +54,14 @@ def linear_forms(d: Definition) -> Structure | None:
 
 
 def quadratic_values(d: Definition, s: Structure) -> Structure:
-    """The structure through named quadratic values of the forms: invariants where some suffice."""
+    """The structure through named quadratic values of the forms: invariants where some suffice.
+
+    In pages of fields of three dimensions no invariants are looked for: this takes ten times as
+    long as all the rest and saves one operation in fourteen.
+    """
     g = d.graph
-    reduced = through_invariants(g, [s.root], s.forms, s.constant)
+    quick = d.point is not None and len(d.coordinates) > 2
+    reduced = None if quick else through_invariants(g, [s.root], s.forms, s.constant)
     if reduced is not None:
         constant = _left(reduced.images, s.constant)
         (root,), squares = reduced.roots, reduced.squares

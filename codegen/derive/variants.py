@@ -98,12 +98,12 @@ def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
     """The derivative of the residual `rows` along `direction` or with respect to one argument."""
     g = d.graph
     if task == Task.PRODUCT:
-        seeds = _moved_unknowns(d, 0)
+        seeds = moved_unknowns(d, 0)
     elif task == Task.PSEUDO_LOAD:
-        seeds = _moved_arguments(d)
+        seeds = moved_arguments(d)
     elif task == Task.FIELDS_RATE:
         first = d.coordinate_width + len(d.data) + len(d.parameters)
-        seeds = {**_moved_arguments(d), **_moved_unknowns(d, first)}
+        seeds = {**moved_arguments(d), **moved_unknowns(d, first)}
     else:
         by_task = {derivative_task(name): node for name, node in d.derivatives}
         seeds = {by_task[task]: g.one}
@@ -111,7 +111,7 @@ def _rates(d: Definition, task: str, rows: list[Entry]) -> list[Entry]:
     return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
 
 
-def _moved_unknowns(d: Definition, first: int) -> dict[Node, Node]:
+def moved_unknowns(d: Definition, first: int) -> dict[Node, Node]:
     """Unknowns that move along `direction`, where theirs begin at the entry `first`."""
     array = {"dofs": ("direction", first), "interpolated": ("interpolated direction", 0)}
     seeds = {}
@@ -122,7 +122,7 @@ def _moved_unknowns(d: Definition, first: int) -> dict[Node, Node]:
     return seeds
 
 
-def _moved_arguments(d: Definition) -> dict[Node, Node]:
+def moved_arguments(d: Definition) -> dict[Node, Node]:
     """Coordinates, data and parameters that move along `direction`, in this order."""
     widths = {
         "coordinates": d.coordinate_width,

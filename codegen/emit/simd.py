@@ -57,10 +57,10 @@ def function(
         for k in range(0, len(GROUP), 3)
     )
     group = f"static void {name}_group(\n    {arguments})\n{{\n    {idle};\n{used}\n}}\n"
-    return f"{group}\n{_batch(definition, task)}", p.temporaries
+    return f"{group}\n{batch(definition, task)}", p.temporaries
 
 
-def _widths(d: Definition, task: str) -> dict[str, str]:
+def widths(d: Definition, task: str) -> dict[str, str]:
     """Values per element of each array, "0" for those that a task does not use."""
     size = dofs_expression(d)
     along = direction_expression(d, task) or "0"
@@ -86,7 +86,7 @@ class _Group:
 
     def __init__(self, p: LanePrinter, task: str, entries: Sequence[Entry]) -> None:
         self.p, self.task, self.entries = p, task, entries
-        self.widths = _widths(p.d, task)
+        self.widths = widths(p.d, task)
         self.scattered = any(map(along_basis, entries))
         self.stores = _Stores(p, self._targets())
         self.fallible = any(n.op is Op.CALL for n in reachable([x.node for x in entries]))
@@ -331,14 +331,14 @@ class _Stores:
         self.p.line(1, f"softehl_store{len(nodes)}({target}, {values});")
 
 
-def _batch(d: Definition, task: str) -> str:
+def batch(d: Definition, task: str) -> str:
     """The public function: full groups, the last one moved back, or one that is filled up."""
     name = abi.function_name(d.name, task)
-    widths = _widths(d, task)
+    wide = widths(d, task)
     letters = {**_READ, "values": "R", "tangent": "K"}
 
     def call(at: str) -> str:
-        place = {letters[k]: f"{k} + {w} * {at}" if w != "0" else "0" for k, w in widths.items()}
+        place = {letters[k]: f"{k} + {w} * {at}" if w != "0" else "0" for k, w in wide.items()}
         given = [place.get(n, n) for _, n in GROUP]
         return f"{name}_group({', '.join(given)});"
 
@@ -355,17 +355,17 @@ def _batch(d: Definition, task: str) -> str:
         "        return;",
         "    }",
     ]
-    used = {k: w for k, w in widths.items() if w != "0"}
+    used = {k: w for k, w in wide.items() if w != "0"}
     for array, width in used.items():
         lines.append(f"    double {letters[array]}[SOFTEHL_LANES * {width}];")
         if array in _READ:
             lines.append(f"    softehl_pad({letters[array]}, {array}, {width}, n);")
     names = [a.split()[-1].strip("*") for a in " ".join(abi.ARGUMENTS).split(",")]
-    arguments = [letters.get(k, k) if k in used or k not in widths else "0" for k in names]
+    arguments = [letters.get(k, k) if k in used or k not in wide else "0" for k in names]
     lines.append(f"    {name}({', '.join(['SOFTEHL_LANES', *arguments[1:]])});")
     for array in ("values", "tangent"):
         if array in used:
-            letter, width = letters[array], widths[array]
+            letter, width = letters[array], wide[array]
             lines.append(
                 f"    for (ptrdiff_t i = 0; i < {width} * n; ++i) {array}[i] = {letter}[i];"
             )

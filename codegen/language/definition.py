@@ -29,6 +29,43 @@ class Condition:
 
 
 @dataclass(frozen=True)
+class Component:
+    """A scalar that varies in the cell.
+
+    name: as of its unknowns; of what was at the step before name_old, of a rate name_rate. order:
+    of its shape functions. given: whether it is data, not an unknown.
+    """
+
+    name: str
+    order: int
+    given: bool = False
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Value of a component at the point (axis None), or its slope along an axis."""
+
+    component: Component
+    axis: int | None
+
+
+@dataclass(frozen=True)
+class PointForm:
+    """A page of fields at a point: `definition` is its model, with one node, the point itself.
+
+    Its unknowns are values and gradients: `all` says what each is, `unknowns` those that occur, in
+    the order of `definition.directions`. data: of those of its data that are interpolated, by
+    their number. axisymmetric: whether the volume is that of a ring.
+    """
+
+    definition: Definition
+    unknowns: tuple[Quantity, ...]
+    all: tuple[Quantity, ...]
+    data: Mapping[int, Quantity]
+    axisymmetric: bool
+
+
+@dataclass(frozen=True)
 class Definition:
     """A finished model: everything the compiler needs, nothing differentiated yet."""
 
@@ -65,6 +102,10 @@ class Definition:
     """Of every unknown its name without number, and its node or None."""
     history: tuple[str, ...] = ()
     """Point data that the last fields are the new values of."""
+    cell: str = ""
+    """The cell of a page of fields, which could stand on another one, too."""
+    point: PointForm | None = field(default=None, compare=False)
+    """The same page at a point, from which the kernel of the whole element can be made as well."""
     record: Record = field(default_factory=Record, repr=False, compare=False)
     """The page as written, by which kernels are checked; nothing is derived from it."""
 

@@ -20,10 +20,14 @@ from softehl.codegen.language.model import Model
 
 @dataclass(frozen=True)
 class Isoparametric:
-    """Shape function gradients by the reference coordinates, [node][component], and Jacobian."""
+    """Shape function gradients by the reference coordinates, [node][component], and Jacobian.
+
+    inverse: of the Jacobian matrix, (parent coordinate, reference coordinate).
+    """
 
     dN: list[list[Any]]
     detJ: Any
+    inverse: Any
 
 
 def isoparametric(m: Model, X: Any, parent: Any) -> Isoparametric:
@@ -43,7 +47,7 @@ def isoparametric(m: Model, X: Any, parent: Any) -> Isoparametric:
     rows = (
         Listed(row, f"dN[{a}], the gradient of a shape function") for a, row in enumerate(slopes)
     )
-    return Isoparametric(Listed(rows, "dN, one row for each node"), detJ)
+    return Isoparametric(Listed(rows, "dN, one row for each node"), detJ, inverse)
 
 
 def _require_parent(m: Model, size: int, parent: Any) -> None:

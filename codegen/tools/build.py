@@ -24,6 +24,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from time import perf_counter
 
+from softehl.codegen.abi import VERSION
+from softehl.codegen.emit import support
 from softehl.codegen.tools import cache
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -42,6 +44,9 @@ LARGE, LIGHT = 20_000, "-O1"
 """Values in a file above which more than -O1 costs minutes, and the code gets slower."""
 STRICT = ("-Wall", "-Wextra", "-Werror")
 """For our own tests alone: another compiler may warn of what ours does not."""
+SHARED = "pairs_"
+"""Beginning of the names of sources that know nothing of the page and are compiled once."""
+_OBJECT, _SUM = "shared.o", "shared.o.sha256"
 LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
 DIGEST = f"{LIBRARY}.sha256"
 
@@ -98,9 +103,13 @@ def build(
 
         def compiled(source: Path, to: Path) -> float:
             start = perf_counter()
-            large = source.read_text(encoding="utf-8").count(" const ") > LARGE
-            light = [LIGHT] if large else []
-            _run([*compiling, *light, *extra, define, "-c", str(source), "-o", str(to)], to)
+            text = source.read_text(encoding="utf-8")
+            light = [LIGHT] if text.count(" const ") > LARGE else []
+            words = [*compiling, *light, *extra]
+            if source.name.startswith(SHARED):
+                shutil.copyfile(_shared(source, text, words, flags), to)
+            else:
+                _run([*words, define, "-c", str(source), "-o", str(to)], to)
             return perf_counter() - start
 
         with ThreadPoolExecutor(_processors()) as pool:
@@ -111,6 +120,26 @@ def build(
     cache.write(directory / LIBRARY, data, mode=0o755)
     cache.write(directory / DIGEST, f"{_sha256(data)}  {LIBRARY}\n".encode(), mode=0o644)
     return {source.stem: s for source, s in zip(sources, seconds, strict=True)}
+
+
+def _shared(source: Path, text: str, command: Sequence[str], flags: Sequence[str]) -> Path:
+    """Object file of a source that many folders hold, compiled once in the user's cache.
+
+    It knows of the header only what is the same in all of them.
+    """
+    told = (text, support.TEXT, str(VERSION), shlex.join(command), identification(flags))
+    key = cache.digest("shared", *told)
+
+    def complete(folder: Path) -> bool:
+        data = (folder / _OBJECT).read_bytes()
+        return (folder / _SUM).read_text(encoding="ascii") == _sha256(data)
+
+    def make(folder: Path) -> None:
+        to = folder / _OBJECT
+        _run([*command, "-c", str(source), "-o", str(to)], to)
+        cache.write(folder / _SUM, _sha256(to.read_bytes()).encode())
+
+    return cache.folder(key, complete, make) / _OBJECT
 
 
 def tuned() -> tuple[tuple[str, ...], str]:

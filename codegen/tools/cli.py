@@ -9,6 +9,7 @@ from pathlib import Path
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.hosts.all import HOSTS
+from softehl.codegen.language.pages import On
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cache, hosts, product, targets
 from softehl.codegen.tools import files as cli_files
@@ -30,15 +31,16 @@ def generate(
     target: str = Target.SIMD,
     out: Path | None = None,
     seconds: float = SECONDS,
+    on: tuple[tuple[str, ...], str | None] = ((), None),
 ) -> int:
-    """See `_generate`; says what is wrong in one line."""
+    """See `_generate`; says what is wrong in one line.  on: cells and geometry of pages."""
     try:
         _require_printable(*models, *([out] if out else []))
         if target in HOSTS:
             if check or trace is not None:
                 return _refused(f"--check and --trace know target simd, not {target}")
-            return hosts.generate(models, target, out)
-        return _generate(models, check, trace, Target(target), out, seconds)
+            return hosts.generate(models, target, out, On(*on))
+        return _generate(models, check, trace, Target(target), out, seconds, On(*on))
     except (ModelFileError, NoStateError, BuildError, CacheError) as error:
         return _refused(str(error))
     except OSError as error:
@@ -65,6 +67,7 @@ def _generate(
     target: Target,
     out: Path | None,
     seconds: float,
+    on: On,
 ) -> int:
     """Regenerate `generated/`; with `check` write nothing and name what is stale (exit code 1).
 
@@ -75,10 +78,10 @@ def _generate(
         if check or trace is not None:
             return _refused(f"--check and --trace know target simd, not {target}")
         if models:
-            return cli_files.write_target(models, target, out)
+            return cli_files.write_target(models, target, out, on)
         return targets.write((make() for make in ALL.values()), target, out)
     if models:
-        return cli_files.generate(models, out=out, check=check, trace=trace, seconds=seconds)
+        return cli_files.generate(models, out=out, check=check, trace=trace, seconds=seconds, on=on)
     if out is not None:
         return _refused("--out needs a MODEL.py or a --target")
     if trace is not None:

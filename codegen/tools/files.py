@@ -20,6 +20,7 @@ from rich.table import Column, Table
 
 from softehl.codegen.abi import Target, Task
 from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.pages import NOWHERE, On
 from softehl.codegen.tools import build, cache, library, targets, timing, user, verify
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.codegen.tools.samples import NoStateError
@@ -36,17 +37,18 @@ def generate(
     check: bool = False,
     trace: str | None = None,
     seconds: float = verify.SECONDS,
+    on: On = NOWHERE,
 ) -> int:
     """Exit code: 0 done, 1 a tangent is off or (`check`) something is stale, 2 no such model.
 
-    The check of each kernel takes at most so many `seconds`.
+    The check of each kernel takes at most so many `seconds`. on: where pages of fields stand.
     Raises `ModelFileError`, `NoStateError`, `BuildError`, `CacheError`, OSError.
     """
     groups = [(list(paths), out)] if out else [([p], default_folder(p)) for p in paths]
     if trace is not None:
-        return _trace(paths, trace)
+        return _trace(paths, trace, on)
     codes = [
-        _check(files, folder) if check else _generate(files, folder, seconds)
+        _check(files, folder, on) if check else _generate(files, folder, seconds, on)
         for files, folder in groups
     ]
     if check and any(codes):
@@ -55,12 +57,12 @@ def generate(
     return max(codes)
 
 
-def write_target(paths: Sequence[Path], target: Target, out: Path | None) -> int:
+def write_target(paths: Sequence[Path], target: Target, out: Path | None, on: On = NOWHERE) -> int:
     """The C of another target for the models of some files; exit code 0 or 2.
 
     Raises `ModelFileError`, OSError.
     """
-    made = [d for p in paths for d in user.definitions(p)]
+    made = [d for p in paths for d in user.definitions(p, on)]
     user.check_names(", ".join(p.name for p in paths), made)
     return targets.write(made, target, out)
 
@@ -70,13 +72,13 @@ def default_folder(path: Path) -> Path:
     return path.parent / "generated" / path.stem
 
 
-def _generate(paths: Sequence[Path], folder: Path, seconds: float) -> int:
+def _generate(paths: Sequence[Path], folder: Path, seconds: float, on: On) -> int:
     build.tuned()  # a missing compiler is better named before the derivation than after
-    definitions, made = library.of_files(paths)
+    definitions, made = library.of_files(paths, on)
     changed = write(folder, made)
     names = " ".join(p.name for p in paths)
     print(f"{names}: {len(made.files) + 2} files in {folder}, {changed} of them new or changed")
-    reports, unchecked = _reports(paths, definitions, made, seconds)
+    reports, unchecked = _reports(paths, definitions, made, seconds, on)
     errors = {name: r.errors for name, r in reports.items()}
     Console().print(_table(made, errors, _times(definitions, made)))
     for name, report in reports.items():
@@ -99,9 +101,10 @@ def _reports(
     definitions: Sequence[Definition],
     made: library.Library,
     seconds: float,
+    on: On,
 ) -> tuple[dict[str, verify.Report], list[str]]:
     """Reports of the check of each kernel, and reasons why some could not be checked."""
-    written = {name: d for p in paths for name, d in user.written_out(p, seconds / 4).items()}
+    written = {name: d for p in paths for name, d in user.written_out(p, seconds / 4, on).items()}
     reports, unchecked = {}, []
     for d in definitions:
         tasks = _entries(made.files)[d.name]["tasks"]
@@ -210,8 +213,8 @@ def _others(folder: Path, files: Mapping[str, str]) -> tuple[list[str], list[str
     return ours, strange
 
 
-def _check(paths: Sequence[Path], folder: Path) -> int:
-    definitions = [d for p in paths for d in user.definitions(p)]
+def _check(paths: Sequence[Path], folder: Path, on: On) -> int:
+    definitions = [d for p in paths for d in user.definitions(p, on)]
     user.check_names(" ".join(p.name for p in paths), definitions)
     files, _ = library.derive(definitions)
     stale = [n for n, text in files.items() if _bytes(folder / n) != text.encode()]
@@ -227,8 +230,8 @@ def _check(paths: Sequence[Path], folder: Path) -> int:
 # ------------------------------------------------------------------------------------- the trace
 
 
-def _trace(paths: Sequence[Path], name: str) -> int:
-    found = [d for p in paths for d in user.definitions(p)]
+def _trace(paths: Sequence[Path], name: str, on: On) -> int:
+    found = [d for p in paths for d in user.definitions(p, on)]
     for d in found:
         if d.name == name:
             show_trace(d)

@@ -15,7 +15,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from softehl.codegen import abi
 from softehl.codegen.tools import build, model_text
@@ -25,6 +25,12 @@ from softehl.codegen.tools.model_text import ModelFileError
 if TYPE_CHECKING:
     from softehl.codegen.graph.graph import Node
     from softehl.codegen.language.definition import Definition
+    from softehl.codegen.language.material import Law
+    from softehl.codegen.language.pages import On, Page
+
+
+Where: TypeAlias = "tuple[tuple[str, ...], str, bool]"
+"""Cells and geometry ("": the usual one) of pages of fields, and whether materials are wanted."""
 
 
 @dataclass(frozen=True)
@@ -41,25 +47,46 @@ class Library:
     compiled: Mapping[str, float]
 
 
-def folder_of(source: Path | Definition) -> Path:
-    """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived)."""
+def folder_of(source: Path | Definition | Page | Law, where: Where = ((), "", False)) -> Path:
+    """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
+
+    where: cells and geometry of pages of fields, and whether materials are wanted.
+    """
+    cells, geometry, materials = where
     if not isinstance(source, Path):
-        return library([source]).folder
-    key = _file_key(source)
-    files = store.recall(key)
+        return library(_definitions(source, where)).folder
+    anywhere = _file_key(source)
+    here = _file_key(source, *cells, geometry, "materials" if materials else "")
+    files = (None if materials else store.recall(anywhere)) or store.recall(here)
     if files is None:
+        from softehl.codegen.language.pages import On
         from softehl.codegen.tools import user
 
-        return library(user.definitions(source), key).folder
+        found = user.definitions(source, On(cells, geometry or None, materials))
+        return library(found, here if any(d.cell for d in found) else anywhere).folder
     return compiled(files)[0]
 
 
-def of_files(paths: Sequence[Path]) -> tuple[list[Definition], Library]:
+def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:
+    from softehl.codegen.language.material import Law
+    from softehl.codegen.language.pages import On, Page
+
+    cells, geometry, _ = where
+    if isinstance(source, Law):
+        source = source.page()
+    if isinstance(source, Page):
+        return source.definitions(On(cells, geometry or None))
+    return [source]
+
+
+def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definition], Library]:
     """The models of some files, which are run, and their library."""
+    from softehl.codegen.language.pages import NOWHERE
     from softehl.codegen.tools import user
 
-    keys = [_file_key(p) for p in paths]
-    found = [d for p in paths for d in user.definitions(p)]
+    on = on or NOWHERE
+    keys = [_file_key(p, *on.told()) for p in paths]
+    found = [d for p in paths for d in user.definitions(p, on)]
     user.check_names(" ".join(p.name for p in paths), found)
     return found, library(found, keys[0] if len(keys) == 1 else None)
 
@@ -126,8 +153,8 @@ def _content_of(folder: Path, files: Mapping[str, str]) -> str | None:
         return None
 
 
-def _file_key(path: Path) -> str:
-    return store.digest("file", generator(), model_text.digest(path))
+def _file_key(path: Path, *on: str) -> str:
+    return store.digest("file", generator(), model_text.digest(path), *on)
 
 
 _CODEGEN = Path(__file__).parents[1]
@@ -141,8 +168,8 @@ def generator() -> str:
 
 
 def fingerprint(definition: Definition) -> str:
-    """Digest of everything that a definition says, its graph included."""
-    return store.digest(_told(definition))
+    """Digest of everything that a definition says, its graphs included."""
+    return store.digest(_told(definition), _told(definition.point))
 
 
 def _told(value: Any) -> str:

@@ -19,6 +19,7 @@ def files(kernels: Iterable[KernelSource]) -> dict[str, str]:
     declarations = [abi.declaration(k.definition.name, t) for k in kernels for t in k.functions]
     out = {f"{k.definition.name}.c": k.text for k in kernels}
     out |= {f"{k.definition.name}_design.c": k.design for k in kernels if k.design}
+    out |= {name: text for k in kernels for name, text in k.shared.items()}
     out[source.HEADER] = source.header(declarations)
     out["signature.c"] = SIGNATURE_C
     manifest = {k.definition.name: _manifest(k) for k in kernels}
@@ -60,6 +61,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "point_data": {a.name: a.meaning for a in d.point_data},
         "places": [list(place) for place in d.places],
         "history": list(d.history),
+        **({"cell": d.cell} if d.cell else {}),
         "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],
         "fields": [name for name, _ in d.fields],
         "unrolled": any(f.chosen.unrolled for f in kernel.functions.values()),
@@ -73,6 +75,10 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
 
 def _cost(f: Function, points: int) -> dict[str, int]:
     once, per_point = f.plan.operations_once, f.plan.operations_per_point
+    if (
+        f.printer == "points"
+    ):  # the function of a point is called at each; its loops are not counted
+        once, per_point = 0, once
     return {
         "operations": once + points * per_point,
         "operations_once": once,

@@ -22,6 +22,9 @@ def show(definition: Definition) -> None:
     console = Console()
     page = len(reachable([definition.potential, *(n for _, n in definition.fields)]))
     console.print(f"page: a graph of {page} nodes; tasks: {', '.join(tasks(definition))}")
+    if definition.point is not None:
+        chosen = pipeline.form(definition)
+        console.print(f"form: {'at points' if chosen.at_points else 'whole element'}: {chosen.why}")
     for task, function in pipeline.compile_model(definition).functions.items():
         console.rule(f"{definition.name} {task}", align="left")
         stages = Table(box=None, show_header=False, padding=(0, 2, 0, 0))

@@ -3,12 +3,14 @@
 A model file is ordinary Python and is *run* to obtain its models: run only files you trust, as you
 would with any script.  Its models are
 
-- the functions of the file that take no argument and are annotated `-> Definition`, and
-- the names of the file that hold a `Definition`,
-- its materials (`@softehl.material`), which hosts take,
+- the functions of the file that take no argument and are annotated `-> Definition`,
+- the names of the file that hold a `Definition`, and
+- the functions decorated by `softehl.page`, on each cell that is asked for,
 
-in the order in which they are written; where the file has a mapping or list `MODELS` (of such
-functions or definitions), those alone.  Names that begin with an underscore are left out.
+in the order in which they are written.  Where there is none of these, or where they are asked for,
+the models are bodies of its functions decorated by `softehl.material`.  Where the file has a
+mapping or list `MODELS` (of such functions or definitions), those alone.  Names that begin with an
+underscore are left out.
 """
 
 from __future__ import annotations
@@ -32,9 +34,13 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
+from softehl.codegen.language.pages import NOWHERE, On, Page
 from softehl.codegen.tools.model_text import ModelFileError, read
 
-_RECIPE = "write `def my_model() -> Definition:` that ends in `return m.finish()`"
+_RECIPE = (
+    "write `def my_model() -> Definition:` that ends in `return m.finish()`, or `@softehl.page` "
+    "above `def my_page(m):`"
+)
 _TRUTH = (
     "a condition on symbols is neither true nor false while the page is read: write a branch as "
     "sp.Piecewise((value, condition), (other, True))"
@@ -48,31 +54,37 @@ _IN_SYMPY = {"fabs": "Abs", "abs": "Abs", "absolute": "Abs", "pow": "Pow", "powe
 }
 
 
-def definitions(path: Path) -> list[Definition]:
-    """The models of a file, which is run; raises `ModelFileError`."""
-    found = pages(path)
-    models = [d for d in found if isinstance(d, Definition)]
-    if not models:
-        raise ModelFileError(
-            f"{path.name} has materials only, which have no kernel of their own: give a --target "
-            "that takes materials, or put them into an element"
-        )
-    return models
+def definitions(path: Path, on: On = NOWHERE) -> list[Definition]:
+    """The models of a file, which is run; raises `ModelFileError`.
 
-
-def pages(path: Path) -> list[Definition | Law]:
-    """The models and the materials of a file, which is run; raises `ModelFileError`."""
+    on: where its pages of fields stand.
+    """
     path = path.resolve()
     text = read(path)
     with _imports_from(path.parent), _errors_of(path):
-        found = [_made(entry) for entry in _entries(path, _run(path, text))]
+        entries = _entries(path, _run(path, text), materials=on.materials)
+        found = [d for entry in entries for d in _made(entry, on)]
     if not found:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
     check_names(path.name, found)
     return found
 
 
-def written_out(path: Path, seconds: float = math.inf) -> dict[str, Definition]:
+def pages(path: Path, on: On = NOWHERE) -> list[Definition | Law]:
+    """The models of a file, and its materials as they are; raises `ModelFileError`."""
+    path = path.resolve()
+    text = read(path)
+    with _imports_from(path.parent), _errors_of(path):
+        entries = _entries(path, _run(path, text), materials=None)
+        made = [[e] if isinstance(e, Law) else _made(e, on) for e in entries]
+    found = [d for some in made for d in some]
+    if not found:
+        raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
+    check_names(path.name, found)
+    return found
+
+
+def written_out(path: Path, seconds: float = math.inf, on: On = NOWHERE) -> dict[str, Definition]:
     """The models of a file that is run again, with names as `language.names.Written`.
 
     A page that loses a dependence through a name, because SymPy took it for a constant, says
@@ -81,7 +93,7 @@ def written_out(path: Path, seconds: float = math.inf) -> dict[str, Definition]:
     """
     try:
         with names.written_out(), redirect_stdout(StringIO()), _at_most(seconds):
-            return {d.name: d for d in definitions(path)}
+            return {d.name: d for d in definitions(path, on)}
     except (ModelFileError, RecursionError, _Over):
         return {}
 
@@ -127,12 +139,22 @@ def _run(path: Path, text: str) -> ModuleType:
     return module
 
 
-def _entries(path: Path, module: ModuleType) -> list[Any]:
+def _entries(path: Path, module: ModuleType, *, materials: bool | None) -> list[Any]:
+    """What a file offers. materials: whether bodies of its materials; None: these as they are."""
     chosen = getattr(module, "MODELS", None)
     if chosen is not None:
         return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
     public = [(k, v) for k, v in vars(module).items() if not k.startswith("_")]
-    found = [v for _, v in public if isinstance(v, (Definition, Law)) or _makes_a_model(module, v)]
+    found = [v for _, v in public if isinstance(v, Definition | Page) or _makes_a_model(module, v)]
+    laws = [v for _, v in public if isinstance(v, Law)]
+    if materials is None and laws:
+        return [v for _, v in public if v in found or v in laws]
+    if laws and (materials or not found):
+        return [law.page() for law in laws]
+    if materials:
+        raise ModelFileError(
+            f"{path.name} has no material: write `@softehl.material` above `def my_law(m):`"
+        )
     if not found:
         bare = [k for k, v in public if _own_function(module, v) and _annotation(v) is None]
         if bare:
@@ -163,15 +185,17 @@ def _makes_a_model(module: ModuleType, value: Any) -> bool:
     return annotation is Definition
 
 
-def _made(entry: Any) -> Definition | Law:
+def _made(entry: Any, on: On) -> list[Definition]:
+    if isinstance(entry, Page):
+        return entry.definitions(on)
     made = entry() if callable(entry) else entry
-    if not isinstance(made, (Definition, Law)):
+    if not isinstance(made, Definition):
         label = getattr(entry, "__name__", repr(entry))
         code = getattr(entry, "__code__", None)
         where = f"{Path(code.co_filename).name}:{code.co_firstlineno}: " if code else ""
         what = "a Model that is not finished" if isinstance(made, Model) else type(made).__name__
         raise ModelFileError(f"{where}{label} gives {what}, not a Definition: {_RECIPE}")
-    return made
+    return [made]
 
 
 @contextmanager

@@ -48,11 +48,13 @@ class _Kernel:
 class DeadLoad(_Kernel):
     """A load per reference length or area of faces, one component; its parameters are t and factor.
 
-    face: kind of the faces, whose coordinates the elements have. value: of the load.
+    face: kind of the faces, whose coordinates the elements have. value: of the load. ring: whether
+    the faces are those of rings around the x axis.
     """
 
     face: Cell
     value: Amount
+    ring: bool = False
     name = "dead load"
     parameters = _TIME
 
@@ -65,6 +67,7 @@ class DeadLoad(_Kernel):
         x = np.einsum("qk,nkc->nqc", shape, places)
         load = amount(self.value, x.reshape(-1, x.shape[2]), *given["parameters"].tolist())
         area = measures(self.face, places, points) if self.face.dimension else np.ones(x.shape[:2])
+        area = area * 2.0 * np.pi * x[:, :, 1] if self.ring else area
         work = np.einsum("nq,nq,q,qk->nk", load.reshape(x.shape[:2]), area, weights, shape)
         return np.asarray(-work)
 
@@ -79,11 +82,13 @@ class Pressure(_Kernel):
     """A pressure on the deformed faces of a body, against their outward normal.
 
     Its unknowns are the displacements, all components node by node. face: kind of the faces.
-    value: force per deformed length or area, a function of undeformed places.
+    value: force per deformed length or area, a function of undeformed places. ring: whether the
+    faces are those of rings around the x axis.
     """
 
     face: Cell
     value: Amount
+    ring: bool = False
     name = "pressure"
     parameters = _TIME
 
@@ -94,9 +99,13 @@ class Pressure(_Kernel):
     def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
         """Residual and its exact tangent, which is not symmetric."""
         r, slopes, load, points = self._evaluate(coordinates, dofs, given)
+        around = self._around(coordinates, dofs, points)
         shape, along = self.face.shape(points), self.face.gradient(points)
         turn = _turned(slopes)  # (n, q, c, c, d): normal component by slope component and direction
-        K = np.einsum("nq,qk,nqced,qld->nkcle", load, shape, turn, along, optimize=True)
+        K = np.einsum("nq,qk,nqced,qld->nkcle", load * around, shape, turn, along, optimize=True)
+        if self.ring:
+            wider = 2.0 * np.pi * load
+            K[..., 1] += np.einsum("nq,qk,nqc,ql->nkcl", wider, shape, _normal(slopes), shape)
         return r, np.ascontiguousarray(K.reshape(*r.shape, r.shape[1]))
 
     def _evaluate(
@@ -114,8 +123,17 @@ class Pressure(_Kernel):
         load = amount(self.value, places.reshape(-1, X.shape[2]), *given["parameters"].tolist())
         slopes = np.einsum("qkd,nkc->nqcd", along, X + u)
         weighted = load.reshape(places.shape[:2]) * weights
-        r = np.einsum("nq,qk,nqc->nkc", weighted, values, _normal(slopes))
+        around = self._around(coordinates, dofs, points)
+        r = np.einsum("nq,qk,nqc->nkc", weighted * around, values, _normal(slopes))
         return r.reshape(dofs.shape), slopes, weighted, points
+
+    def _around(self, coordinates: Array, dofs: Array, points: Array) -> Array:
+        """Deformed circumferences (n, q) of rings, else ones."""
+        n, k = len(coordinates), len(self.face.nodes)
+        if not self.ring:
+            return np.ones((n, len(points)))
+        radius = (coordinates + dofs).reshape(n, k, 2)[:, :, 1]
+        return np.asarray(2.0 * np.pi * radius @ self.face.shape(points).T)
 
 
 def _normal(slopes: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,29 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.unknowns import Slot, slots
 from softehl.runtime.kernels import Kernel
-from softehl.runtime.mesh.mesh import Mesh, Predicate
+from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.statement.given import datum, known, parameter
 from softehl.runtime.statement.records import Block, StudyError
 
+GEOMETRIES = {1: ("solid",), 2: ("plane strain", "axisymmetric"), 3: ("solid",)}
+"""Geometries of meshes by their dimension, the default first."""
 Elements = tuple[str, Integers]
 """Kind of cells or faces and their nodes (n, k)."""
+
+
+def _faces(mesh: Mesh, on: str | Predicate, kernel: Kernel) -> Mapping[str, Integers]:
+    """Faces of a side; those of a page of fields have an outside, where its normals go."""
+    return mesh.outer_faces(on) if kernel.cell else mesh.faces(on)
+
+
+def kinds_of(mesh: Mesh, on: str | Predicate | None, cells: str | None) -> tuple[str, ...]:
+    """The kinds of cells or faces that are meant."""
+    if on is None:
+        return tuple(mesh.cells_of(cells))
+    try:
+        return tuple(mesh.faces(on))
+    except MeshError:
+        return ()  # nodes without faces: for a page of one node
 
 
 def elements_of(
@@ -26,7 +44,9 @@ def elements_of(
         raise StudyError(f"{name!r}: give cells=... or on=..., not both")
     if on is not None and kernel.nodes == 1:
         return "point1", mesh.nodes(on)[:, None]
-    there = mesh.faces(on) if on is not None else mesh.cells_of(cells)
+    there = _faces(mesh, on, kernel) if on is not None else mesh.cells_of(cells)
+    if kernel.cell in there:
+        return kernel.cell, there[kernel.cell]
     fit = {kind: nodes for kind, nodes in there.items() if nodes.shape[1] == kernel.nodes}
     if len(fit) != 1 or (cells is None and len(there) > 1):
         kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in there.items())
@@ -113,3 +133,27 @@ def _initial(block: str, kernel: Kernel, given: Mapping[str, Any], centres: Arra
     columns = [datum(block, name, given.get(name, 0.0), centres) for name in kernel.point_data]
     points = len(kernel.default_rule.weights)
     return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
+
+
+def geometry_of(mesh: Mesh, geometry: str | None) -> str:
+    """The geometry of a mesh (None: the usual one).  Raises StudyError for one it cannot have."""
+    allowed = GEOMETRIES[mesh.dimension]
+    if geometry is not None and geometry not in allowed:
+        words = " or ".join(f'"{g}"' for g in allowed)
+        raise StudyError(
+            f"geometry = {geometry!r} of a mesh in {mesh.dimension}-D: allowed is {words}"
+        )
+    return geometry or allowed[0]
+
+
+def require_page(source: object) -> None:
+    """Raise StudyError for what cannot be loaded."""
+    if isinstance(source, str | Path) or hasattr(source, "at_point"):
+        return
+    if callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):
+        name = getattr(source, "__name__", type(source).__name__)
+        hint = f", or what {name} returns when it is called" if callable(source) else ""
+        raise StudyError(
+            f"{type(source).__name__} is no page: give a model file, a function under "
+            f"@softehl.page, a kernel, a Definition that m.finish() made{hint}"
+        )

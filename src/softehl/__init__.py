@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.elements import quadrature, shapes
     from softehl.codegen.language.elements.cells import element
-    from softehl.codegen.language.material import material
+    from softehl.codegen.language.material import Law, material
     from softehl.codegen.language.model import Model
+    from softehl.codegen.language.pages import Page, page
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
     from softehl.runtime.fem.checks import ProblemError
     from softehl.runtime.fem.dofs import DofLayout
@@ -75,6 +76,7 @@ _MODELLING = {
     "element": "softehl.codegen.language.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
     "material": "softehl.codegen.language.material",
+    "page": "softehl.codegen.language.pages",
     "quadrature": "softehl.codegen.language.elements.quadrature:",
     "shapes": "softehl.codegen.language.elements.shapes:",
 }
@@ -110,6 +112,7 @@ __all__ = [
     "load_kernel",
     "main",
     "material",
+    "page",
     "processes",
     "quadrature",
     "run_oring",
@@ -152,15 +155,25 @@ def with_sympy() -> Iterator[None]:
         ) from None
 
 
-def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "Kernel":
+def load_kernel(
+    source: "str | Path | Definition | Page | Law",
+    name: str | None = None,
+    *,
+    cell: str | None = None,
+    geometry: str | None = None,
+    materials: bool = False,
+) -> "Kernel":
     """A compiled kernel, by any of
 
     - the name of one that ships: `load_kernel("solid_q4")`;
     - a model file: `load_kernel("my_model.py")`, with `name` where it has several models.  It is
       derived and compiled if the cache does not have it; the file is run then;
     - a folder that `softehl generate` wrote: `load_kernel("generated/my_model")`;
-    - a `Definition`, for notebooks.
+    - a `Definition` or a function decorated by `softehl.page` or `softehl.material`, for notebooks.
 
+    cell, geometry: where a page of fields stands, as in `load_kernel(page, cell="hex8")`; the
+    geometry is "plane strain" (the default), "axisymmetric" or "solid". Others ignore them.
+    materials: take the stress laws of a file, as bodies, and not its pages.
     Raises `runtime.kernels.KernelError`, or what is wrong with the model or the compiler.
     """
     from softehl.runtime import kernels
@@ -170,10 +183,11 @@ def load_kernel(source: "str | Path | Definition", name: str | None = None) -> "
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
         return kernels.load_kernel(source)
     if isinstance(source, (str, Path)) and folder_given:
-        return kernels.kernel_in(Path(source).resolve(), name)
+        return kernels.kernel_in(Path(source).resolve(), name, cell)
     from softehl.codegen.tools import library
 
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
-        folder = library.folder_of(place)
-    return kernels.kernel_in(folder, name)
+        where = (() if cell is None else (cell,), geometry or "", materials)
+        folder = library.folder_of(place, where)
+    return kernels.kernel_in(folder, name, cell)

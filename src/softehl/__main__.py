@@ -95,6 +95,14 @@ def _commands() -> "click.Group":
         show_default=True,
         help="For comparing each kernel with its page.",
     )
+    @click.option(
+        "--cell", "cells", multiple=True, help="Cell of pages of fields, e.g. hex8; several times."
+    )
+    @click.option(
+        "--geometry",
+        type=click.Choice(["plane strain", "axisymmetric", "solid"]),
+        help="Of pages of fields in two dimensions  [default: plane strain]",
+    )
     def generate(
         models: tuple[Path, ...],
         check: bool,
@@ -102,16 +110,20 @@ def _commands() -> "click.Group":
         target: str,
         out: Path | None,
         check_seconds: float,
+        cells: tuple[str, ...],
+        geometry: str | None,
     ) -> int:
         """Derive, compile and check the kernels of your own models, in MODEL.py.
 
-        The file is run; a model is a function without arguments annotated `-> Definition`.
+        The file is run; a model is a function under `@softehl.page`, for each --cell, or one
+        without arguments annotated `-> Definition`.
         Without a file the kernels that ship, in generated/, are regenerated.
         """
         with with_sympy():
             from softehl.codegen.tools.cli import generate
 
-            return generate(models, check, trace, target, out, check_seconds)
+            on = (cells, geometry)
+            return generate(models, check, trace, target, out, check_seconds, on)
 
     @commands.command()
     def kernels() -> int:

@@ -9,11 +9,14 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
+from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.fields import Fields
+from softehl.codegen.language.pages import Page
 from softehl.codegen.tools import build, cache, library, location
 from softehl.codegen.tools.build import LIBRARY
 
@@ -249,3 +252,32 @@ def test_files_have_the_usual_permissions(place: Path) -> None:
     assert records
     for path in (*records, folder / "spring.c"):
         assert stat.S_IMODE(path.stat().st_mode) == usual
+
+
+def test_what_pages_of_fields_share_is_compiled_once_and_again_where_it_is_damaged(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled: list[str] = []
+    run = build._run
+
+    def noted(command: Sequence[str], makes: Path) -> None:
+        compiled.extend(Path(word).name for word in command if Path(word).name.startswith("pairs_"))
+        run(command, makes)
+
+    def page(name: str) -> Definition:
+        def write(m: Fields) -> None:
+            (k,) = m.parameters(k=name)
+            g = m.grad(m.scalar(name))
+            m.minimise(k * g.dot(g) / 2)
+
+        return Page(name, write, form="point").definition("quad4")
+
+    monkeypatch.setattr(build, "_run", noted)
+    library.library([page("T")])
+    library.library([page("c")])
+    once = [name for name in compiled if name.endswith(".c")]
+    assert len(once) == 1
+    (stored,) = (place / "cache" / "built").glob(f"*/{build._OBJECT}")
+    stored.write_bytes(b"nothing")
+    library.library([page("p")])
+    assert [name for name in compiled if name.endswith(".c")] == 2 * once

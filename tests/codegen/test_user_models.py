@@ -480,3 +480,29 @@ def void_film() -> Definition:
 """
     model_file(text)
     assert run("mine.py") == 0
+
+
+# -------------------------------------------------------------------------------- pages of fields
+
+FLOW = """
+import softehl
+
+@softehl.page
+def flow(m):
+    T = m.scalar("T")
+    m.minimise(m.grad(T).dot(m.grad(T)) ** 2)
+"""
+
+
+def test_a_page_of_fields_is_generated_on_cells(capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(model_file(FLOW))
+    assert run(path) == 2
+    assert "say which, as in" in capsys.readouterr().err
+    assert run(path, "--cell", "hex9") == 2
+    assert "mine.py: no element 'hex9'; there are" in capsys.readouterr().err
+    assert run(path, "--cell", "tri3", "--cell", "quad4", "--geometry", "axisymmetric") == 0
+    assert "flow_quad4_axisymmetric: compared with its page" in capsys.readouterr().out
+    kernel = softehl.load_kernel("generated/mine", "flow", cell="tri3")
+    assert (kernel.name, kernel.cell) == ("flow_tri3_axisymmetric", "tri3")
+    assert run(path, "--cell", "tri3", "--trace", "flow_tri3") == 0
+    assert "form: whole element: about" in capsys.readouterr().out

@@ -112,6 +112,7 @@ def _contracted(d: Definition, node: Node, state: State, shapes: Sequence[Shape]
 
 def write(d: Definition, directory: Path) -> None:
     """All files of one model, as `softehl generate` writes them."""
+    directory.mkdir(exist_ok=True)
     for name, text in product.files([pipeline.compile_model(d)]).items():
         (directory / name).write_text(text, encoding="utf-8")
 

@@ -1,21 +1,16 @@
-"""Rubber in plane strain, 4 nodes."""
+"""Rubber on any cell."""
 
 import sympy as sp
 
-from softehl import Definition, Model, element, kinematics
+import softehl
 
 
-def rubber() -> Definition:
+@softehl.page
+def rubber(m):
     """W = mu / 2 (J^(-2/3) I1 - 3) + K / 2 (J - 1)^2."""
-    cell = element("quad4")
-    m = Model("rubber", nodes=4, rule=cell.rule, unroll=True)
-    X = m.coordinates("X", "Y")
-    u = m.nodal_unknowns("u_x", "u_y")
+    u = m.vector("u")
     mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
-    e = kinematics.isoparametric(m, X, cell.gradient(*m.point()))
-    F = kinematics.deformation_gradient(m, e.dN, u)
+    F = m.deformation_gradient(u)
     J = m.define("J", F.det())
-    I1 = (F.T * F).trace() + 1
-    W = mu / 2 * (J ** sp.Rational(-2, 3) * I1 - 3) + K / 2 * (J - 1) ** 2
-    m.potential(m.integral("Pi", W * e.detJ))
-    return m.finish()
+    I1 = (F.T * F).trace()
+    m.minimise(mu / 2 * (J ** sp.Rational(-2, 3) * I1 - 3) + K / 2 * (J - 1) ** 2)

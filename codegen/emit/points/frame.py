@@ -1,0 +1,75 @@
+"""Frame of the loops of a cell: the task, its lines, sums over nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from softehl.codegen import abi
+from softehl.codegen.abi import Task
+from softehl.codegen.emit import simd
+from softehl.codegen.emit.points import function
+from softehl.codegen.emit.points.function import Outputs
+from softehl.codegen.emit.points.layout import Layout, Needs
+from softehl.codegen.emit.points.lines import Lines
+from softehl.codegen.emit.printer import design_width
+from softehl.codegen.language.definition import Component, Quantity
+
+
+class Frame:
+    """The function of a group of elements while it is written.
+
+    Arrays of the element: places xs, unknowns us, data es, variation ts, forces r. D: dimension.
+    ring: whether the volume is that of a ring. design: whether places move. spread: whether
+    fluxes go to nodes. first_dof: unknowns in a variation come after so many entries.
+    """
+
+    def __init__(self, layout: Layout, task: str, outputs: Outputs) -> None:
+        self.layout, self.task, self.outputs = layout, task, outputs
+        self.needs = Needs.of(outputs.entries)
+        self.out = Lines()
+        self.D = layout.dimension
+        self.widths = simd.widths(layout.d, task)
+        self.ring = layout.form.axisymmetric
+        self.design = task in abi.DESIGN
+        self.spread = function.used(task)
+        self.first_dof = design_width(layout.d)
+
+    def moving(self) -> int:
+        """Entries of `direction` of an element."""
+        d = self.layout.d
+        sizes = {
+            Task.PRODUCT: len(d.unknowns),
+            Task.PSEUDO_LOAD: self.first_dof,
+            Task.FIELDS_RATE: self.first_dof + len(d.unknowns),
+        }
+        return sizes.get(Task(self.task), 0) if self.task in set(Task) else 0
+
+    def sums(self, order: int, sums: dict[str, tuple[str, str]]) -> None:
+        """Sums over the nodes of an order: name -> value at the node n, factor N, D0, D1 or D2."""
+        if not sums:
+            return
+        out = self.out
+        nodes = self.layout.shape(order).nodes
+        out.add(f"V {', '.join(f'{k} = softehl_splat(0.0)' for k in sums)};")
+        out.open(f"for (int n = 0; n < {nodes}; ++n)")
+        self.factors(order, {f for _, f in sums.values()}, "n")
+        values = dict.fromkeys(v for v, _ in sums.values())
+        named = {v: f"value{k}" for k, v in enumerate(values)}
+        for v, k in named.items():
+            out.add(f"const V {k} = {v};")
+        for k, (v, f) in sums.items():
+            out.add(f"{k} += {named[v]} * {f};")
+        out.close()
+
+    def factors(self, order: int, wanted: Iterable[str], node: str) -> None:
+        """Shape functions N and slopes D0, D1, D2 of a node at the point q."""
+        name = self.layout.d.cell
+        for f in sorted(wanted):
+            entry = "" if f == "N" else f"[{f[1:]}]"
+            table = "N" if f == "N" else "D"
+            self.out.add(f"const double {f} = {name}_{table}{order}[q][{node}]{entry};")
+
+
+def components(quantities: Iterable[Quantity]) -> list[Component]:
+    """Components of quantities, each once."""
+    return list(dict.fromkeys(q.component for q in quantities))

@@ -1,0 +1,155 @@
+"""Shape functions of a cell at the points of a rule, as tables of constants in C."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from typing import Any
+
+import mpmath
+import sympy as sp
+
+from softehl.codegen.emit.printer import number
+from softehl.codegen.language.elements.cells import Element
+from softehl.codegen.language.elements.quadrature import QuadratureRule
+
+DIGITS = 40
+
+
+@dataclass(frozen=True)
+class Line:
+    """Shape functions of a product along one direction.
+
+    values: [point][node] of a line, slopes too. places: of every node of the cell its nodes along
+    the directions.
+    """
+
+    values: tuple[tuple[float, ...], ...]
+    slopes: tuple[tuple[float, ...], ...]
+    places: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Values [point][node] and slopes [point][node][direction] of shape functions of an order.
+
+    line: for cells that are products of lines, under a rule that is a product too.
+    """
+
+    order: int
+    values: tuple[tuple[float, ...], ...]
+    slopes: tuple[tuple[tuple[float, ...], ...], ...]
+    line: Line | None
+
+    @property
+    def nodes(self) -> int:
+        """Number of shape functions."""
+        return len(self.values[0])
+
+    def text(self, name: str) -> str:
+        """Tables NAME_N<order> and NAME_D<order>."""
+        N = _array(f"{name}_N{self.order}", self.values)
+        return f"{N}\n{_array(f'{name}_D{self.order}', self.slopes)}"
+
+
+@cache
+def shape(order: int, cell: Element, rule: QuadratureRule) -> Shape:
+    """Shape functions of a cell at the points of a rule."""
+    values, slopes = _evaluated(cell.shape, rule.points, cell.dimension)
+    return Shape(order, values, slopes, _line(cell, rule))
+
+
+def constant(points: int, dimension: int) -> Shape:
+    """The one shape function of what is the same in the whole cell."""
+    return Shape(0, ((1.0,),) * points, (((0.0,) * dimension,),) * points, None)
+
+
+def _evaluated(function: Any, points: Sequence[Sequence[Any]], dimension: int) -> tuple[Any, Any]:
+    at = sp.symbols(f"x:{dimension}", real=True)
+    N = [sp.sympify(v) for v in function(*at)]
+    flat = [*N, *(sp.diff(v, x) for v in N for x in at)]
+    compiled = sp.lambdify(at, flat, "mpmath")
+    values, slopes = [], []
+    with mpmath.workdps(DIGITS):
+        for p in points:
+            found = [float(v) for v in compiled(*(mpmath.mpf(sp.N(x, DIGITS)) for x in p))]
+            values.append(tuple(found[: len(N)]))
+            rest = found[len(N) :]
+            starts = range(0, len(rest), dimension)
+            slopes.append(tuple(tuple(rest[k : k + dimension]) for k in starts))
+    return tuple(values), tuple(slopes)
+
+
+def _line(cell: Element, rule: QuadratureRule) -> Line | None:
+    """The line that a cell of all products is made of, with the points of the rule along it."""
+    sides = sorted({c for place in cell.nodes for c in place}, key=lambda c: (c == 0, c))
+    count = round(len(rule.points) ** (1 / cell.dimension))
+    of_lines = len(cell.nodes) == len(sides) ** cell.dimension and -1 in sides
+    if not of_lines or count**cell.dimension != len(rule.points):
+        return None
+    along = [p[-1] for p in rule.points[:count]]
+    grid = [rule.points[k][0] for k in range(0, len(rule.points), count ** (cell.dimension - 1))]
+    if along != grid:
+        return None
+    number_of = {c: k for k, c in enumerate(sides)}
+    places = tuple(tuple(number_of[c] for c in place) for place in cell.nodes)
+
+    def lagrange(x: Any) -> list[Any]:
+        return [
+            sp.prod([(x - b) / (a - b) for b in sides if b != a]) if len(sides) > 1 else 1
+            for a in sides
+        ]
+
+    values, slopes = _evaluated(lagrange, [(x,) for x in along], 1)
+    return Line(values, tuple(tuple(s for (s,) in row) for row in slopes), places)
+
+
+def weights(name: str, rule: QuadratureRule) -> str:
+    """Table NAME_W of the weights of a rule."""
+    return _array(f"{name}_W", [float(sp.N(w, DIGITS)) for w in rule.weights])
+
+
+def pairs(name: str, first: Line, second: Line) -> str:
+    """Table NAME of products along a line, [point][node of first][node of second][4].
+
+    Value by value, value by slope, slope by value, slope by slope.
+    """
+    rows = [
+        [
+            [[p * r, p * s, d * r, d * s] for r, s in zip(b, db, strict=True)]
+            for p, d in zip(a, da, strict=True)
+        ]
+        for a, da, b, db in zip(
+            first.values, first.slopes, second.values, second.slopes, strict=True
+        )
+    ]
+    return _array(name, rows)
+
+
+def nodes(name: str, line: Line) -> str:
+    """Table NAME of the node of every product of nodes along the directions."""
+    size, D = len(line.values[0]), len(line.places[0])
+    at = {place: k for k, place in enumerate(line.places)}
+    order = [at[place] for place in product(range(size), repeat=D)]
+    return f"static const int {name}[{size**D}] = {{{', '.join(map(str, order))}}};\n"
+
+
+def _array(name: str, values: Any) -> str:
+    """A constant array of C."""
+    sizes, inner = "", values
+    while not isinstance(inner, float):
+        sizes += f"[{len(inner)}]"
+        inner = inner[0]
+    return f"static const double {name}{sizes} = {_braces(values)};\n"
+
+
+def _braces(values: Any) -> str:
+    if isinstance(values, float):
+        return number(values)
+    inner: Iterable[str] = map(_braces, values)
+    joined = ", ".join(inner)
+    if isinstance(values[0], float):
+        return f"{{{joined}}}"
+    return "{\n" + joined.replace("}, {", "},\n{") + "}"

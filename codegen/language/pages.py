@@ -1,0 +1,167 @@
+"""`@softehl.page`: a function of fields that becomes the definition of an element of any cell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args, overload
+
+from softehl.codegen.language.definition import Definition, PointForm
+from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.elements.cells import Element, element
+from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.codegen.language.entries import applied
+from softehl.codegen.language.fields import AXISYMMETRIC, GEOMETRIES, SOLID, Fields, order_of
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.side import Side
+from softehl.codegen.language.site import Site
+from softehl.codegen.language.whole import Whole
+
+Write = Callable[[Fields], Any]
+Form = Literal["whole", "point"]
+
+
+class PlaceError(ModelError):
+    """A page of fields cannot stand there; no line of it is wrong."""
+
+    def __init__(self, message: str) -> None:
+        ValueError.__init__(self, message)
+
+
+@dataclass(frozen=True)
+class On:
+    """Places for pages of fields: cells by name, and the geometry (None: the usual one).
+
+    materials: whether only the stress laws of a file are wanted, as bodies.
+    """
+
+    cells: tuple[str, ...] = ()
+    geometry: str | None = None
+    materials: bool = False
+
+    def told(self) -> tuple[str, ...]:
+        """All of it as texts, for a digest."""
+        return (*self.cells, self.geometry or "", "materials" if self.materials else "")
+
+
+NOWHERE = On()
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of fields: `write` says its mathematics.
+
+    degree: of polynomials that the quadrature integrates on the parent cell; None: the rule of the
+    cell, or on triangles and tetrahedra one that integrates products of values, where they occur.
+    form: of its kernels, "whole" element or loops around a "point"; None: the faster one.
+    """
+
+    name: str
+    write: Write
+    degree: int | None = None
+    doc: str = ""
+    form: Form | None = None
+
+    def definition(self, cell: str, geometry: str | None = None) -> Definition:
+        """The model of an element of a cell, by its name, in a geometry (None: the usual one).
+
+        It is a side where the geometry has one dimension more: quad4 of a solid, line2 in plane
+        strain.
+        """
+        kind = element(cell)
+        chosen = geometry_of(kind.dimension, geometry)
+        name = f"{self.name}_{cell}" + ("_axisymmetric" if chosen == AXISYMMETRIC else "")
+        if space_of(chosen, kind.dimension) > kind.dimension:
+            degree = self.degree or 2 * order_of(kind)
+            side = Side(name, kind, chosen, rule_of(kind, degree), self.doc)
+            applied(self.name, self.write, side)
+            return side.finish()
+        point = self._at_point(name, kind, chosen)
+        whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
+        applied(self.name, self.write, whole)
+        unroll = False if self.form == "point" else None
+        at = None if self.form == "whole" else point
+        return replace(whole.finish(), point=at, unroll=unroll)
+
+    def definitions(self, on: On) -> list[Definition]:
+        """Its models on all cells that are wanted."""
+        if not on.cells:
+            raise PlaceError(
+                f"{self.name} is a page of fields, which stands on any cell: say which, as in "
+                'softehl.load_kernel(page, cell="hex8") or softehl generate --cell hex8'
+            )
+        try:
+            return [self.definition(cell, on.geometry) for cell in on.cells]
+        except ModelError:
+            raise
+        except ValueError as error:  # no such cell
+            raise PlaceError(str(error)) from None
+
+    def at_point(self, cell: str, geometry: str | None = None) -> PointForm:
+        """The model at a point of a cell."""
+        kind = element(cell)
+        return self._at_point(self.name, kind, geometry_of(kind.dimension, geometry))
+
+    def _at_point(self, name: str, kind: Element, geometry: str) -> PointForm:
+        site = Site(name, kind, geometry, self.doc)
+        applied(self.name, self.write, site)
+        return site.form()
+
+    def rule(self, cell: Element, form: PointForm) -> QuadratureRule:
+        """The quadrature on a cell."""
+        if self.degree is not None:
+            return rule_of(cell, self.degree)
+        order = order_of(cell)
+        values = any(q.axis is None and q.component.order == order for q in form.unknowns)
+        short = cell.name.startswith(("line", "tri", "tet"))
+        return rule_of(cell, 2 * order) if values and short else cell.rule
+
+
+def rule_of(cell: Element, degree: int) -> QuadratureRule:
+    """A rule of a cell for polynomials of a degree (in each direction of a square or cube)."""
+    name = cell.name.rstrip("0123456789")
+    if name == "tri":
+        return quadrature.triangle(degree)
+    if name == "tet":
+        return quadrature.tetrahedron(degree)
+    if name == "wedge":
+        return quadrature.wedge(degree)
+    return quadrature.gauss(degree // 2 + 1, cell.dimension)
+
+
+def space_of(geometry: str, dimension: int) -> int:
+    """Dimensions of the mesh in which a cell of a dimension has this geometry."""
+    if geometry != SOLID:
+        return 2
+    return 3 if dimension > 1 else 1
+
+
+def geometry_of(dimension: int, geometry: str | None) -> str:
+    """The geometry of a mesh, checked.  Raises ModelError."""
+    allowed = GEOMETRIES[dimension]
+    if geometry is not None and geometry not in allowed:
+        raise PlaceError(
+            f"geometry = {geometry!r} of a cell in {dimension}-D; allowed is "
+            + " or ".join(f'"{g}"' for g in allowed)
+        )
+    return geometry or allowed[0]
+
+
+@overload
+def page(write: Write, /) -> Page: ...
+@overload
+def page(*, degree: int | None = None, form: Form | None = None) -> Callable[[Write], Page]: ...
+def page(
+    write: Write | None = None, /, *, degree: int | None = None, form: Form | None = None
+) -> Any:
+    """Make a page of fields of a function that gets m, a `Fields`: `@softehl.page`.
+
+    degree, form: as in `Page`, for `@softehl.page(degree=4)`.
+    """
+    if form is not None and form not in get_args(Form):
+        raise ModelError(f'form = {form!r}: allowed are "whole" and "point"')
+
+    def made(function: Write) -> Page:
+        return Page(function.__name__, function, degree, function.__doc__ or "", form)
+
+    return made if write is None else made(write)

@@ -1,0 +1,49 @@
+"""A page of fields as the model of one whole element of a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import sympy as sp
+
+from softehl.codegen.language import kinematics
+from softehl.codegen.language.definition import Component
+from softehl.codegen.language.elements.cells import Element
+from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.codegen.language.elements.shapes import interpolate
+from softehl.codegen.language.fields import AXISYMMETRIC
+from softehl.codegen.language.nodal import Nodal
+
+
+class Whole(Nodal):
+    """Values and gradients are sums over nodes, densities are integrated over the cell."""
+
+    def __init__(
+        self, name: str, cell: Element, geometry: str, rule: QuadratureRule, doc: str
+    ) -> None:
+        super().__init__(name, cell, geometry, rule, doc, dimension=cell.dimension)
+        self._map = kinematics.isoparametric(self, self._X, cell.gradient(*self._at))
+        self._slopes_by_order = {self.order: self._map.dN}
+
+    def _of_cell(self, order: int) -> list[list[Any]]:
+        """Gradients of the shape functions of an order."""
+        if order not in self._slopes_by_order:
+            parent = self._element(order).gradient(*self._at)
+            rows = [sp.Matrix([list(g)]) * self._map.inverse for g in parent]
+            dN = [
+                [self.define(f"slope_of_order_{order}_{a}{k}", v) for k, v in enumerate(row)]
+                for a, row in enumerate(rows)
+            ]
+            self.measure(self._map.detJ, [v for row in dN for v in row])
+            self._slopes_by_order[order] = dN
+        return self._slopes_by_order[order]
+
+    def _slopes_of(self, component: Component, column: Sequence[Any]) -> list[Any]:
+        dN = self._of_cell(component.order)
+        return [interpolate([g[k] for g in dN], column) for k in range(self.dimension)]
+
+    def _volume(self) -> Any:
+        if self.geometry == AXISYMMETRIC:
+            return self.define("volume_of_ring", 2 * sp.pi * self._place()[1] * self._map.detJ)
+        return self._map.detJ

@@ -1,0 +1,278 @@
+"""Pages of fields in a study: one page on every kind of cell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import softehl
+from softehl.runtime.arrays import Array
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.result import Result
+from softehl.runtime.study import Study, StudyError
+
+AFFINE = np.array([[0.08, 0.05, -0.02], [-0.03, 0.1, 0.04], [0.02, -0.06, 0.07]])
+"""Displacement gradient of the patch tests."""
+
+
+@softehl.page
+def rubber(m):  # type: ignore[no-untyped-def]
+    """Compressible neo-Hooke."""
+    u = m.vector("u")
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + K / 2 * (J - 1) ** 2
+    m.minimise(W)
+    m.fields(J=J, W=W)
+
+
+def moved(mesh: Mesh) -> Mesh:
+    """The mesh with its inner nodes moved: cells are no more alike, straight or parallel."""
+    size = mesh.points.max()
+    inside = np.all((mesh.points > 1e-9) & (mesh.points < size - 1e-9), axis=1)
+    shift = 0.04 * np.sin(7.0 * mesh.points @ np.ones((mesh.dimension, mesh.dimension)) + 1.0)
+    points = mesh.points + shift * inside[:, None]
+    return Mesh(points=points, cells=mesh.cells, groups=mesh.groups, sides=mesh.sides)
+
+
+def patch(mesh: Mesh, geometry: str | None, gradient: Array) -> tuple[float, Array]:
+    """Largest error of the displacements, and J, where the boundary is moved by a gradient."""
+    study = Study(mesh, geometry=geometry)
+    study.add("rubber", rubber, mu=0.4, K=0.9)
+    size = mesh.dimension
+    A = gradient[:size, :size]
+    for side in mesh.sides:
+        for axis, row in zip("xyz", A, strict=False):
+            study.fix(side, **{f"u_{axis}": lambda x, t, row=row: x @ row})
+    result = study.solve()
+    errors = [
+        np.abs(result.values(f"u_{axis}") - mesh.points @ row).max()
+        for axis, row in zip("xyz", A, strict=False)
+    ]
+    return float(max(errors)), result.fields("rubber")["J"]
+
+
+def box(shape: str, order: int, cells: int = 2) -> Mesh:
+    """A unit square or cube."""
+    if shape in ("triangle", "quad"):
+        return Mesh.rectangle(1, 1, cells=(cells, cells), order=order, shape=shape)  # type: ignore[arg-type]
+    return Mesh.box((1, 1, 1), cells=(cells,) * 3, order=order, shape=shape)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("shape", "order"),
+    [
+        ("triangle", 1),
+        ("quad", 2),
+        ("tetrahedron", 1),
+        ("hex", 1),
+        pytest.param("triangle", 2, marks=pytest.mark.slow),
+        pytest.param("quad", 1, marks=pytest.mark.slow),
+        pytest.param("tetrahedron", 2, marks=pytest.mark.slow),
+        pytest.param("wedge", 1, marks=pytest.mark.slow),
+        pytest.param("serendipity", 2, marks=pytest.mark.slow),
+        pytest.param("hex", 2, marks=pytest.mark.slow),
+    ],
+)
+def test_a_patch_of_any_cells_deforms_affinely(shape: str, order: int) -> None:
+    mesh = moved(box(shape, order))
+    size = mesh.dimension
+    error, J = patch(mesh, None, AFFINE)
+    assert error < 1e-12
+    assert np.allclose(J, np.linalg.det(np.eye(size) + AFFINE[:size, :size]), rtol=1e-12)
+
+
+def test_a_page_stands_on_several_kinds_of_cells_at_once() -> None:
+    points = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0.9, 0.4]], dtype=float)
+    cells = {
+        "quad4": np.array([[1, 2, 5, 4]]),
+        "tri3": np.array([[0, 1, 6], [1, 4, 6], [4, 3, 6], [3, 0, 6]]),
+    }
+    mesh = Mesh(points=points, cells=cells)
+    study = Study(mesh)
+    study.add("rubber", rubber, mu=0.4, K=0.9)
+    A = AFFINE[:2, :2]
+    edge = [0, 1, 2, 3, 4, 5]
+    study.fix(edge, u_x=lambda x, t: x @ A[0], u_y=lambda x, t: x @ A[1])
+    result = study.solve()
+    assert np.abs(result.values("u_y") - points @ A[1]).max() < 1e-12
+    for block in ("rubber:quad4", "rubber:tri3"):
+        assert np.allclose(result.fields(block)["J"], np.linalg.det(np.eye(2) + A), rtol=1e-12)
+
+
+def test_a_patch_that_is_not_affine_is_seen() -> None:
+    mesh = moved(box("triangle", 1))
+    study = Study(mesh)
+    study.add("rubber", rubber, mu=0.4, K=0.9)
+    for side in mesh.sides:
+        study.fix(side, u_x=lambda x, t: 0.1 * x[:, 1] ** 2, u_y=0)
+    assert np.ptp(study.solve().fields("rubber")["J"]) > 1e-3
+
+
+def test_a_pressure_of_every_cell_holds_the_volume() -> None:
+    study = Study(Mesh.rectangle(1, 1, cells=(4, 4)))
+    study.add("rubber", constant_pressure, mu=0.4, K=4e4)
+    study.fix("bottom", u_x=0, u_y=0)
+    study.fix("top", u_x=0.2, u_y=0.1)
+    result = study.solve(steps=2)
+    J = result.fields("rubber")["J"].mean(axis=1)
+    assert np.abs(J - 1).max() < 1e-4
+    assert len(result.values("p")) == 16
+
+
+@softehl.page
+def constant_pressure(m):  # type: ignore[no-untyped-def]
+    """Displacements and a pressure of every cell."""
+    u, p = m.vector("u"), m.scalar("p", order=0)
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + p * (J - 1) - p**2 / (2 * K))
+    m.fields(J=J)
+
+
+@softehl.page
+def poisson(m):  # type: ignore[no-untyped-def]
+    """- div grad T = q with T = sin(pi x) sin(pi y)."""
+    T = m.scalar("T")
+    x, y = m.position
+    q = 2 * sp.pi**2 * sp.sin(sp.pi * x) * sp.sin(sp.pi * y)
+    m.weak(m.grad(T), m.grad(T))
+    m.weak(-q, T)
+    m.fields(error=(T - sp.sin(sp.pi * x) * sp.sin(sp.pi * y)) ** 2)
+
+
+@pytest.mark.parametrize(("shape", "order"), [("triangle", 1), ("quad", 2)])
+def test_errors_fall_with_the_order_of_the_cell(shape: str, order: int) -> None:
+    errors = []
+    for cells in (4, 8):
+        mesh = box(shape, order, cells)
+        study = Study(mesh)
+        study.add("plate", poisson)
+        for side in mesh.sides:
+            study.fix(side, T=0)
+        errors.append(np.sqrt(study.solve().fields("plate")["error"].mean()))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order + 1, abs=0.25)
+
+
+def test_an_axisymmetric_body_is_stretched_around_the_x_axis() -> None:
+    mesh = Mesh.rectangle(1, 1, cells=(2, 2), shape="triangle")
+    error, J = patch(mesh, "axisymmetric", np.diag([0.1, 0.05, 0.0]))
+    assert error < 1e-12
+    assert np.allclose(J, 1.1 * 1.05**2, rtol=1e-12)
+
+
+def test_a_geometry_that_the_mesh_cannot_have_is_refused() -> None:
+    with pytest.raises(StudyError, match='"plane strain" or "axisymmetric"'):
+        Study(Mesh.rectangle(1, 1, cells=(1, 1)), geometry="solid")
+
+
+def test_a_file_may_hold_a_page_of_fields(tmp_path: Path) -> None:
+    path = tmp_path / "laplace.py"
+    path.write_text(
+        "import softehl\n@softehl.page\ndef laplace(m):\n"
+        "    T = m.scalar('T')\n    (k,) = m.parameters(k='conductivity [W/(mm K)]')\n"
+        "    m.weak(k * m.grad(T), m.grad(T))\n"
+    )
+    study = Study(Mesh.rectangle(2, 1, cells=(2, 1), shape="triangle"))
+    study.add("plate", path, k=3.0)
+    study.fix("left", T=0)
+    study.fix("right", T=4)
+    result = study.solve()
+    assert result.at((1.0, 0.5))["T"] == pytest.approx(2.0, rel=1e-12)
+    assert result.reaction("right")["T"] == pytest.approx(3.0 * 4 / 2, rel=1e-12)
+
+
+@softehl.page
+def laplace(m):  # type: ignore[no-untyped-def]
+    """- div k grad T = 0."""
+    T = m.scalar("T")
+    (k,) = m.parameters(k="conductivity [W/(mm K)]")
+    m.weak(k * m.grad(T), m.grad(T))
+
+
+@softehl.page
+def followed(m):  # type: ignore[no-untyped-def]
+    """A pressure that follows the side."""
+    u = m.vector("u")
+    (p,) = m.parameters(p="pressure [MPa]")
+    m.weak(p * m.area_vector(u), u)
+
+
+@softehl.page
+def convection(m):  # type: ignore[no-untyped-def]
+    """Heat that leaves through a side, and a flux of given direction."""
+    T = m.scalar("T")
+    h, q = m.parameters(h="transfer [W/(mm^2 K)]", q="flux along x [W/mm^2]")
+    m.weak(h * T + q * m.normal[0], T)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "geometry"),
+    [
+        (Mesh.rectangle(1, 1, cells=(2, 2), shape="triangle", order=2), "plane strain"),
+        (Mesh.box((1, 1, 1), cells=(1, 1, 1), shape="tetrahedron"), "solid"),
+    ],
+)
+def test_a_page_on_a_side_is_the_pressure_that_follows_it(mesh: Mesh, geometry: str) -> None:
+    def solved(page: bool) -> Array:
+        study = Study(mesh, geometry=geometry)
+        study.add("rubber", rubber, mu=0.4, K=0.9)
+        for axis in "xyz"[: mesh.dimension]:
+            study.fix("left", **{f"u_{axis}": 0})
+        if page:
+            study.add("pressure", followed, on="right", p=lambda t: 0.1 * t)
+        else:
+            study.pressure("right", 0.1)
+        return study.solve(steps=2).values("u_x")
+
+    assert np.abs(solved(True) - solved(False)).max() < 1e-12
+    assert np.ptp(solved(False)) > 1e-2
+
+
+def test_an_axisymmetric_side_has_the_pressure_of_a_thick_tube() -> None:
+    mesh = Mesh.rectangle(1, 1, cells=(1, 8), order=2).map(lambda x: x + np.array([0.0, 1.0]))
+    study = Study(mesh, geometry="axisymmetric")
+    study.add("rubber", rubber, mu=0.4, K=0.9)
+    study.add("pressure", followed, on="bottom", p=1e-5)
+    for side in ("left", "right"):
+        study.fix(side, u_x=0)
+    moved = study.solve().at((0.5, 1.0))["u_y"]
+    lame = 0.9
+    inner = 1e-5 / 3 * (1 / (2 * (0.4 + lame)) * 1.0 + 4 / (2 * 0.4))
+    assert moved == pytest.approx(inner, rel=1e-4)
+
+
+def test_loads_and_pressures_of_an_axisymmetric_study_act_on_rings() -> None:
+    mesh = Mesh.rectangle(1, 1, cells=(2, 2), order=2).map(lambda x: x + np.array([0.0, 1.0]))
+
+    def solved(how: str) -> Result:
+        study = Study(mesh, geometry="axisymmetric")
+        study.add("rubber", rubber, mu=0.4, K=0.9)
+        study.fix("left", u_x=0, u_y=0)
+        if how == "page":
+            study.add("pressure", followed, on="right", p=lambda t: 0.1 * t)
+        elif how == "pressure":
+            study.pressure("right", 0.1)
+        else:
+            study.load("right", u_x=-0.1)
+        return study.solve(steps=2)
+
+    results = {how: solved(how) for how in ("page", "pressure", "load")}
+    assert np.abs(results["page"].x - results["pressure"].x).max() < 1e-12
+    total = results["load"].reaction("left")["u_x"]
+    assert total == pytest.approx(0.1 * np.pi * (2**2 - 1), rel=1e-9)
+    assert results["pressure"].iterations == results["page"].iterations
+
+
+def test_sides_have_outward_normals_and_values() -> None:
+    study = Study(Mesh.rectangle(2, 1, cells=(4, 2), shape="triangle"))
+    study.add("plate", laplace, k=3.0)
+    study.fix("left", T=4)
+    study.add("loss", convection, on="right", h=0.5, q=1.0)
+    # 3 dT/dx = - (T / 2 + 1) on the right: T = 4 - a x with 3 a = (4 - 2 a) / 2 + 1
+    assert study.solve().at((2.0, 0.5))["T"] == pytest.approx(4 - 2 * 3 / 4, rel=1e-12)

@@ -1,0 +1,171 @@
+"""Stress laws by themselves: in a study, in a page, in a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import softehl
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.material import Law, Material
+from softehl.codegen.tools.model_text import ModelFileError
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.result import Result
+from softehl.runtime.study import Source, Study, StudyError
+
+
+@softehl.material
+def neo(m: Material) -> None:
+    """Compressible neo-Hooke."""
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    J = m.define("J", m.F.det(method="berkowitz"))
+    m.energy(mu / 2 * ((m.F.T * m.F).trace() - 3 - 2 * sp.log(J)) + K / 2 * (J - 1) ** 2)
+
+
+@softehl.material
+def neo_stress(m: Material) -> None:
+    """The same law as a stress."""
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    J = m.define("J", m.F.det(method="berkowitz"))
+    inverse = m.F.adjugate().T / J
+    m.stress(mu * (m.F - inverse) + K * (J - 1) * J * inverse)
+
+
+@softehl.material
+def saint_venant(m: Material) -> None:
+    """An energy of the strain."""
+    mu, lame = m.parameters(mu="shear modulus [MPa]", lame="first Lame parameter [MPa]")
+    E = m.green
+    m.energy(lame / 2 * E.trace() ** 2 + mu * (E.T * E).trace())
+
+
+@softehl.material
+def second(m: Material) -> None:
+    """The same law as a second Piola-Kirchhoff stress."""
+    mu, lame = m.parameters(mu="shear modulus [MPa]", lame="first Lame parameter [MPa]")
+    m.second_stress(lame * m.green.trace() * sp.eye(3) + 2 * mu * m.green)
+
+
+def sheared(geometry: str | None = None, **what: Source | float) -> Result:
+    """A square whose top is moved, of a material or page."""
+    study = Study(Mesh.rectangle(1, 1, cells=(2, 2), shape="triangle"), geometry=geometry)
+    study.add("body", **what)  # type: ignore[arg-type]
+    study.fix("bottom", u_x=0, u_y=0)
+    study.fix("top", u_x=0.1, u_y=0.05)
+    return study.solve()
+
+
+def test_an_energy_and_its_stress_are_one_material() -> None:
+    a = sheared(material=neo, mu=0.4, K=0.9)
+    b = sheared(material=neo_stress, mu=0.4, K=0.9)
+    assert np.abs(a.x - b.x).max() < 1e-12
+    assert np.allclose(a.fields("body")["sigma_zz"], b.fields("body")["sigma_zz"], rtol=1e-10)
+    other = sheared(material=neo_stress, mu=0.4, K=0.91)
+    assert np.abs(a.x - other.x).max() > 1e-6
+
+
+def test_an_energy_of_the_strain_and_its_second_stress_are_one_material() -> None:
+    a = sheared("axisymmetric", material=saint_venant, mu=0.4, lame=0.6)
+    b = sheared("axisymmetric", material=second, mu=0.4, lame=0.6)
+    assert np.abs(a.x - b.x).max() < 1e-12
+
+
+def test_a_page_may_use_a_material_beside_its_own_terms() -> None:
+    @softehl.page
+    def held(m):  # type: ignore[no-untyped-def]
+        u = m.vector("u")
+        (k,) = m.parameters(k="stiffness of the ground [N/mm^3]")
+        F = m.deformation_gradient(u)
+        m.weak(m.stress(neo, F), F)
+        m.minimise(k / 2 * u.dot(u))
+
+    free = sheared(material=neo, mu=0.4, K=0.9)
+    assert np.abs(sheared(source=held, mu=0.4, K=0.9, k=0).x - free.x).max() < 1e-12
+    assert np.abs(sheared(source=held, mu=0.4, K=0.9, k=1).x - free.x).max() > 1e-3
+
+
+def test_uniaxial_cauchy_stress_in_closed_form() -> None:
+    study = Study(Mesh.box((1, 1, 1), cells=(1, 1, 1), shape="tetrahedron"))
+    study.add("body", material=neo, mu=0.4, K=0.9)
+    for side, name in (("left", "u_x"), ("front", "u_y"), ("bottom", "u_z")):
+        study.fix(side, **{name: 0})
+    study.fix("right", u_x=0.3)
+    result = study.solve(steps=2)
+    J = result.fields("body")["J"]
+    across = J / 1.3
+    assert np.allclose(0.4 * (across - 1) + 0.9 * (J - 1) * J, 0.0, atol=1e-12)
+    expected = (0.4 * (1.3**2 - 1) + 0.9 * (J - 1) * J) / J
+    assert np.allclose(result.fields("body")["sigma_xx"], expected, rtol=1e-10)
+
+
+def test_a_law_of_small_strains_is_linear() -> None:
+    @softehl.material
+    def hooke(m: Material) -> None:
+        G, lame = m.parameters(G="shear modulus [MPa]", lame="first Lame parameter [MPa]")
+        m.energy(G * (m.strain * m.strain).trace() + lame / 2 * m.strain.trace() ** 2)
+
+    study = Study(Mesh.rectangle(1, 1, cells=(1, 1)))
+    study.add("body", material=hooke, G=0.4, lame=0.6)
+    study.fix("left", u_x=0)
+    study.fix("bottom", u_y=0)
+    study.fix("right", u_x=0.5)
+    result = study.solve()
+    across = -0.5 * 0.6 / (0.6 + 2 * 0.4)
+    assert result.iterations == 1
+    expected = {
+        "sigma_xx": 1.4 * 0.5 + 0.6 * across,
+        "sigma_yy": 0.0,
+        "sigma_zz": 0.6 * (0.5 + across),
+    }
+    for name, value in expected.items():
+        assert np.allclose(result.fields("body")[name], value, atol=1e-14)
+
+
+FILE = """
+import softehl
+
+@softehl.material
+def stiff(m):
+    (c,) = m.parameters(c="modulus [MPa]")
+    m.energy(c * (m.green.T * m.green).trace())
+"""
+PAGE = """
+@softehl.page
+def body(m):
+    F = m.deformation_gradient(m.vector("u"))
+    m.weak(m.stress(stiff, F), F)
+    m.fields(of_page=F[0, 0])
+"""
+
+
+def test_a_file_of_materials_gives_bodies_of_them(tmp_path: Path) -> None:
+    alone, both = tmp_path / "alone.py", tmp_path / "both.py"
+    alone.write_text(FILE)
+    both.write_text(FILE + PAGE)
+    assert "sigma_xx" in sheared(source=alone, c=1.0).fields("body")
+    assert "sigma_xx" in sheared(material=both, c=1.0).fields("body")
+    assert "of_page" in sheared(source=both, model="body", c=1.0).fields("body")
+    alone.write_text("import softehl\n" + PAGE.replace("stiff, F", "None, F"))
+    with pytest.raises(ModelFileError, match="has no material"):
+        sheared(material=alone)
+
+
+def test_what_a_material_cannot_say_is_told() -> None:
+    with pytest.raises(ModelError, match=r"neither m\.energy"):
+        sheared(material=Law("empty", "", lambda m: None))
+    with pytest.raises(ModelError, match="shape that of a scalar, must be"):
+        sheared(material=Law("scalar", "", lambda m: m.stress(1)))
+    with pytest.raises(StudyError, match="one of them"):
+        sheared(source=neo, material=neo)
+    with pytest.raises(StudyError, match="one of them"):
+        sheared()
+
+
+def test_a_material_by_itself_has_a_symmetric_tangent_of_nine_gradients() -> None:
+    form = neo.at_point()
+    assert [q.axis for q in form.unknowns] == [0, 1, 2] * 3
+    assert form.definition.conservative
+    assert not neo_stress.at_point().definition.conservative
