@@ -140,7 +140,7 @@ def _run(path: Path, text: str) -> ModuleType:
 
 
 def _entries(path: Path, module: ModuleType, *, materials: bool | None) -> list[Any]:
-    """What a file offers. materials: whether bodies of its materials; None: these as they are."""
+    """Entries of a file. materials: whether bodies of its materials; None: these as they are."""
     chosen = getattr(module, "MODELS", None)
     if chosen is not None:
         return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
