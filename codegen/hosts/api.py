@@ -30,7 +30,9 @@ def files(page: Interface, *, single: bool = False) -> tuple[dict[str, str], Ker
     declarations = [abi.declaration(page.name, t) for t in kernel.functions]
     return {
         f"{page.name}.h": header(page),
-        f"{page.name}.c": "\n".join([*lanes, kernel.text, functions(page)]),
+        f"{page.name}.c": "\n".join(
+            [*lanes, *kernel.shared.values(), kernel.text, functions(page)]
+        ),
         source.HEADER: source.header(declarations, signed=False),
     }, kernel
 

@@ -14,6 +14,7 @@ import mpmath
 
 from softehl.codegen.abi import Task
 from softehl.codegen.derive.outputs import Entry
+from softehl.codegen.derive.variants import outputs
 from softehl.codegen.graph.evaluate import State, Walk
 from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.pipeline import KernelSource
@@ -49,13 +50,13 @@ def sample(page: Interface, kernel: KernelSource, state: State) -> Sample:
         size = len(state.dofs)
         residual, tangent = [0.0] * size, [0.0] * size**2
         task = Task.TANGENT if Task.TANGENT in kernel.functions else Task.RESIDUAL
-        for x in _entries(kernel, task):
+        for x in _entries(page, kernel, task):
             value = float(walk.value(x.node))
             if x.column is None:
                 residual[x.row.position] = value
             else:
                 tangent[x.row.position * size + x.column.position] = value
-        energy = [float(walk.value(x.node)) for x in _entries(kernel, Task.ENERGY)]
+        energy = [float(walk.value(x.node)) for x in _entries(page, kernel, Task.ENERGY)]
         nodes = [n for _, n in page.definition.fields]
         fields = [float(walk.at(n, q)) for q in range(page.points) for n in nodes]
     return Sample(
@@ -67,8 +68,13 @@ def sample(page: Interface, kernel: KernelSource, state: State) -> Sample:
     )
 
 
-def _entries(kernel: KernelSource, task: str) -> list[Entry]:
-    return kernel.functions[task].chosen.entries if task in kernel.functions else []
+def _entries(page: Interface, kernel: KernelSource, task: str) -> list[Entry]:
+    """Outputs of the whole element, also of a kernel that is made of functions of a point."""
+    if task not in kernel.functions:
+        return []
+    function = kernel.functions[task]
+    at_point = function.printer == "points"
+    return outputs(page.definition, task) if at_point else function.chosen.entries
 
 
 def samples(page: Interface, kernel: KernelSource, states: Sequence[State]) -> list[Sample]:

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from softehl.codegen import pipeline
 from softehl.codegen.abi import TargetError
 from softehl.codegen.hosts.interface import Before, Given, Interface, Timed
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import cli, hosts, samples
 from softehl.runtime.arrays import Array
+from tests.codegen import field_pages
 from tests.codegen.hosts.random_pages import FEW, A, K, page, pages
 from tests.codegen.hosts.workshop import errors, folder, made
 from tests.codegen.workshop import compiled
@@ -46,6 +48,14 @@ def test_a_folder_tests_itself(host: str, tmp_path: Path) -> None:
     assert 0 < max(first, second) < 1e-6
     shown = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
     assert shown.stdout.startswith("residual[0] = ")
+
+
+def test_a_page_of_fields_on_a_large_cell_tests_itself(tmp_path: Path) -> None:
+    d = field_pages.rubber.definition("quad9")
+    assert pipeline.form(d).at_points
+    done = made(folder(d, "c", tmp_path), CFLAGS="-O1 -Wall -Wextra -Werror -Wno-psabi")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert max(errors(done.stdout)[:5]) < 1e-12
 
 
 @pytest.mark.parametrize(
