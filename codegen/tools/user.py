@@ -8,9 +8,9 @@ would with any script.  Its models are
 - the functions decorated by `softehl.page`, on each cell that is asked for,
 
 in the order in which they are written.  Where there is none of these, or where they are asked for,
-the models are bodies of its functions decorated by `softehl.material`.  Where the file has a
-mapping or list `MODELS` (of such functions or definitions), those alone.  Names that begin with an
-underscore are left out.
+the models are bodies of its materials (`@softehl.material`), which hosts take by themselves.  Where
+the file has a mapping or list `MODELS` (of such functions or definitions), those alone.  Names that
+begin with an underscore are left out.
 """
 
 from __future__ import annotations
@@ -59,25 +59,34 @@ def definitions(path: Path, on: On = NOWHERE) -> list[Definition]:
 
     on: where its pages of fields stand.
     """
-    path = path.resolve()
-    text = read(path)
-    with _imports_from(path.parent), _errors_of(path):
-        entries = _entries(path, _run(path, text), materials=on.materials)
-        found = [d for entry in entries for d in _made(entry, on)]
-    if not found:
-        raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
-    check_names(path.name, found)
-    return found
+    return [d for d in _found(path, on, by_itself=False) if isinstance(d, Definition)]
 
 
 def pages(path: Path, on: On = NOWHERE) -> list[Definition | Law]:
-    """The models of a file, and its materials as they are; raises `ModelFileError`."""
+    """The models and the materials of a file, which is run; raises `ModelFileError`."""
+    return _found(path, on, by_itself=True)
+
+
+def _found(path: Path, on: On, *, by_itself: bool) -> list[Definition | Law]:
+    """Models, with materials by themselves or as bodies where there is nothing else."""
     path = path.resolve()
     text = read(path)
     with _imports_from(path.parent), _errors_of(path):
-        entries = _entries(path, _run(path, text), materials=None)
-        made = [[e] if isinstance(e, Law) else _made(e, on) for e in entries]
-    found = [d for some in made for d in some]
+        entries = _entries(path, _run(path, text))
+        laws = [entry for entry in entries if isinstance(entry, Law)]
+        others = [entry for entry in entries if not isinstance(entry, Law)]
+        if on.materials and not laws:
+            raise ModelFileError(
+                f"{path.name} has no material: write `@softehl.material` above `def my_law(m):`"
+            )
+        if not (by_itself or others or on.cells) and laws:
+            raise ModelFileError(
+                f"{path.name} has materials only, which have no kernel of their own: give a --cell "
+                "for bodies of them, or a --target that takes materials"
+            )
+        if not by_itself:
+            entries = others if others and not on.materials else [law.page() for law in laws]
+        found = [d for entry in entries for d in _made(entry, on)]
     if not found:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
     check_names(path.name, found)
@@ -139,22 +148,13 @@ def _run(path: Path, text: str) -> ModuleType:
     return module
 
 
-def _entries(path: Path, module: ModuleType, *, materials: bool | None) -> list[Any]:
-    """Entries of a file. materials: whether bodies of its materials; None: these as they are."""
+def _entries(path: Path, module: ModuleType) -> list[Any]:
     chosen = getattr(module, "MODELS", None)
     if chosen is not None:
         return list(chosen.values() if isinstance(chosen, Mapping) else chosen)
     public = [(k, v) for k, v in vars(module).items() if not k.startswith("_")]
-    found = [v for _, v in public if isinstance(v, Definition | Page) or _makes_a_model(module, v)]
-    laws = [v for _, v in public if isinstance(v, Law)]
-    if materials is None and laws:
-        return [v for _, v in public if v in found or v in laws]
-    if laws and (materials or not found):
-        return [law.page() for law in laws]
-    if materials:
-        raise ModelFileError(
-            f"{path.name} has no material: write `@softehl.material` above `def my_law(m):`"
-        )
+    kinds = Definition | Page | Law
+    found = [v for _, v in public if isinstance(v, kinds) or _makes_a_model(module, v)]
     if not found:
         bare = [k for k, v in public if _own_function(module, v) and _annotation(v) is None]
         if bare:
@@ -185,11 +185,11 @@ def _makes_a_model(module: ModuleType, value: Any) -> bool:
     return annotation is Definition
 
 
-def _made(entry: Any, on: On) -> list[Definition]:
+def _made(entry: Any, on: On) -> list[Definition | Law]:
     if isinstance(entry, Page):
-        return entry.definitions(on)
+        return [*entry.definitions(on)]
     made = entry() if callable(entry) else entry
-    if not isinstance(made, Definition):
+    if not isinstance(made, (Definition, Law)):
         label = getattr(entry, "__name__", repr(entry))
         code = getattr(entry, "__code__", None)
         where = f"{Path(code.co_filename).name}:{code.co_firstlineno}: " if code else ""
