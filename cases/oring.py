@@ -24,6 +24,8 @@ from softehl.cases.seal.states.answer import answer
 from softehl.cases.seal.states.leakage import net_leakage
 from softehl.cases.seal.states.sensitivity_table import resolved
 from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.seal.states.state import Observer as SealObserver
+from softehl.cases.seal.states.state import Outcome as SealOutcome
 from softehl.cases.seal.states.telling import Teller
 
 
@@ -46,10 +48,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def solve(self, parameters: ORing, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`; runs of one section share their contact states."""
-        from softehl.cases.seal.sensitivity.sensitivity import differentiation
-        from softehl.cases.seal.solve.method import run
-
-        return run(parameters, Teller(observer), shared, differentiation(parameters))
+        return run_oring(parameters, Teller(observer), shared)
 
     def requested(self, parameters: ORing) -> list[float]:
         """See :class:`Case`."""
@@ -151,6 +150,19 @@ class ORingCase(Case[ORing, FilmRow]):
         from softehl.cases.seal.solve.contact_store import contact_key
 
         return parameters.density, contact_key(parameters)
+
+
+def run_oring(
+    parameters: ORing, observer: SealObserver, contacts: Path | None = None
+) -> SealOutcome:
+    """Solve a seal and report to the observer, with sensitivities where they are asked for.
+
+    contacts: folder of contact states to start from and add to.
+    """
+    from softehl.cases.seal.sensitivity.sensitivity import differentiation
+    from softehl.cases.seal.solve.method import run
+
+    return run(parameters, observer, contacts, differentiation(parameters))
 
 
 def _not_differentiated(rows: Sequence[FilmRow]) -> list[str]:

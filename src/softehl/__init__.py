@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from softehl.__main__ import main
     from softehl.cases.harness.processes import processes
     from softehl.cases.harness.sweep import Curve
+    from softehl.cases.oring import run_oring
     from softehl.cases.seal.gland.parameters import ORing
-    from softehl.cases.seal.solve.method import run as run_oring
     from softehl.cases.seal.states.state import FilmState, Observer, Outcome, Silent
     from softehl.cases.shipped import solve_cases
     from softehl.codegen.language import kinematics
@@ -67,7 +67,7 @@ _PUBLIC = {
     "Study": "softehl.runtime.study",
     "main": "softehl.__main__",
     "processes": "softehl.cases.harness.processes",
-    "run_oring": "softehl.cases.seal.solve.method:run",
+    "run_oring": "softehl.cases.oring",
     "solve_cases": "softehl.cases.shipped",
 }
 _MODELLING = {

@@ -22,7 +22,7 @@ from softehl.cases.seal.states.verdict import FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.newton import Newton
 
-FITS = 2.5
+FITS = 2.2
 """Segments that a film may ask for in the place of one. Where it asked for at most three, h*
 changed by 0.5 % or less on the mesh that was made for it; where for nine, by 7 %."""
 
