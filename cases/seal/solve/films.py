@@ -1,4 +1,4 @@
-"""The steady film at a speed: from the dry contact, or from the same film on another mesh.
+"""The steady film at a speed: from contact, from another speed, from another mesh.
 
 Each step in time is solved by modified Newton iterations on the Schur complement of the section;
 where these fail, by Newton's method for all unknowns, which holds on to the pressures of the
@@ -124,7 +124,8 @@ class FilmSolver:
         layer, moment = film_layer(self.system, x), self.system.moment(x)
         squeezing = Squeezing(self.system, layer, film, scales, x, self.offset, moment)
         pressed = pressed_film(self.system, x, film.sealed_pressure)
-        return self._followed(squeezing, Moment(pressed, squeezing.first))
+        correctors = FilmCorrectors.of(self.system, self.newton)
+        return self._followed(squeezing, Moment(pressed, squeezing.first), correctors)
 
     def from_neighbour(self, last: Sequence[Film], speed: float) -> Film | NoFilm:
         """The film at |U|, mm/s, along those at speeds between, from the last film on our mesh.
@@ -153,7 +154,7 @@ class FilmSolver:
         if branch.converged and squeezing.change(film.x, branch.last.x) < inf:
             return self._entered(squeezing, correctors, branch.last)
         x = branch.last.x if branch.points else film.x
-        return self._followed(squeezing, Moment(x, _NEIGHBOUR, 1.0), correctors=correctors)
+        return self._followed(squeezing, Moment(x, _NEIGHBOUR, 1.0), correctors)
 
     def from_film(self, carried: Squeezing, start: Moment, pressures: Array) -> Film | NoFilm:
         """The steady film of another mesh, carried to ours: at once, else squeezed out from there.
@@ -166,16 +167,16 @@ class FilmSolver:
             found = told(correctors.whole.steady(problem, x, pressures, _AT_ONCE))
         if found.converged and carried.change(x, found.x) < inf:
             return self._entered(carried, correctors, found)
-        return self._followed(carried, start, pressures)
+        return self._followed(carried, start, correctors, pressures)
 
     def _followed(
         self,
         squeezing: Squeezing,
         start: Moment,
+        correctors: FilmCorrectors,
         pressures: Array | None = None,
-        correctors: FilmCorrectors | None = None,
     ) -> Film | NoFilm:
-        film, correctors = squeezing.film, correctors or FilmCorrectors.of(self.system, self.newton)
+        film = squeezing.film
         steps = PseudoTransient(correctors.steps(pressures))
         with self._told(film) as told:
             branch, reached = steps.follow(squeezing, start, on_point=lambda p: told(p.solution))

@@ -7,7 +7,7 @@ A stage is a family of problems in one parameter. A stage that does not reach it
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -16,7 +16,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
-from softehl.runtime.solve.predictor import Guess, Predictor
+from softehl.runtime.solve.predictor import Predictor
 from softehl.runtime.solve.solution import Branch, Point
 from softehl.runtime.solve.steps import StepRule
 
@@ -51,10 +51,9 @@ def _nothing(point: Point) -> None:
 class Stage:
     """A family of problems in one parameter, to be followed from `start` to `stop`.
 
-    name, sealed_pressure, stroke: what observers and records call it. waypoints: parameters
-    hit exactly. shown: the parameter as it is reported (mm/s for a path in log |U|). method: how
-    it is solved, for the record. corrector: what solves it, None for the path driver's Newton.
-    predictor: how it is guessed.
+    name, sealed_pressure, stroke: what observers and records call it. method: how it is
+    solved, for the record. corrector: what solves it, None for the path driver's Newton. predictor:
+    how it is guessed.
     """
 
     name: str
@@ -64,25 +63,15 @@ class Stage:
     steps: StepRule
     sealed_pressure: float
     stroke: str
-    waypoints: tuple[float, ...] = ()
     method: str = "newton"
     corrector: Corrector | None = None
-    predictor: Predictor | Guess = "secant"
+    predictor: Predictor = "secant"
     on_point: Callable[[Point], None] = _nothing
-    shown: Callable[[float], float] = float
 
     def fraction(self, parameter: float) -> float:
         """Share of the way, 0 to 1."""
         way = self.stop - self.start
         return (parameter - self.start) / way if way else 1.0
-
-
-def laborious(stage: Stage, corrector: Corrector | None) -> Stage:
-    """A stage by a corrector of its own, each state from the one before it.
-
-    Where thin elements turn with an edge of the contact a secant turns them too far.
-    """
-    return replace(stage, corrector=corrector, predictor="previous", method="newton")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +86,10 @@ class StageFailed:
     def message(self) -> str:
         """How far the stage came, in its own units."""
         stage, branch = self.stage, self.branch
-        goal = f"{stage.name} {stage.shown(stage.stop):.5g}"
+        goal = f"{stage.name} {stage.stop:.5g}"
         if not branch.points:
             return f"{goal} was not reached, not even its start"
-        return f"{goal} was not reached, only {stage.shown(self.reached):.5g}"
+        return f"{goal} was not reached, only {self.reached:.5g}"
 
     @property
     def reached(self) -> float:
@@ -118,26 +107,20 @@ class PathDriver:
     """Follows stages, reports every step and keeps a record of each stage.
 
     newton: corrector of every step. start_iterations: iterations allowed at the start of a stage,
-    which has no predictor; a step that needs as many is better cut. prefix: of the names of its
-    stages. Only `records` changes, by one with each stage.
+    which has no predictor; a step that needs as many is better cut. Only `records` changes, by one
+    with each stage.
     """
 
     observer: Observer
     newton: Newton = field(default_factory=lambda: Newton(max_iterations=10))
     start_iterations: int = 40
-    prefix: str = ""
     records: list[StageRecord] = field(default_factory=list)
-
-    def named(self, prefix: str) -> PathDriver:
-        """One that keeps its records with ours, under a prefix."""
-        return replace(self, prefix=prefix)
 
     def follow(self, stage: Stage, x0: Array) -> Followed:
         """Solve at the start of a stage from x0 (n,), then follow it to its end.
 
         What slips on a wall slips from where it was after the step before, first of all in x0.
         """
-        stage = replace(stage, name=self.prefix + stage.name)
         begin = time.perf_counter()
         self.observer.stage(
             stage.name, sealed_pressure=stage.sealed_pressure, stroke=stage.stroke, steps=None
@@ -152,7 +135,7 @@ class PathDriver:
             points.append(replace(point, solution=point.solution.forget()))
             self.observer.step(
                 label=stage.name,
-                parameter=stage.shown(point.parameter),
+                parameter=point.parameter,
                 iterations=point.solution.iterations,
                 residuals=point.solution.residual_norms,
                 fraction=stage.fraction(point.parameter),
@@ -165,20 +148,10 @@ class PathDriver:
             stage.start,
             stage.stop,
             x0,
-            waypoints=stage.waypoints,
             on_point=report,
         )
         self.records.append(_record(stage, branch, points, time.perf_counter() - begin))
         return branch.last.x if branch.converged else StageFailed(stage, branch)
-
-    def follow_all(self, stages: Iterable[Stage], x: Array) -> Followed:
-        """Follow stages one after the other, each from the end of the one before."""
-        for stage in stages:
-            end = self.follow(stage, x)
-            if isinstance(end, StageFailed):
-                return end
-            x = end
-        return x
 
     def _continuation(self, stage: Stage) -> Continuation:
         return Continuation(
@@ -197,7 +170,7 @@ def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -
         factorisations=branch.factorisations,
         iterations=branch.iterations,
         residual_histories=tuple(p.solution.residual_norms for p in points),
-        parameters=tuple(stage.shown(p.parameter) for p in points),
+        parameters=tuple(p.parameter for p in points),
         where=place(stage.sealed_pressure, stage.stroke),
         method=stage.method if branch.converged else f"{stage.method}; ended: {branch.message}",
     )

@@ -28,9 +28,6 @@ from softehl.cases.seal.states.verdict import (
 ORDER = 2.5
 """Order of convergence of h*: 2 in theory, 2.1 to 3.2 were measured between densities 2 and 4."""
 
-ESTIMATED = 1e-6
-"""Residual of the films of the coarser mesh: it moves the estimate by less than 1e-3 of it."""
-
 _FINER = "use a finer mesh (larger density)"
 
 LEAST_DENSITY = 2
