@@ -22,7 +22,9 @@ def uel(page: Interface, states: Sequence[State]) -> dict[str, str]:
     words = _words(page)
     texts["uel.c"] = api.filled(api.template("uel.c"), words)
     texts["host.f90"] = host.program(page)
-    texts["Makefile"] = api.filled(api.template("uel.mk"), words)
+    texts["Makefile"] = api.filled(
+        api.template("abaqus.mk"), {**words, "kind": "uel", "host": "host.f90"}
+    )
     texts["NOTES.md"] = api.filled(api.template("uel.md"), words)
     texts["samples.txt"] = host.sample_file(page, found)
     if page.cell is not None:

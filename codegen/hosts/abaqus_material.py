@@ -22,7 +22,10 @@ def umat(law: Law, states: States) -> dict[str, str]:
     words["density"] = "fields[0]" if r.measure is Measure.SMALL else f"fields[0] / {_VOLUME}"
     texts["umat.c"] = api.filled(api.template("umat.c"), words)
     texts["element.f90"] = api.filled(api.template("umat_element.f90"), words)
-    texts["Makefile"] = api.filled(api.template("umat.mk"), words)
+    texts["Makefile"] = api.filled(
+        api.template("abaqus.mk"),
+        {**words, "kind": "umat", "host": "tetrahedron.f90 element.f90 host.f90"},
+    )
     texts["NOTES.md"] = api.filled(api.template("umat.md"), words)
     texts[f"{law.name}.inp"] = _deck(r, settings)
     return texts | more

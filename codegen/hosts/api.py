@@ -158,9 +158,13 @@ def table(name: str, values: Iterable[float], kind: str = "static const double")
     return f"{kind} {name}[] = {{\n" + "\n".join(rows) + "\n};\n"
 
 
-def filled(template: str, words: Mapping[str, object]) -> str:
-    """A text with every @word@ replaced; one that is not known is a KeyError."""
-    return re.sub(r"@(\w+)@", lambda m: str(words[m[1]]), template)
+def filled(text: str, words: Mapping[str, object]) -> str:
+    """A text with every @word@ replaced; one that is not known is a KeyError.
+
+    @finite_numbers@ is a function that several programs need.
+    """
+    known = {"finite_numbers": template("finite_numbers.c"), **words}
+    return re.sub(r"@(\w+)@", lambda m: str(known[m[1]]), text)
 
 
 def template(name: str) -> str:

@@ -19,6 +19,7 @@ from softehl.cases.seal.solve.judging import Differentiate, Judge
 from softehl.cases.seal.solve.loading import Loading
 from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
 from softehl.cases.seal.states.contact_results import contact_numbers, contact_state
+from softehl.cases.seal.states.plan import strokes_of
 from softehl.cases.seal.states.state import (
     ContactState,
     FilmState,
@@ -110,8 +111,7 @@ def run(
     observer.contact_state(contact.state)
     judge = Judge(differentiate)
     states, failures = list[FilmState](), list[tuple[Status, str]]()
-    strokes: tuple[Stroke, ...] = ("out", "in")
-    for stroke in strokes if parameters.stroke == "both" else (parameters.stroke,):
+    for stroke in strokes_of(parameters):
         last, missed = list[Adapted](), list[NoFilm]()
         for speed in parameters.speeds:
             found = contact.adapted(stroke, speed, last[-2:])

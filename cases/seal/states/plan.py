@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 
+from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.gland.parameters import DENSITIES, ORing
 from softehl.cases.seal.gland.surfaces import FULL
 from softehl.cases.seal.states.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
 from softehl.cases.seal.states.verdict import DOUBTFUL
 
-SIGNS = {"out": 1.0, "in": -1.0}
+SIGNS: dict[Stroke, float] = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
 
 USUAL = 0.2
@@ -41,7 +42,7 @@ def doubts(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, li
     return found
 
 
-def strokes_of(parameters: ORing) -> tuple[str, ...]:
+def strokes_of(parameters: ORing) -> tuple[Stroke, ...]:
     """The strokes that are asked for, one by one."""
     return tuple(SIGNS) if parameters.stroke == "both" else (parameters.stroke,)
 
@@ -65,10 +66,11 @@ def pieces(parameters: ORing, rows: Sequence[FilmRow], jobs: int) -> list[ORing]
 
     Strokes go separately where they can run side by side or miss different speeds.
     """
-    missing = {
-        stroke: missing_speeds(parameters, stroke, rows) for stroke in strokes_of(parameters)
+    missing: dict[str, tuple[float, ...]] = {
+        stroke: speeds
+        for stroke in strokes_of(parameters)
+        if (speeds := missing_speeds(parameters, stroke, rows))
     }
-    missing = {stroke: speeds for stroke, speeds in missing.items() if speeds}
     if jobs == 1 and len(missing) == 2 and missing["out"] == missing["in"]:
         missing = {"both": missing["out"]}
     return [
@@ -77,7 +79,7 @@ def pieces(parameters: ORing, rows: Sequence[FilmRow], jobs: int) -> list[ORing]
     ]
 
 
-def missing_speeds(parameters: ORing, stroke: str, rows: Sequence[FilmRow]) -> tuple[float, ...]:
+def missing_speeds(parameters: ORing, stroke: Stroke, rows: Sequence[FilmRow]) -> tuple[float, ...]:
     """The requested speeds |U| of a stroke to be solved.
 
     Those that are not there, or are there from a coarser mesh outside the tolerance.

@@ -12,18 +12,7 @@ enum { GIVEN = @NAME@_PARAMETERS, FIELDS = @NAME@_FIELDS };
 /* Field of the page for each of the 21 moduli: columns of the upper triangle. */
 static const int modulus[21] = {@moduli@};
 
-/* True for numbers; looks at the bits, so that no option of a compiler takes it away. */
-static int finite_numbers(const double *values, int count)
-{
-    for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, values + k, sizeof bits);
-        if ((bits >> 52 & 0x7ff) == 0x7ff)
-            return 0;
-    }
-    return 1;
-}
-
+@finite_numbers@
 static void refuse(int element, const char *why)
 {
     printf("*ERROR: @name@, element %d: %s\n", element, why);

@@ -29,18 +29,7 @@ static void refuse(int element, const char *why)
     xit_();
 }
 
-/* True for numbers; looks at the bits, so that no option of a compiler takes it away. */
-static int finite_numbers(const double *values, int count)
-{
-    for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, values + k, sizeof bits);
-        if ((bits >> 52 & 0x7ff) == 0x7ff)
-            return 0;
-    }
-    return 1;
-}
-
+@finite_numbers@
 void uel_(double *rhs, double *amatrx, double *svars, double *energy, const int *ndofel,
     const int *nrhs, const int *nsvars, const double *props, const int *nprops,
     const double *coords, const int *mcrd, const int *nnode, const double *U, const double *du,

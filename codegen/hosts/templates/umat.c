@@ -25,18 +25,7 @@ static void refuse(int element, const char *why)
     xit_();
 }
 
-/* True for numbers; looks at the bits, so that no option of a compiler takes it away. */
-static int finite_numbers(const double *values, int count)
-{
-    for (int k = 0; k < count; ++k) {
-        uint64_t bits;
-        memcpy(&bits, values + k, sizeof bits);
-        if ((bits >> 52 & 0x7ff) == 0x7ff)
-            return 0;
-    }
-    return 1;
-}
-
+@finite_numbers@
 void umat_(double *stress, double *statev, double *ddsdde, double *sse, double *spd, double *scd,
     double *rpl, double *ddsddt, double *drplde, double *drpldt, const double *stran,
     const double *dstran, const double *time, const double *dtime, const double *temp,

@@ -4,8 +4,8 @@ CFLAGS ?= -O2 -fno-math-errno -ffp-contract=fast
 FFLAGS ?= -O2
 FC = gfortran
 
-@name@_umat.o: umat.o @name@.o
-	$(LD) -r umat.o @name@.o -o $@
+@name@_@kind@.o: @kind@.o @name@.o
+	$(LD) -r @kind@.o @name@.o -o $@
 
 %.o: %.c @name@.h softehl_kernels.h
 	$(CC) -std=c11 -fPIC -Wno-psabi $(CFLAGS) -c $< -o $@
@@ -13,8 +13,8 @@ FC = gfortran
 test: host
 	./host
 
-host: tetrahedron.f90 element.f90 host.f90 @name@_umat.o
-	$(FC) $(FFLAGS) tetrahedron.f90 element.f90 host.f90 @name@_umat.o -lm -o $@
+host: @host@ @name@_@kind@.o
+	$(FC) $(FFLAGS) @host@ @name@_@kind@.o -lm -o $@
 
 clean:
 	rm -f *.o *.mod host solution.txt
