@@ -31,7 +31,7 @@ _AXES = "xyz"
 def require_held(system: System, problem: Any, x: Array) -> None:
     """Raise NotConverged that names the free motion if nothing holds a part of the problem at x.
 
-    One that is spread over processes is not looked at.
+    One that is spread over processes is looked at after its first step (`solve.held`).
     """
     if not isinstance(problem, Problem):
         return

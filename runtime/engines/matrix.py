@@ -108,6 +108,12 @@ class Tangent:
         self.matrix.getDiagonal(found)
         return np.asarray(np.abs(found.array_r[self.exchange.places]))
 
+    def times(self, x: Array) -> Array:
+        """K times own values x, (k,): own rows, (k,)."""
+        found = self.exchange.vector.duplicate()
+        self.matrix.mult(self.exchange.to_petsc(x), found)
+        return np.array(found.array_r[self.exchange.places])
+
     def times_magnitudes(self, x: Array) -> Array:
         """|K| times own values x, (k,), at least 0: own rows, (k,)."""
         starts, columns, values = self.matrix.getValuesCSR()
@@ -169,6 +175,11 @@ class Solver:
             words = f"PETSc's {ksp.getType()} with {ksp.getPC().getType()} failed (reason {reason})"
             raise SingularMatrix(words, None if row < 0 else row)
         return tangent.exchange.local(x)
+
+    @property
+    def direct(self) -> bool:
+        """Whether a further right-hand side costs no iterations."""
+        return self._ksp is not None and self._ksp.getType() == "preonly"
 
     def reset(self) -> None:
         """Forget what belongs to another matrix."""

@@ -16,6 +16,8 @@ from softehl.runtime.fem.checks import element_name, rows_not_finite, unknown_na
 from softehl.runtime.fem.measure import ROUNDING, Balance, is_lost, size
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import world
+from softehl.runtime.solve.held import SINGULAR, moving, signs
+from softehl.runtime.solve.linear import SingularMatrix
 
 
 @dataclass(eq=False)
@@ -58,6 +60,26 @@ class Factors:
     def solve(self, r: Array) -> Array:
         """Local x, (m,), of own r, (k,)."""
         return self.solver.solve(self.tangent, r)
+
+    def loosest(self) -> int | None:
+        """See `runtime.solve.held.loosest`: PETSc's number. Only a direct solver is asked."""
+        if not self.solver.direct:
+            return None
+        exchange = self.tangent.exchange
+        try:
+            y = self.solve(signs(len(exchange.owned), world().rank))[exchange.owned]
+        except SingularMatrix:
+            return None
+        most = float(largest(np.abs(y).max(initial=0.0)))
+        y = moving(y, most)
+        resisted = np.abs(self.tangent.times(y)) > SINGULAR * self.tangent.times_magnitudes(
+            np.abs(y)
+        )
+        if world().allreduce(int(resisted.any())):
+            return None
+        mine = exchange.numbers[exchange.owned[np.abs(y) >= most]]
+        number: int = max(world().allgather(int(mine.max(initial=-1))))
+        return number
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ regular, and where it ends up is an accident.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
-from scipy.sparse import issparse
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Factors, LinearSolver, SingularMatrix, SparseMatrix
@@ -18,6 +18,15 @@ SINGULAR = 1e-13
 """A change of the entries of a matrix, relative to each, that rounding may have made."""
 
 _AT_REST = 1e-10  # of the largest entry of a vector
+
+
+@runtime_checkable
+class Judging(Protocol):
+    """Factors whose matrix is not at hand as a whole, and which say by themselves what is loose."""
+
+    def loosest(self) -> int | None:
+        """The number of the unknown that moves most where the matrix is singular, else None."""
+        ...
 
 
 @dataclass
@@ -60,8 +69,7 @@ class FirstStep:
             return
         self._memory.keeps = False
         K, factors = memory
-        # one that is spread over processes is not looked at
-        number = loosest(K, factors) if issparse(K) else None
+        number = factors.loosest() if isinstance(factors, Judging) else loosest(K, factors)
         if number is not None:
             message = f"nothing prevents a motion of {problem.name_of(number)}"
             raise NotConverged(replace(solution, status=Status.NOT_HELD, message=message))
@@ -74,13 +82,22 @@ def loosest(K: SparseMatrix, factors: Factors) -> int | None:
     singular (Oettli and Prager). What hardly moves with y, prescribed unknowns above all, is left
     at rest.
     """
-    b: Array = np.where(np.random.default_rng(0).random(K.shape[0]) < 0.5, -1.0, 1.0)
     try:
-        y = factors.solve(b)
+        y = factors.solve(signs(K.shape[0]))
     except SingularMatrix:
         return None  # it was regular enough for the solution
-    y[np.abs(y) <= _AT_REST * np.abs(y).max()] = 0.0
-    size = np.asarray(abs(K) @ np.abs(y))
-    if np.all(np.abs(np.asarray(K @ y)) <= SINGULAR * size):
+    y = moving(y, np.abs(y).max())
+    if np.all(np.abs(np.asarray(K @ y)) <= SINGULAR * np.asarray(abs(K) @ np.abs(y))):
         return int(np.abs(y).argmax())
     return None
+
+
+def signs(n: int, seed: int = 0) -> Array:
+    """Random entries -1 and 1, (n,)."""
+    found: Array = np.where(np.random.default_rng(seed).random(n) < 0.5, -1.0, 1.0)
+    return found
+
+
+def moving(y: Array, largest: float) -> Array:
+    """Entries (n,) with those at rest set to 0; largest: magnitude of any."""
+    return np.where(np.abs(y) <= _AT_REST * largest, 0.0, y)
