@@ -21,7 +21,8 @@ import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.begin import beginning
-from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
+from softehl.runtime.engines.engine import AnyEngine, engine_of, note_of
+from softehl.runtime.engines.sizes import Linear
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.kernels import Kernel
@@ -226,6 +227,7 @@ class Study:
         newton: Newton | None = None,
         on_step: Callable[[Result], object] | None = None,
         engine: AnyEngine = None,
+        linear: Linear = "auto",
         write: str | Path | Series | None = None,
         progress: bool | None = None,
     ) -> Result:
@@ -237,20 +239,22 @@ class Study:
         fails and grow again; history is committed after each. on_step is given the result of every
         converged step, write: a .pvd file that names them all. progress: tell of each step on
         stderr; None: in one line, on a terminal only. engine: "serial", "petsc" (on all processes
-        that mpirun started) or an engine with settings. Raises StudyError; NotConverged if the end
-        is not reached: its `reached` is the last Result, or None.
+        that mpirun started) or an engine with settings. linear: "direct", "superlu" and "pardiso"
+        factorise; "amg" is algebraic multigrid (pyamg) for displacements or one scalar; "auto"
+        takes it for large problems. Raises StudyError; NotConverged if the end is not reached: its
+        `reached` is the last Result, or None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
         until = read.finite("until", until)
         if on_step is not None:
             read.function("on_step", on_step, "result")
-        where = engine_of(engine)
+        where = engine_of(engine, linear)
         system = where.spread(self.system())
-        begin = beginning(system, start)
-        told = Telling(progress, system.share.first, "load factor", begin[0])
+        begin, newton = beginning(system, start), where.newton(newton)
+        told = Telling(progress, system.share.first, "load factor", begin[0], note_of(where))
         with Watch(told.until(until), write, on_step) as watch:
-            return LoadSteps(steps, where.newton(newton), watch).run(system, begin, until)
+            return LoadSteps(steps, newton, watch).run(system, begin, until)
 
     def march(
         self,
@@ -264,6 +268,7 @@ class Study:
         restart: str | Path | None = None,
         newton: Newton | None = None,
         engine: AnyEngine = None,
+        linear: Linear = "auto",
         write: str | Path | None = None,
         progress: bool | None = None,
     ) -> Iterator[Result]:
@@ -278,7 +283,8 @@ class Study:
         pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
         `engine` "petsc" on any number of processes; another `dt` than then is the next step.
         write: a .pvd file that names the results of all steps (with start or restart, it
-        goes on). progress: as in `solve`. Raises StudyError, and NotConverged as `solve` does.
+        goes on). linear, progress: as in `solve`. Raises StudyError, and NotConverged as `solve`
+        does.
         """
         if method not in ("euler", "bdf2"):
             raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
@@ -287,7 +293,7 @@ class Study:
                 raise StudyError(f"{name} = {value}: must be positive")
         if start is not None and restart is not None:
             raise StudyError("start and restart: give one of them, a result or a checkpoint")
-        where = engine_of(engine)
+        where = engine_of(engine, linear)
         system = where.spread(self.system())
         if restart is None:
             clock = Clock.begin(system, start, dt)
@@ -297,7 +303,7 @@ class Study:
         settings = March(method, tolerance, dt, where.newton(newton))
         file = None if checkpoint is None else Path(checkpoint)
         series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
-        told = Telling(progress, system.share.first, "t", clock.t)
+        told = Telling(progress, system.share.first, "t", clock.t, note_of(where))
         return watched(settings.run(system, clock, until, file), Watch(told.until(until), series))
 
     def follow(
@@ -308,6 +314,7 @@ class Study:
         start: Result | None = None,
         newton: Newton | None = None,
         most: int = 1000,
+        linear: Linear = "auto",
         write: str | Path | None = None,
         progress: bool | None = None,
     ) -> LoadPath:
@@ -316,18 +323,19 @@ class Study:
         start: a result to begin with, as in `solve`. step: length of the first and longest step. A
         length counts the load factor, and the unknowns in units of what they change by per load
         factor in the beginning. until: is given each result; the path ends where it says True.
-        most: points at most. History is committed after each point. write, progress: as in `solve`.
-        Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
-        or None.
+        most: points at most. History is committed after each point. linear, write, progress: as in
+        `solve`. Raises StudyError; NotConverged if the end is not reached: its `reached` is the
+        last Result, or None.
         """
         if read.finite("step", step) <= 0.0:
             raise StudyError(f"step = {step}: must be positive")
         read.function("until", until, "result")
-        system = self.system()
-        begin = beginning(system, start)
-        with Watch(Telling(progress, True, "load factor", begin[0]).until(None), write) as watch:
-            path = ArcSteps(step, Serial().newton(newton), most, watch)
-            return path.run(system, begin, until)
+        where = engine_of(None, linear)
+        system = where.spread(self.system())
+        begin, newton = beginning(system, start), where.newton(newton)
+        told = Telling(progress, True, "load factor", begin[0], note_of(where))
+        with Watch(told.until(None), write) as watch:
+            return ArcSteps(step, newton, most, watch).run(system, begin, until)
 
     def system(self) -> System:
         """Equations of the study.  Raises StudyError for what does not fit together."""

@@ -60,13 +60,14 @@ class Progress:
     """One line on the terminal that tells where a path is; a line for each step elsewhere.
 
     name: of what grows, such as "load factor", from `begin` to `until` (None: it is not known).
-    inplace: rewrite the one line.
+    inplace: rewrite the one line. note: gives what is said at the end of each.
     """
 
     name: str
     begin: float
     until: float | None
     inplace: bool
+    note: Callable[[], str] = str
     steps: int = 0
     since: float = field(default_factory=time.monotonic)
 
@@ -76,9 +77,10 @@ class Progress:
             return  # where the path begins
         self.steps += 1
         end = "" if self.until is None else f" of {self.until:g}"
+        note = self.note()
         text = (
             f"step {self.steps}: {self.name} {result.t:.4g}{end}, {result.iterations} iterations, "
-            f"{time.monotonic() - self.since:.1f} s"
+            f"{time.monotonic() - self.since:.1f} s{f' ({note})' if note else ''}"
         )
         sys.stderr.write(f"\r\x1b[K{text}" if self.inplace else f"{text}\n")
         sys.stderr.flush()
@@ -128,17 +130,18 @@ def watched(results: Iterator[Result], watch: Watch) -> Iterator[Result]:
 @dataclass(frozen=True)
 class Telling:
     """Who wants to be told: `wanted` or not, None where there is a terminal; only the first process
-    `speaks`. name: of what grows, begin: where from.
+    `speaks`. name: of what grows, begin: where from. note: on the linear solver.
     """
 
     wanted: bool | None
     speaks: bool
     name: str
     begin: float
+    note: Callable[[], str] = str
 
     def until(self, end: float | None) -> Progress | None:
         """Progress up to an end, where it is wanted."""
         terminal = sys.stderr.isatty()
         if not self.speaks or not (terminal if self.wanted is None else self.wanted):
             return None
-        return Progress(self.name, self.begin, end, terminal)
+        return Progress(self.name, self.begin, end, terminal, self.note)

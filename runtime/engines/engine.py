@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
-from softehl.runtime.solve.backends import choose
+from softehl.runtime.engines.sizes import Linear, linear_solver
+from softehl.runtime.solve.kept import Kept
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
@@ -18,7 +21,7 @@ class Engine(Protocol):
         ...
 
     def newton(self, given: Newton | None) -> Newton:
-        """Newton's method as it was asked for, on the engine's linear solver."""
+        """Newton's method as it was asked for, on the engine's linear solver; after `spread`."""
         ...
 
 
@@ -26,22 +29,39 @@ AnyEngine: TypeAlias = "str | Engine | None"
 """An engine, or the name of one; None is "serial"."""
 
 
+@dataclass(eq=False)
 class Serial:
-    """Everything in this process, with the linear solver that is asked for."""
+    """Everything in this process, with the linear solver that is asked for.
+
+    note: says which one, where the size of the problem decides.
+    """
+
+    linear: Linear = "auto"
+    note: Callable[[], str] = str
+    _system: System | None = field(default=None, init=False, repr=False)
 
     def spread(self, system: System) -> System:
         """See `Engine`."""
+        self._system = system
         return system
 
     def newton(self, given: Newton | None) -> Newton:
         """See `Engine`."""
-        return given or Newton(linear=choose("auto"))
+        if given is not None and self.linear != "auto":
+            raise StudyError("newton and linear: give one of them, newton has a linear solver")
+        if given is not None:
+            return given
+        assert self._system is not None
+        solver, self.note = linear_solver(self._system, self.linear)
+        return Newton(linear=Kept(solver))
 
 
-def engine_of(engine: AnyEngine) -> Engine:
+def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
     """The engine of that name.  Raises StudyError for an unknown one, MissingPetsc."""
     if engine is None or engine == "serial":
-        return Serial()
+        return Serial(linear)
+    if linear != "auto":
+        raise StudyError(f'linear = {linear!r}: for engine = "serial" only')
     if engine == "petsc":
         from softehl.runtime.engines.petsc import Petsc
 
@@ -49,3 +69,8 @@ def engine_of(engine: AnyEngine) -> Engine:
     if isinstance(engine, str):
         raise StudyError(f'engine = {engine!r}: allowed are "serial" and "petsc"')
     return engine
+
+
+def note_of(engine: Engine) -> Callable[[], str]:
+    """What says which linear solver an engine chose; of others than `Serial` nothing."""
+    return engine.note if isinstance(engine, Serial) else str

@@ -1,4 +1,4 @@
-"""Whether a solved problem was held: a body that floats solves equations that rounding alone keeps
+"""Support of a solved problem: a body that floats solves equations that rounding alone keeps
 regular, and where it ends up is an accident.
 """
 

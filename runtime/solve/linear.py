@@ -1,4 +1,4 @@
-"""What the solvers ask of sparse linear algebra, and the check of every solution.
+"""Interfaces of sparse linear algebra, and the check of every solution.
 
 The backends are `solve.superlu` and `solve.pardiso`; `solve.backends` chooses.
 """

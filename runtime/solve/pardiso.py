@@ -34,7 +34,7 @@ _ERRORS = {-2: "not enough memory", -3: "no ordering", -4: "a zero pivot", -7: "
 
 @cache
 def available() -> bool:
-    """Whether the library is installed and can be loaded."""
+    """True if the library is installed and can be loaded."""
     try:
         _library()
     except (ImportError, OSError, AttributeError):

@@ -1,4 +1,4 @@
-"""What a solver hands back: failure is a value with advice in it, not an exception.
+"""Solutions and paths, which solvers hand back: failure is a value with advice, not an exception.
 
 Newton returns a `Solution`, continuation a `Branch` of them. Inner layers read `status` and react
 (continuation cuts its step); only the outermost caller turns a failure into an exception, with

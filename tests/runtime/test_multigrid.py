@@ -1,0 +1,128 @@
+"""The linear solver of one process by size: multigrid, factors, factors that are kept."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import softehl
+from softehl.runtime.engines import sizes
+from softehl.runtime.solve import multigrid
+from softehl.runtime.solve.solution import NotConverged
+from softehl.runtime.solve.superlu import SuperLU
+from softehl.runtime.statement.records import StudyError
+
+HEAT = Path(__file__).parents[2] / "docs" / "models" / "heat_fields.py"
+
+
+@softehl.page
+def rubber(m: Any) -> None:
+    """Compressible neo-Hooke."""
+    u = m.vector("u")
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + K / 2 * (J - 1) ** 2)
+
+
+@softehl.page
+def wind(m: Any) -> None:
+    """Conduction in a stream: its tangent is not symmetric."""
+    T = m.scalar("T")
+    g = m.grad(T)
+    m.weak(g, g)
+    m.weak(20 * g[0] - 1, T)
+
+
+def cube(K: float = 2.0) -> softehl.Study:
+    study = softehl.Study(softehl.Mesh.box((1, 1, 1), cells=(6, 6, 6)))
+    study.add("rubber", rubber, mu=0.4, K=K)
+    study.fix("left", u_x=0, u_y=0, u_z=0)
+    study.fix("right", u_x=0.1)
+    return study
+
+
+def stream() -> softehl.Study:
+    study = softehl.Study(softehl.Mesh.rectangle(1, 1, cells=(24, 24)))
+    study.add("air", wind)
+    study.fix("left", T=0)
+    return study
+
+
+@pytest.mark.parametrize("make", [cube, stream])
+def test_multigrid_finds_what_factors_find(make: Any) -> None:
+    x, y = (make().solve(linear=linear).x for linear in ("amg", "direct"))
+    assert np.abs(x - y).max() < 1e-7 * np.abs(y).max()
+
+
+def test_multigrid_keeps_rigid_motions() -> None:
+    """Without rotations, or with wrong ones, it needs far more iterations."""
+    system = cube().system()
+    problem = system.problem(system.still(1.0, system.at_rest(), {}))
+    r, K = problem.linearise(system.at_rest())
+    right = sizes.nodal_modes(system)
+    assert right is not None
+    shifts = multigrid.Modes(right.order, 3, right.near[:, :3])
+    steps = []
+    for modes in (right, shifts):
+        factors = multigrid.Multigrid(modes).factorise(K)
+        norms = list[float]()
+        factors.levels.solve(-r[modes.order], tol=1e-6, accel="cg", residuals=norms)
+        steps.append(len(norms))
+    assert steps[0] < 0.8 * steps[1]
+
+
+def test_size_decides_and_progress_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sizes.FACTORS_UP_TO, 3, 100)
+    cube().solve(progress=True)
+    assert "(multigrid, because of 1029 unknowns in 3-D)" in capsys.readouterr().err
+    monkeypatch.setattr(multigrid, "available", lambda: False)
+    cube().solve(progress=True)
+    assert "in spite of 1029 unknowns in 3-D: pyamg is not installed" in capsys.readouterr().err
+
+
+def test_factors_stand_in_where_multigrid_fails(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sizes.FACTORS_UP_TO, 3, 100)
+    monkeypatch.setattr(sizes, "Multigrid", partial(multigrid.Multigrid, most=3))
+    study, reference = cube(), cube().solve(linear="direct")
+    found = study.solve(progress=True)
+    assert "superlu after multigrid failed, because of 1029" in capsys.readouterr().err
+    assert np.abs(found.x - reference.x).max() < 1e-9
+    monkeypatch.setitem(sizes.FALL_BACK_UP_TO, 3, 100)
+    with pytest.raises(NotConverged, match=r'multigrid left .* Use linear = "direct"'):
+        study.solve()
+
+
+def test_what_multigrid_cannot_take_is_refused() -> None:
+    with pytest.raises(StudyError, match="linear = 'amgx': allowed are auto, direct, superlu"):
+        cube().solve(linear="amgx")  # type: ignore[arg-type]
+    study = cube()
+    study.tie("bottom", "top", "u_y")
+    with pytest.raises(StudyError, match="components of one vector, or one scalar, as the only"):
+        study.solve(linear="amg")
+    with pytest.raises(StudyError, match="newton and linear: give one of them"):
+        study.solve(linear="amg", newton=softehl.Newton())
+
+
+def test_a_linear_march_factorises_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, factorise = list[int](), SuperLU.factorise
+
+    def counted(self: SuperLU, K: Any) -> Any:
+        made.append(K.nnz)
+        return factorise(self, K)
+
+    monkeypatch.setattr(SuperLU, "factorise", counted)
+    study = softehl.Study(softehl.Mesh.rectangle(1, 1, cells=(4, 4)))
+    study.add("plate", HEAT, k=1.0, c=1.0)
+    study.fix("left", T=1)
+    assert len(list(study.march(dt=0.25, until=1, linear="superlu"))) == 4
+    assert len(made) == 1
