@@ -31,6 +31,7 @@ from softehl.runtime.march import Clock, March, Method
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.names import listed
+from softehl.runtime.periodic import Cell, periodic
 from softehl.runtime.result import Result
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement import given as read
@@ -336,6 +337,14 @@ class Study:
         told = Telling(progress, True, "load factor", begin[0], note_of(where))
         with Watch(told.until(None), write) as watch:
             return ArcSteps(step, newton, most, watch).run(system, begin, until)
+
+    def periodic(self, *pairs: tuple[Where, Where], tolerance: float = 1e-6) -> Cell:
+        """The study as a cell of a periodic material: opposite sides, a pair for each direction.
+
+        `solve(F)` of it gives the mean stress P and its tangent A. Sides of a pair must have the
+        same nodes but for a shift; `tolerance` is relative to their size. Raises StudyError.
+        """
+        return periodic(self._statement, self.system(), pairs, tolerance)
 
     def system(self) -> System:
         """Equations of the study.  Raises StudyError for what does not fit together."""

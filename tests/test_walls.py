@@ -46,7 +46,7 @@ ORDER = {
             "begin",
             "held watch engines",
         ),
-        *("follow load march", "study"),
+        *("follow load march periodic", "study"),
     ),
     "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "cli document"),
     "cases/seal": (

@@ -1,0 +1,127 @@
+"""Cells of periodic materials against a laminate, whose effective stress has a closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.optimize import fsolve
+
+import softehl
+from softehl.runtime.arrays import Array
+from softehl.runtime.periodic import Cell
+from softehl.runtime.statement.records import StudyError
+
+SOFT, STIFF = (0.4, 1.3), (2.0, 5.0)
+SHARE = 0.25
+F = np.array([[1.15, 0.2], [-0.05, 0.9]])
+
+
+@softehl.page
+def rubber(m: Any) -> None:
+    """Compressible neo-Hooke."""
+    u = m.vector("u")
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + K / 2 * (J - 1) ** 2)
+
+
+def laminate(cells: tuple[int, int] = (4, 2), turn: bool = False) -> Cell:
+    """Layers across x, `SHARE` of them stiff; turn: across y."""
+    across = 1 if turn else 0
+    mesh = softehl.Mesh.rectangle(2, 2, cells=cells[::-1] if turn else cells)
+    mesh = mesh.with_group("stiff", lambda x: x[:, across] < 2 * SHARE)
+    mesh = mesh.with_group("soft", lambda x: x[:, across] > 2 * SHARE)
+    study = softehl.Study(mesh)
+    for name, (mu, K) in (("stiff", STIFF), ("soft", SOFT)):
+        study.add(name, rubber, cells=name, mu=mu, K=K)
+    return study.periodic(("left", "right"), ("bottom", "top"))
+
+
+def stress(F: Array, law: tuple[float, float]) -> Array:
+    """P of a layer in plane strain, written out."""
+    mu, K = law
+    J, inverse = np.linalg.det(F), np.linalg.inv(F).T
+    return np.asarray(mu * (F - inverse) + K * (J - 1) * J * inverse)
+
+
+def layers(F: Array) -> Array:
+    """Mean P of the laminate: both layers have equal tractions across x."""
+
+    def both(a: Array) -> tuple[Array, Array]:
+        jump = np.outer(a, [1.0, 0.0])
+        parts = F + (1 - SHARE) * jump, F - SHARE * jump
+        return stress(parts[0], STIFF), stress(parts[1], SOFT)
+
+    def apart(a: Array) -> Array:
+        stiff, soft = both(a)
+        return np.asarray((stiff - soft)[:, 0])
+
+    stiff, soft = both(fsolve(apart, np.zeros(2), xtol=1e-12))
+    return SHARE * stiff + (1 - SHARE) * soft
+
+
+def slopes(f: Any, F: Array, h: float = 1e-3) -> Array:
+    """dP/dF by differences of sixth order."""
+    found = np.zeros((2, 2, 2, 2))
+    for k, el in np.ndindex(2, 2):
+        for step, weight in ((1, 45), (2, -9), (3, 1)):
+            d = np.zeros((2, 2))
+            d[k, el] = step * h
+            found[:, :, k, el] += weight * (f(F + d) - f(F - d)) / (60 * h)
+    return found
+
+
+def test_a_laminate_has_the_stress_and_the_tangent_of_its_layers() -> None:
+    found = laminate().solve(F)
+    assert np.abs(found.P - layers(F)).max() < 1e-10
+    assert np.abs(found.A - slopes(layers, F)).max() < 1e-8
+    other = laminate(turn=True).solve(F)  # layers across the other direction are another material
+    assert np.abs(other.P - layers(F)).max() > 1e-2
+
+
+def test_components_of_the_stress_may_vanish_instead() -> None:
+    found = laminate().solve([[1.2, 0.0], [0.0, None]], steps=2)
+    assert abs(found.P[1, 1]) < 1e-10
+    assert 0.5 < found.F[1, 1] < 1.0
+    assert np.abs(found.P - layers(found.F)).max() < 1e-9
+
+
+def test_a_path_goes_on_from_a_state() -> None:
+    cell = laminate()
+    half = cell.solve(0.5 * (np.eye(2) + F))
+    assert np.abs(cell.solve(F, start=half).P - cell.solve(F).P).max() < 1e-9
+
+
+def test_a_hole_counts_in_the_volume_and_corners_are_one_node() -> None:
+    mesh = softehl.Mesh.box((1, 1, 1), cells=(2, 2, 2))
+    study = softehl.Study(mesh)
+    study.add("body", rubber, mu=0.4, K=1.3)
+    cell = study.periodic(("left", "right"), ("bottom", "top"), ("front", "back"))
+    assert cell.volume == pytest.approx(1.0)
+    assert cell.fluctuations.shape[1] == 3 * 7  # eight nodes of the torus, one of them held
+    G = np.eye(3) + 0.1 * np.arange(9).reshape(3, 3) / 9
+    J, inverse = np.linalg.det(G), np.linalg.inv(G).T
+    assert (
+        np.abs(cell.solve(G).P - (0.4 * (G - inverse) + 1.3 * (J - 1) * J * inverse)).max() < 1e-12
+    )
+
+
+def test_what_is_no_cell_is_refused() -> None:
+    study = softehl.Study(softehl.Mesh.rectangle(1, 1, cells=(2, 3)))
+    study.add("body", rubber, mu=0.4, K=1.3)
+    with pytest.raises(StudyError, match="1 pairs of sides; a mesh in 2-D needs 2"):
+        study.periodic(("left", "right"))
+    with pytest.raises(StudyError, match=r"\('left', 'top'\): 4 and 3 nodes; the mesh of both"):
+        study.periodic(("left", "top"), ("bottom", "top"))
+    cell = study.periodic(("left", "right"), ("bottom", "top"))
+    with pytest.raises(StudyError, match=r"F has shape \(3, 3\): \(2, 2\) is needed"):
+        cell.solve(np.eye(3))
+    with pytest.raises(StudyError, match="a determinant above 0"):
+        cell.solve([[-1.0, 0.0], [0.0, 1.0]])
+    study.fix("left", u_x=0)
+    with pytest.raises(StudyError, match="the cell is moved by F alone"):
+        study.periodic(("left", "right"), ("bottom", "top"))
