@@ -28,8 +28,12 @@ FITS = 2.2
 changed by 0.5 % or less on the mesh that was made for it; where for nine, by 7 %. With 2.5 thin
 films of easy glands had estimates above 2 %."""
 
-CYCLES = 6
-"""Meshes of a film, at most."""
+ALIKE = 1.25
+"""Ratio of the segments that two meshes have for a film, relative to their densities: what they
+differ by shows the error of both only where they resolve the same things alike."""
+
+CYCLES, FEW = 6, 2
+"""Meshes of a film, at most, and of the coarser one of its estimate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,25 +80,36 @@ class Adaptation:
             return found
         return Adapted(found, self._coarser(found, last), fits)
 
-    def _settled(self, found: Film | NoFilm, density: Fraction) -> tuple[Film | NoFilm, bool]:
-        """The film on a mesh of that density that fits it, and whether it does."""
-        fits = isinstance(found, Film) and self._fits(found, density)
-        for _ in range(CYCLES):
+    def _settled(
+        self, found: Film | NoFilm, density: Fraction, like: Film | None = None
+    ) -> tuple[Film | NoFilm, bool]:
+        """The film on a mesh of that density that fits it, and whether it does.
+
+        like: see `_fits`.
+        """
+        fits = isinstance(found, Film) and self._fits(found, density, like)
+        for _ in range(CYCLES if like is None else FEW):
             again = None if fits else self._remeshed(found, density)
             if not isinstance(again, Film):
                 break
-            found, fits = again, self._fits(again, density)
+            found, fits = again, self._fits(again, density, like)
         return found, fits
 
-    def _fits(self, film: Film, density: Fraction) -> bool:
-        """Whether a mesh fits its film; a mesh that is given is as it is."""
-        p, numbers = film.system.parameters, film.numbers
+    def _fits(self, film: Film, density: Fraction, like: Film | None = None) -> bool:
+        """Whether a mesh fits its film; a mesh that is given is as it is.
+
+        like: the film on another mesh, which this one must resolve as well for its density.
+        """
+        p, segments = film.system.parameters, film.numbers.inlet_segments
         if p.mesh != "graded":
             return True
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
-        thickness = film.squeezing.scales.thickness
-        shown = numbers.inlet_segments >= fewest or numbers.touching
-        return shown and misfit(film.system, film.x, thickness, float(density)) <= FITS
+        most = FITS
+        if like is not None:
+            fewest = like.numbers.inlet_segments * float(density / p.density) / ALIKE
+            most = ALIKE * _misfit(like, p.density)
+        shown = segments >= fewest or film.numbers.touching
+        return shown and _misfit(film, float(density)) <= most
 
     def _remeshed(self, found: Film | NoFilm, density: Fraction) -> Film | NoFilm | None:
         """The film on the mesh that is made for it; None where there is none."""
@@ -123,7 +138,7 @@ class Adaptation:
             except MeshError:
                 return None  # too coarse for the corners of a section
         if isinstance(found, Film):
-            found, _ = self._settled(found, density)
+            found, _ = self._settled(found, density, film)
         return found if isinstance(found, Film) else None
 
     def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:
@@ -148,3 +163,7 @@ class Adaptation:
 
     def _solver(self, system: SealSystem) -> FilmSolver:
         return FilmSolver(system, self.newton, self.observer, self.offset, self.records)
+
+
+def _misfit(film: Film, density: float) -> float:
+    return misfit(film.system, film.x, film.squeezing.scales.thickness, density)
