@@ -11,7 +11,7 @@ from softehl.runtime.fem.touching import Contact, Side
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.cells import CELLS, measures
-from softehl.runtime.mesh.thickness import thickness
+from softehl.runtime.mesh.thickness import inner_radii, thickness
 from softehl.runtime.statement.contacts import MULTIPLIERS, Touch
 from softehl.runtime.statement.records import Statement, StudyError
 from softehl.runtime.system import Step, System
@@ -25,7 +25,8 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> Cont
         block = statement.blocks[label]
         x = mesh.points[block.nodes[:, :2]]
         reach = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-        depth = 0.5 * thickness(mesh.points, mesh.boundary, block.nodes)
+        body = mesh.points, mesh.boundary, block.nodes
+        depth = inner_radii(*body) if touch.alone else thickness(*body)
         depth = np.minimum(depth, float(np.ptp(mesh.points, axis=0).max()))
         if touch.depth is not None:
             depth = np.full(len(reach), touch.depth)

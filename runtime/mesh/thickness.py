@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
@@ -14,15 +16,36 @@ def thickness(points: Array, boundary: Faces, faces: Integers) -> Array:
     """Distance (n,) from lines (n, k) on the boundary of plane bodies to the nearest line of it
     that lies beneath and looks the other way; infinite where there is none.
     """
-    every = np.concatenate([np.empty((0, 2), dtype=np.int64), *(f[:, :2] for f in boundary.values())])
-    far, out = _centres_and_normals(points[every])
     found = np.full(len(faces), np.inf)
-    for k, (x, n) in enumerate(zip(*_centres_and_normals(points[faces[:, :2]]), strict=True)):
-        across = x - far
-        distance = np.linalg.norm(across, axis=1)
-        meant = (out @ n < _OPPOSITE) & (across @ n > _BENEATH * distance)
+    for k, (below, distance, cosine) in enumerate(_beneath(points, boundary, faces)):
+        meant = (cosine < _OPPOSITE) & (below > _BENEATH * distance)
         found[k] = distance[meant].min(initial=np.inf)
     return found
+
+
+def inner_radii(points: Array, boundary: Faces, faces: Integers) -> Array:
+    """Radius (n,) of the largest circle inside that touches each line from within: half of the
+    thickness, and towards a corner of the body less and less.
+    """
+    found = np.full(len(faces), np.inf)
+    for k, (below, distance, _) in enumerate(_beneath(points, boundary, faces)):
+        meant = below > 1e-9 * distance
+        found[k] = (distance[meant] ** 2 / (2.0 * below[meant])).min(initial=np.inf)
+    return found
+
+
+def _beneath(
+    points: Array, boundary: Faces, faces: Integers
+) -> Iterator[tuple[Array, Array, Array]]:
+    """For each line, of all lines of the boundary: how far they lie beneath, their distance, and
+    the cosine between both normals; (m,) each.
+    """
+    none = np.empty((0, 2), dtype=np.int64)
+    every = np.concatenate([none, *(f[:, :2] for f in boundary.values())])
+    far, out = _centres_and_normals(points[every])
+    for x, n in zip(*_centres_and_normals(points[faces[:, :2]]), strict=True):
+        across = x - far
+        yield across @ n, np.linalg.norm(across, axis=1), out @ n
 
 
 def in_chains(lines: Integers) -> Integers:
