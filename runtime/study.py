@@ -229,7 +229,7 @@ class Study:
             known = listed(self._statement.blocks)
             raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {known}")
         given = {"friction": friction, "stiffness": stiffness, "depth": depth}
-        found, blocks = touch(self.mesh, name, (side, other), of, ring=self._ring, **given)
+        found, blocks = touch(self.mesh, name, (side, other), of, self._ring, given)
         self._statement.blocks.update(blocks)
         self._statement.contacts.append(found)
 

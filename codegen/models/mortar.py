@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
@@ -12,8 +13,11 @@ from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.shapes import interpolate, line2
 from softehl.codegen.language.model import Model
 
-_STEPS = 3
-"""Gauss-Newton steps of a projection onto a curved side, which a straight one needs none of."""
+_STEPS = 1
+"""Gauss-Newton steps of a projection onto a curved side; a straight one needs none. One step of
+an error e leaves e^2, and none of it where the sides touch."""
+_AXES = ((0, "x"), (1, "y"))
+_Sides = Sequence[Sequence[Any]]
 
 
 def pair(nodes: int, others: int) -> Definition:
@@ -27,13 +31,9 @@ def pair(nodes: int, others: int) -> Definition:
     means of p and tau' (Poulios and Renard 2015). The integral goes over the part of the side
     whose lines meet the other one, so that parts add up; the ends of this part move with the nodes.
     """
-    m = Model(
-        f"mortar_{nodes}{others}",
-        nodes=nodes + others,
-        rule=quadrature.gauss(4, 1),
-        unroll=False,
-        doc=pair.__doc__ or "",
-    )
+    name, doc = f"mortar_{nodes}{others}", pair.__doc__ or ""
+    rule = quadrature.gauss(4, 1)
+    m = Model(name, nodes=nodes + others, rule=rule, unroll=False, doc=doc)
     X = m.coordinates("X", "Y")
     u = m.nodal_unknowns("u_x", "u_y")
     lam, tau = m.nodal_unknowns("lambda", "tau", nodes=2)
@@ -45,42 +45,23 @@ def pair(nodes: int, others: int) -> Definition:
         reach="largest gap that counts [mm]",
         ring="1 for rings around the x axis, 0 for plane strain",
     )
-    x = [[a + b for a, b in zip(X[c], u[c], strict=True)] for c in (0, 1)]
-    before = [[a + b for a, b in zip(X[c], old[c], strict=True)] for c in (0, 1)]
-    side, other = [c[:nodes] for c in x], [c[nodes:] for c in x]
-    (s,) = m.point()
-    first, last = (m.define(f"end_{k}", _met(m, side, other, k), interface=True) for k in (1, 0))
-    half = m.define("half", sp.Max(last - first, 0) / 2)
-    xi = m.define("xi_side", (first + last) / 2 + half * s, interface=True)
-    N, L = (m.define(f"N{a}", v) for a, v in enumerate(_shape(nodes, xi))), line2(xi)
-    N = list(N)
-    at = [m.define(f"at_{c}", interpolate(N, side[k]), interface=True) for k, c in enumerate("xy")]
-    slope = [m.define(f"slope_{c}", interpolate(_slope(nodes, xi), side[k]), interface=True) for k, c in _AXES]
-    length = m.define("length", sp.sqrt(slope[0] ** 2 + slope[1] ** 2))
-    t = [m.define(f"t_{c}", slope[k] / length) for k, c in _AXES]
-    n = [t[1], -t[0]]
-    eta = m.define("eta", _partner(m, other, at, t), interface=True)
-    M = [m.define(f"M{a}", v) for a, v in enumerate(_shape(others, eta))]
-    gap = m.define("gap", sum(n[k] * (interpolate(M, other[k]) - at[k]) for k in (0, 1)), interface=True)
-    trial = m.define("trial", sp.Max(interpolate(L, lam) - rho * gap, 0))
-    near = sp.Piecewise((trial, gap < reach), (0, True))
-    p = m.define("p", sp.Piecewise((near, gap > -depth), (0, True)), interface=True)
-    came = [interpolate(M, c[nodes:]) - interpolate(N, c[:nodes]) for c in before]
-    slip = m.define("slip", t[0] * came[0] + t[1] * came[1], interface=True)
+    at = _met(m, _moved(X, u), nodes)
+    trial = m.define("trial", sp.Max(interpolate(at.L, lam) - rho * at.gap, 0))
+    apart = (at.gap - reach) * (at.gap + depth)
+    p = m.define("p", sp.Piecewise((trial, apart < 0), (0, True)), interface=True)
     limit = m.define("limit", friction * p)
-    q = m.define("q", sp.Max(-limit, sp.Min(interpolate(L, tau) + rho * slip, limit)), interface=True)
-    around = [interpolate(_slope(nodes, xi), X[k][:nodes]) for k in (0, 1)]
-    radius = interpolate(N, X[1][:nodes])
-    area = m.define(
-        "area", half * sp.sqrt(around[0] ** 2 + around[1] ** 2) * (1 + ring * (2 * sp.pi * radius - 1))
-    )
-    force = [m.define(f"force_{c}", area * (p * n[k] + q * t[k])) for k, c in _AXES]
+    stress = interpolate(at.L, tau) + rho * at.slip(m, _moved(X, old), nodes)
+    q = m.define("q", sp.Max(-limit, sp.Min(stress, limit)), interface=True)
+    area = m.define("area", at.half * _area(nodes, at.xi, [c[:nodes] for c in X], ring))
+    force = [
+        m.define(f"force_{c}", area * (p * at.n[k] + q * at.t[k]), interface=True) for k, c in _AXES
+    ]
+    shares = [*at.N, *(-v for v in at.M)]
     m.weak_form(
         [
-            *((force[k] * N[a], u[k][a]) for k in (0, 1) for a in range(nodes)),
-            *((-force[k] * M[b], u[k][nodes + b]) for k in (0, 1) for b in range(others)),
-            *((area * p * L[a] / rho, lam[a]) for a in (0, 1)),
-            *((area * q * L[a] / rho, tau[a]) for a in (0, 1)),
+            *((force[k] * v, u[k][a]) for k in (0, 1) for a, v in enumerate(shares)),
+            *((area * p * at.L[a] / rho, lam[a]) for a in (0, 1)),
+            *((area * q * at.L[a] / rho, tau[a]) for a in (0, 1)),
         ]
     )
     return m.finish()
@@ -89,15 +70,11 @@ def pair(nodes: int, others: int) -> Definition:
 def side(nodes: int) -> Definition:
     """The whole side of `pair`: its multipliers where nothing meets it, and what they mean.
 
-    lambda and tau are per reference area; the fields are per deformed area.
+    lambda and tau are per reference area; the fields are per deformed area, and `area` is that of
+    a quadrature point: sum(pressure * area) is the force.
     """
-    m = Model(
-        f"mortar_side_{nodes}",
-        nodes=nodes,
-        rule=quadrature.gauss(3, 1),
-        unroll=False,
-        doc=side.__doc__ or "",
-    )
+    name, doc = f"mortar_side_{nodes}", side.__doc__ or ""
+    m = Model(name, nodes=nodes, rule=quadrature.gauss(3, 1), unroll=False, doc=doc)
     X = m.coordinates("X", "Y")
     u = m.nodal_unknowns("u_x", "u_y", idle=("u_x", "u_y"))
     lam, tau = m.nodal_unknowns("lambda", "tau", nodes=2)
@@ -106,14 +83,9 @@ def side(nodes: int) -> Definition:
         ring="1 for rings around the x axis, 0 for plane strain",
     )
     (xi,) = m.point()
-    N, L = _shape(nodes, xi), line2(xi)
-    x = [[a + b for a, b in zip(X[c], u[c], strict=True)] for c in (0, 1)]
-    areas = []
-    for name, places in (("area", X), ("area_now", x)):
-        slope = [interpolate(_slope(nodes, xi), c) for c in places]
-        around = 1 + ring * (2 * sp.pi * interpolate(N, places[1]) - 1)
-        areas.append(m.define(name, sp.sqrt(slope[0] ** 2 + slope[1] ** 2) * around))
-    area, now = areas
+    N, L, x = _shape(nodes, xi), line2(xi), _moved(X, u)
+    area = m.define("area", _area(nodes, xi, X, ring))
+    now = m.define("area_now", _area(nodes, xi, x, ring))
     p, q = m.define("p", interpolate(L, lam)), m.define("q", interpolate(L, tau))
     m.weak_form(
         [
@@ -126,12 +98,59 @@ def side(nodes: int) -> Definition:
         shear=q * area / now,
         x=interpolate(N, x[0]),
         y=interpolate(N, x[1]),
-        area=now,
+        area=now * m.weight,
     )
     return m.finish()
 
 
-_AXES = ((0, "x"), (1, "y"))
+@dataclass(frozen=True)
+class _Meeting:
+    """A point of the side and its partner.
+
+    half: length of the common part in parent coordinates, halved. xi: of the point; N, L, M: shape
+    functions of the side, of the multipliers and of the other side; t, n: along and out of it.
+    """
+
+    half: Any
+    xi: Any
+    N: list[Any]
+    L: list[Any]
+    M: list[Any]
+    t: list[Any]
+    n: list[Any]
+    gap: Any
+
+    def slip(self, m: Model, before: _Sides, nodes: int) -> Any:
+        """How far the point has moved along the side since its partner and it were at `before`."""
+        came = [interpolate(self.M, c[nodes:]) - interpolate(self.N, c[:nodes]) for c in before]
+        return m.define("slip", self.t[0] * came[0] + self.t[1] * came[1], interface=True)
+
+
+def _met(m: Model, x: _Sides, nodes: int) -> _Meeting:
+    """The point of the side at a quadrature point of the part that both have in common."""
+    mine, other = [c[:nodes] for c in x], [c[nodes:] for c in x]
+    (s,) = m.point()
+    # the other side runs the other way
+    first, last = (
+        m.define(f"end_{k}", _projected(m, mine, other, k), interface=True) for k in (1, 0)
+    )
+    half = m.define("half", sp.Max(last - first, 0) / 2)
+    xi = m.define("xi_side", (first + last) / 2 + half * s, interface=True)
+    N = [m.define(f"N{a}", v) for a, v in enumerate(_shape(nodes, xi))]
+    at = [m.define(f"at_{c}", interpolate(N, mine[k]), interface=True) for k, c in _AXES]
+    slope = [interpolate(_slope(nodes, xi), mine[k]) for k, _ in _AXES]
+    slope = [m.define(f"slope_{c}", slope[k], interface=True) for k, c in _AXES]
+    length = m.define("length", sp.sqrt(slope[0] ** 2 + slope[1] ** 2))
+    t = [m.define(f"t_{c}", slope[k] / length) for k, c in _AXES]
+    n = [t[1], -t[0]]
+    eta = m.define("eta", _partner(m, other, at, t), interface=True)
+    M = [m.define(f"M{a}", v) for a, v in enumerate(_shape(len(other[0]), eta))]
+    apart = sum(n[k] * (interpolate(M, other[k]) - at[k]) for k in (0, 1))
+    return _Meeting(half, xi, N, line2(xi), M, t, n, m.define("gap", apart, interface=True))
+
+
+def _moved(X: _Sides, u: _Sides) -> list[list[Any]]:
+    return [[a + b for a, b in zip(X[k], u[k], strict=True)] for k in (0, 1)]
 
 
 def _shape(nodes: int, xi: Any) -> list[Any]:
@@ -147,17 +166,24 @@ def _slope(nodes: int, xi: Any) -> list[Any]:
     return [-half, half] if nodes == 2 else [xi - half, xi + half, -2 * xi]
 
 
-def _met(m: Model, side: Sequence[Any], other: Sequence[Any], end: int) -> Any:
+def _area(nodes: int, xi: Any, x: _Sides, ring: Any) -> Any:
+    """Area per parent coordinate, of rings or of the plane."""
+    along = [interpolate(_slope(nodes, xi), c) for c in x]
+    around = 1 + ring * (2 * sp.pi * interpolate(_shape(nodes, xi), x[1]) - 1)
+    return sp.sqrt(along[0] ** 2 + along[1] ** 2) * around
+
+
+def _projected(m: Model, mine: _Sides, other: _Sides, end: int) -> Any:
     """Where on the side the line through an end of the other one starts, from -1 to 1."""
-    y = [c[end] for c in other]
-    nodes = len(side[0])
-    chord = [(c[1] - c[0]) / 2 for c in side]
-    off = [y[k] - (side[k][0] + side[k][1]) / 2 for k in (0, 1)]
+    y, nodes = [c[end] for c in other], len(mine[0])
+    chord = [(c[1] - c[0]) / 2 for c in mine]
+    off = [y[k] - (mine[k][0] + mine[k][1]) / 2 for k in (0, 1)]
     found = _inside((chord[0] * off[0] + chord[1] * off[1]) / (chord[0] ** 2 + chord[1] ** 2))
     for step in range(_STEPS if nodes == 3 else 0):
         xi = m.define(f"meets_{end}_{step}", found)
-        at = [interpolate(_shape(nodes, xi), c) for c in side]
-        t = [m.define(f"along_{end}_{step}_{k}", interpolate(_slope(nodes, xi), side[k])) for k in (0, 1)]
+        at = [interpolate(_shape(nodes, xi), c) for c in mine]
+        t = [interpolate(_slope(nodes, xi), mine[k]) for k in (0, 1)]
+        t = [m.define(f"along_{end}_{step}_{k}", t[k]) for k in (0, 1)]
         ahead = t[0] * (y[0] - at[0]) + t[1] * (y[1] - at[1])
         found = _inside(xi + ahead / (t[0] ** 2 + t[1] ** 2))
     return found
@@ -167,7 +193,7 @@ def _inside(xi: Any) -> Any:
     return sp.Max(-1, sp.Min(xi, 1))
 
 
-def _partner(m: Model, other: Sequence[Any], at: Sequence[Any], t: Sequence[Any]) -> Any:
+def _partner(m: Model, other: _Sides, at: Sequence[Any], t: Sequence[Any]) -> Any:
     """Where on the other side a line across t through a place ends."""
     half = sp.Rational(1, 2)
     along = m.define("against", sum(half * (c[1] - c[0]) * t[k] for k, c in enumerate(other)))

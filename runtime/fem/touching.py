@@ -66,7 +66,9 @@ class Contact:
         """Elements of the pairs at unknowns x; old: those of the step before."""
         one, other = self.pairs(x)
         mine, theirs = _starts([s.faces for s in self.sides]), _starts([f for _, f in self.others])
-        kind, kind_of_other = (np.searchsorted(s, k, side="right") - 1 for s, k in ((mine, one), (theirs, other)))
+        kind, kind_of_other = (
+            np.searchsorted(s, k, side="right") - 1 for s, k in ((mine, one), (theirs, other))
+        )
         found = []
         for a, b in self._kinds():
             chosen = (kind == a) & (kind_of_other == b)
@@ -99,9 +101,7 @@ class Contact:
     def _kinds(self) -> list[tuple[int, int]]:
         return [(a, b) for a in range(len(self.sides)) for b in range(len(self.others))]
 
-    def _block(
-        self, a: int, b: int, one: Integers, other: Integers, old: Array
-    ) -> ElementBlock:
+    def _block(self, a: int, b: int, one: Integers, other: Integers, old: Array) -> ElementBlock:
         """Elements of sides of kind a with others of kind b."""
         side, (kind, faces) = self.sides[a], self.others[b]
         nodes = np.concatenate([side.faces[one], faces[other]], axis=1)

@@ -49,7 +49,7 @@ def _beneath(
 
 
 def in_chains(lines: Integers) -> Integers:
-    """Lines (n, k), each from its first node to its second, in the order of the chains they form."""
+    """Lines (n, k), each from its first to its second node, in the order of their chains."""
     at = {int(a): k for k, a in enumerate(lines[:, 0])}
     inner = np.isin(lines[:, 0], lines[:, 1])
     order: dict[int, None] = {}

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.fem.unknowns import Slot
@@ -48,9 +46,8 @@ def touch(
     name: str,
     sides: tuple[str | Predicate, str | Predicate | None],
     of: Sequence[str] | None,
-    *,
     ring: bool,
-    **given: float | None,
+    given: Mapping[str, float | None],
 ) -> tuple[Touch, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
     words = f"contact({', '.join(shown(s) for s in sides if s is not None)})"
@@ -64,16 +61,20 @@ def touch(
         if value is not None and (value < 0.0 if key == "friction" else value <= 0.0):
             least = "at least 0" if key == "friction" else "positive"
             raise StudyError(f"{words}: {key} = {value:g}, must be {least}")
-    mine = mesh.outer_faces(sides[0])
-    alone = sides[1] is None or sides[1] == sides[0]
+    side, other = sides
+    mine = mesh.outer_faces(side)
+    theirs = mine if other is None or other == side else mesh.outer_faces(other)
+    alone = theirs is mine
     if alone:
-        mine = {kind: in_chains(faces) for kind, faces in mine.items()}
-    theirs = mine if alone else mesh.outer_faces(sides[1])
+        mine = theirs = {kind: in_chains(faces) for kind, faces in mine.items()}
     blocks = {}
     for kind, faces in mine.items():
         label = name if len(mine) == 1 else f"{name}:{kind}"
         blocks[label] = _block(mesh, name, label, (kind, faces), names, float(ring))
-    return Touch(name, (*blocks,), (*theirs.items(),), names, ring=ring, alone=alone, **numbers), blocks  # type: ignore[arg-type]
+    friction, stiffness, depth = (numbers[k] for k in ("friction", "stiffness", "depth"))
+    faces_of = (*theirs.items(),)
+    found = Touch(name, (*blocks,), faces_of, names, friction or 0.0, ring, alone, stiffness, depth)
+    return found, blocks
 
 
 def _block(
