@@ -36,6 +36,8 @@ SHIPPED = {
     "contact": Shipped(1, 3),
     "contact_friction": Shipped(1, 4),
     "contact_corner": Shipped(1, 3, energy=True),
+    **{f"mortar_{a}{b}": Shipped(a + b, 2 * (a + b) + 4) for a in (2, 3) for b in (2, 3)},
+    **{f"mortar_side_{a}": Shipped(a, 2 * a + 4, fields=True) for a in (2, 3)},
     "film": Shipped(2, 4, fields=True),
     "film_upwind": Shipped(2, 4),
     "film_facet": Shipped(3, 6, fields=True),
