@@ -46,12 +46,14 @@ def pair(nodes: int, others: int) -> Definition:
         ring="1 for rings around the x axis, 0 for plane strain",
     )
     at = _met(m, _moved(X, u), nodes)
-    trial = m.define("trial", sp.Max(interpolate(at.L, lam) - rho * at.gap, 0))
-    apart = (at.gap - reach) * (at.gap + depth)
-    p = m.define("p", sp.Piecewise((trial, apart < 0), (0, True)), interface=True)
+    # where nothing decides, at the start, sides touch and stick
+    trial = m.define("trial", interpolate(at.L, lam) - rho * at.gap)
+    near = sp.Piecewise((trial, (at.gap - reach) * (at.gap + depth) < 0), (0, True))
+    p = m.define("p", sp.Piecewise((near, trial >= 0), (0, True)), interface=True)
     limit = m.define("limit", friction * p)
-    stress = interpolate(at.L, tau) + rho * at.slip(m, _moved(X, old), nodes)
-    q = m.define("q", sp.Max(-limit, sp.Min(stress, limit)), interface=True)
+    stick = m.define("stick", interpolate(at.L, tau) + rho * at.slip(m, _moved(X, old), nodes))
+    slides = sp.Piecewise((limit, stick > limit), (-limit, stick < -limit), (stick, True))
+    q = m.define("q", slides, interface=True)
     area = m.define("area", at.half * _area(nodes, at.xi, [c[:nodes] for c in X], ring))
     force = [
         m.define(f"force_{c}", area * (p * at.n[k] + q * at.t[k]), interface=True) for k, c in _AXES

@@ -189,7 +189,7 @@ MEETINGS = (
 
 
 def mortar_states() -> Iterator[State]:
-    """Two sides, turned: pressed, slipping, apart, past each other; rings and plane; sides alone."""
+    """Two sides, turned: pressed, slipping, apart, missed; rings and plane; sides alone."""
     c, s = np.cos(0.4), np.sin(0.4)
     turn, shift = np.array([[c, s], [-s, c]]), np.array([0.3, 3.0])
     for a, b in ((2, 2), (2, 3), (3, 2), (3, 3)):
