@@ -123,7 +123,7 @@ class _Meeting:
     gap: Any
 
     def slip(self, m: Model, before: _Sides, nodes: int) -> Any:
-        """How far the point has moved along the side since its partner and it were at `before`."""
+        """Motion of the point along the side since its partner and it were at `before`."""
         came = [interpolate(self.M, c[nodes:]) - interpolate(self.N, c[:nodes]) for c in before]
         return m.define("slip", self.t[0] * came[0] + self.t[1] * came[1], interface=True)
 
@@ -176,7 +176,7 @@ def _area(nodes: int, xi: Any, x: _Sides, ring: Any) -> Any:
 
 
 def _projected(m: Model, mine: _Sides, other: _Sides, end: int) -> Any:
-    """Where on the side the line through an end of the other one starts, from -1 to 1."""
+    """Place on the side, -1 to 1, from where a line goes through an end of the other one."""
     y, nodes = [c[end] for c in other], len(mine[0])
     chord = [(c[1] - c[0]) / 2 for c in mine]
     off = [y[k] - (mine[k][0] + mine[k][1]) / 2 for k in (0, 1)]
@@ -196,7 +196,7 @@ def _inside(xi: Any) -> Any:
 
 
 def _partner(m: Model, other: _Sides, at: Sequence[Any], t: Sequence[Any]) -> Any:
-    """Where on the other side a line across t through a place ends."""
+    """Place on the other side at which a line across t through a place ends."""
     half = sp.Rational(1, 2)
     along = m.define("against", sum(half * (c[1] - c[0]) * t[k] for k, c in enumerate(other)))
     if len(other[0]) == 2:

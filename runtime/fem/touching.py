@@ -187,5 +187,5 @@ class TouchingProblem(Problem):
 
 
 def _alike(blocks: Sequence[ElementBlock], assembler: Assembler) -> bool:
-    """Whether an assembler has these elements."""
+    """True if an assembler has these elements."""
     return all(np.array_equal(b.dofs, assembler.block(b.name).dofs) for b in blocks)

@@ -1,4 +1,4 @@
-"""How thick a body is beneath its boundary."""
+"""Thickness of a body beneath its boundary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contact of sides as it was written down: what it asks for, and its blocks of sides."""
+"""Contact of sides as it was written down: the request, and its blocks of sides."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MULTIPLIERS = ("lambda", "tau")
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """What a contact asks for.
+    """Request of a contact.
 
     labels: of the blocks of its sides, one for each kind. others: kind -> faces that it may meet.
     names: of the displacements. alone: both are one surface. stiffness, depth: None: derived.
