@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.touching import Contact, Side
+from softehl.runtime.fem.touching_faces import FaceContact
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.cells import CELLS, measures
@@ -17,12 +19,13 @@ from softehl.runtime.statement.contacts import MULTIPLIERS, Touch
 from softehl.runtime.statement.records import Statement, StudyError
 from softehl.runtime.system import Step, System
 
+AnyContact: TypeAlias = Contact | FaceContact
 _SOFTER = 0.25
 """Of the stiffness of the bodies at their sides. Blocks, discs and dies with and without friction
 need as many iterations from 0.03 to 0.25; from 0.5 on sticking and slipping may cycle."""
 
 
-def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> Contact:
+def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyContact:
     """The search and the elements of a contact, whose stiffness is not known yet.
 
     Raises StudyError.
@@ -32,8 +35,8 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> Cont
     sides = []
     for label in touch.labels:
         block = statement.blocks[label]
-        x = mesh.points[block.nodes[:, :2]]
-        reach = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
+        x = mesh.points[block.nodes]
+        reach = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)  # of the order of a face
         body = mesh.points, mesh.boundary, block.nodes
         depth = inner_radii(*body) if touch.alone else thickness(*body)
         depth = np.minimum(depth, float(np.ptp(mesh.points, axis=0).max()))
@@ -42,18 +45,21 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> Cont
         sides.append(Side(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
     kinds = [(s.kind, other) for s in sides for other, _ in touch.others]
     nodes = {kind: len(CELLS[kind].nodes) for pair in kinds for kind in pair}
-    return Contact(
+    flat = mesh.dimension == 2
+    family = "mortar" if flat else "touch"
+    unknowns = [touch.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
+    given = (
         touch.name,
         mesh.points,
         np.stack([numbering.nodal[n] for n in touch.names], axis=1),
-        np.stack([numbering.nodal[touch.unknown(m)] for m in MULTIPLIERS], axis=1),
+        np.stack([numbering.nodal[n] for n in unknowns], axis=1),
         tuple(sides),
         touch.others,
-        {(a, b): load_kernel(f"mortar_{nodes[a]}{nodes[b]}") for a, b in kinds},
-        touch.friction,
-        touch.ring,
-        touch.alone,
+        {(a, b): load_kernel(f"{family}_{nodes[a]}{nodes[b]}") for a, b in kinds},
     )
+    if not flat:
+        return FaceContact(*given)
+    return Contact(*given, touch.friction, touch.ring, touch.alone)
 
 
 def _require_displacements(statement: Statement, touch: Touch) -> None:
@@ -69,7 +75,7 @@ def _require_displacements(statement: Statement, touch: Touch) -> None:
             )
 
 
-def with_contacts(system: System, contacts: dict[str, Contact]) -> System:
+def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
     """The system with its contacts, of the stiffness of the bodies at rest.  Raises StudyError."""
     statement = system.statement
     assert statement is not None
@@ -94,11 +100,13 @@ def with_contacts(system: System, contacts: dict[str, Contact]) -> System:
     return replace(system, assembler=assembler, blocks=blocks, contacts=tuple(found))
 
 
-def _rho(system: System, touch: Touch, contact: Contact, side: Side, K: Array) -> Array:
+def _rho(system: System, touch: Touch, contact: AnyContact, side: Side, K: Array) -> Array:
     """Stiffness per area, (n,), about that of the softer of the two bodies beneath a side."""
     if touch.stiffness is not None:
         return np.full(len(side.faces), touch.stiffness)
-    own = _per_area(contact, [(side.kind, side.faces)], K)[side.faces[:, :2]].mean(axis=1)
+    own = _per_area(contact, [(side.kind, side.faces)], K)[
+        side.faces[:, : CELLS[side.kind].corners]
+    ].mean(axis=1)
     theirs = _per_area(contact, contact.others, K)
     rho = np.minimum(own, np.median(theirs[theirs > 0.0]) if (theirs > 0.0).any() else np.inf)
     if not (np.isfinite(rho) & (rho > 0.0)).all():
@@ -109,7 +117,7 @@ def _rho(system: System, touch: Touch, contact: Contact, side: Side, K: Array) -
     return np.asarray(_SOFTER * rho)
 
 
-def _per_area(contact: Contact, faces: object, K: Array) -> Array:
+def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
     """Entries of the diagonal of K over the area of each node, (points,); zero elsewhere."""
     area = np.zeros(len(contact.points))
     for kind, nodes in faces:  # type: ignore[attr-defined]
@@ -117,7 +125,7 @@ def _per_area(contact: Contact, faces: object, K: Array) -> Array:
         places = contact.points[nodes]
         density = measures(CELLS[kind], places, at)
         shape = CELLS[kind].shape(at)
-        if contact.ring:
+        if isinstance(contact, Contact) and contact.ring:
             density = density * 2.0 * np.pi * np.einsum("qk,nk->nq", shape, places[:, :, 1])
         np.add.at(area, nodes, np.einsum("nq,q,qk->nk", density, weights, shape))
     there = area > 0.0

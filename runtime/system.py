@@ -12,7 +12,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.loads import Tie, amount
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.touching import Contact, TouchingProblem
+from softehl.runtime.fem.touching import Sought, TouchingProblem
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.share import ALONE, Share
@@ -66,7 +66,7 @@ class System:
     whole: System | None = None
     statement: Statement | None = field(default=None, repr=False)
     written: int = 0
-    contacts: tuple[Contact, ...] = ()
+    contacts: tuple[Sought, ...] = ()
 
     @property
     def everywhere(self) -> System:

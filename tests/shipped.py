@@ -38,6 +38,8 @@ SHIPPED = {
     "contact_corner": Shipped(1, 3, energy=True),
     **{f"mortar_{a}{b}": Shipped(a + b, 2 * (a + b) + 4) for a in (2, 3) for b in (2, 3)},
     **{f"mortar_side_{a}": Shipped(a, 2 * a + 4, fields=True) for a in (2, 3)},
+    **{f"touch_{a}{b}": Shipped(a + b, 4 * a + 3 * b) for a in (3, 4) for b in (3, 4)},
+    **{f"touch_side_{a}": Shipped(a, 4 * a, fields=True) for a in (3, 4)},
     "film": Shipped(2, 4, fields=True),
     "film_upwind": Shipped(2, 4),
     "film_facet": Shipped(3, 6, fields=True),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -21,8 +22,8 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import Kernel
 
 Sparse = csc_array
-_FACING = -0.1  # cosine between normals; sides that meet more steeply do not press
-_SLANTED = 2.0  # a line along the normal is at most so many times as long as the distance
+FACING = -0.1  # cosine between normals; sides that meet more steeply do not press
+SLANTED = 2.0  # a line along the normal is at most so many times as long as the distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,12 +88,12 @@ class Contact:
         centre, radius, along = _balls(places[mine])
         far, size, against = _balls(places[theirs])
         tree = cKDTree(far)
-        nearest = _SLANTED * tree.query(centre)[0]
+        nearest = SLANTED * tree.query(centre)[0]
         reach = radius + size.max() + np.maximum(reach, np.minimum(depth, nearest))
         found = tree.query_ball_point(centre, reach, return_sorted=True)
         one = np.repeat(np.arange(len(mine)), [len(row) for row in found])
         other = np.concatenate([np.empty(0, dtype=np.int64), *found]).astype(np.int64)
-        kept = np.einsum("nc,nc->n", along[one], against[other]) < _FACING
+        kept = np.einsum("nc,nc->n", along[one], against[other]) < FACING
         kept &= (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
         if self.alone:
             kept &= one < other
@@ -140,6 +141,14 @@ def _balls(ends: Array) -> tuple[Array, Array, Array]:
     return ends.mean(axis=1), 0.5 * length, along / np.maximum(length, 1e-300)[:, None]
 
 
+class Sought(Protocol):
+    """Elements that depend on the unknowns."""
+
+    def blocks(self, x: Array, old: Array) -> list[ElementBlock]:
+        """Blocks at unknowns x, always of the same names; old: unknowns of the step before."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class TouchingProblem(Problem):
     """A problem with contacts, whose elements are looked for wherever it is evaluated.
@@ -148,19 +157,23 @@ class TouchingProblem(Problem):
     saves time.
     """
 
-    contacts: tuple[Contact, ...] = ()
+    contacts: tuple[Sought, ...] = ()
     old: Array = field(default_factory=lambda: np.empty(0))
     latest: list[Problem] = field(default_factory=list, repr=False)
 
     def at(self, x: Array) -> Problem:
         """The problem with the pairs at x, (n,), and no others."""
         found = [b for contact in self.contacts for b in contact.blocks(x, self.old)]
-        if self.latest and _alike(found, self.latest[0].assembler):
+        last = self.latest[0].assembler if self.latest else None
+        if last is not None and all(_alike(b, last.block(b.name), data=True) for b in found):
             return self.latest[0]
         new = {block.name: block for block in found}
         blocks = tuple(new.get(b.name, b) for b in self.assembler.blocks)
         size = self.assembler.size
-        assembler = Assembler(size, blocks, Structure(size, tuple(b.dofs for b in blocks)))
+        structure = Structure(size, tuple(b.dofs for b in blocks))
+        if last is not None and all(_alike(b, last.block(b.name)) for b in found):
+            structure = last.structure
+        assembler = Assembler(size, blocks, structure)
         given = {f.name: getattr(self, f.name) for f in fields(Problem)}
         self.latest[:] = [Problem(**{**given, "assembler": assembler})]
         return self.latest[0]
@@ -186,6 +199,7 @@ class TouchingProblem(Problem):
         return self.at(x).merit(x)
 
 
-def _alike(blocks: Sequence[ElementBlock], assembler: Assembler) -> bool:
-    """True if an assembler has these elements."""
-    return all(np.array_equal(b.dofs, assembler.block(b.name).dofs) for b in blocks)
+def _alike(one: ElementBlock, other: ElementBlock, *, data: bool = False) -> bool:
+    """True if blocks have the same unknowns, and the same data."""
+    alike = np.array_equal(one.dofs, other.dofs)
+    return alike and (not data or np.array_equal(one.data, other.data))  # type: ignore[arg-type]

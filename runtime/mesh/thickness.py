@@ -13,8 +13,8 @@ _OPPOSITE, _BENEATH = -0.5, 0.5  # cosines: which faces look the other way, and 
 
 
 def thickness(points: Array, boundary: Faces, faces: Integers) -> Array:
-    """Distance (n,) from lines (n, k) on the boundary of plane bodies to the nearest line of it
-    that lies beneath and looks the other way; infinite where there is none.
+    """Distance (n,) from faces (n, k) of a boundary to the nearest face of it that lies beneath
+    and looks the other way; infinite where there is none.
     """
     found = np.full(len(faces), np.inf)
     for k, (below, distance, cosine) in enumerate(_beneath(points, boundary, faces)):
@@ -37,13 +37,12 @@ def inner_radii(points: Array, boundary: Faces, faces: Integers) -> Array:
 def _beneath(
     points: Array, boundary: Faces, faces: Integers
 ) -> Iterator[tuple[Array, Array, Array]]:
-    """For each line, of all lines of the boundary: how far they lie beneath, their distance, and
+    """For each face, of all faces of the boundary: how far they lie beneath, their distance, and
     the cosine between both normals; (m,) each.
     """
-    none = np.empty((0, 2), dtype=np.int64)
-    every = np.concatenate([none, *(f[:, :2] for f in boundary.values())])
-    far, out = _centres_and_normals(points[every])
-    for x, n in zip(*_centres_and_normals(points[faces[:, :2]]), strict=True):
+    parts = [_centres_and_normals(points, f) for f in boundary.values() if len(f)]
+    far, out = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    for x, n in zip(*_centres_and_normals(points, faces), strict=True):
         across = x - far
         yield across @ n, np.linalg.norm(across, axis=1), out @ n
 
@@ -61,8 +60,13 @@ def in_chains(lines: Integers) -> Integers:
     return np.asarray(lines[list(order)])
 
 
-def _centres_and_normals(ends: Array) -> tuple[Array, Array]:
-    """Of lines with ends (n, 2, 2), seen with their body on the left: outward, of length one."""
-    along = ends[:, 1] - ends[:, 0]
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    return ends.mean(axis=1), np.stack([along[:, 1], -along[:, 0]], axis=1) / length
+def _centres_and_normals(points: Array, faces: Integers) -> tuple[Array, Array]:
+    """Of lines or faces (n, k) as their body has them; normals look outward, of length one."""
+    if points.shape[1] == 2:
+        ends = points[faces[:, :2]]
+        along = ends[:, 1] - ends[:, 0]
+        across = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    else:
+        ends = points[faces[:, : 4 if faces.shape[1] in (4, 8, 9) else 3]]
+        across = np.cross(ends[:, 1] - ends[:, 0], ends[:, -1] - ends[:, 0])
+    return ends.mean(axis=1), across / np.linalg.norm(across, axis=1, keepdims=True)

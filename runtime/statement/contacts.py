@@ -15,7 +15,10 @@ from softehl.runtime.statement.given import finite
 from softehl.runtime.statement.pages import page_on
 from softehl.runtime.statement.records import Block, StudyError, shown
 
-MULTIPLIERS = ("lambda", "tau")
+MULTIPLIERS = {2: ("lambda", "tau"), 3: ("lambda",)}
+"""Unknowns of a contact by the dimension of its mesh."""
+KINDS = {2: ("line2", "line3"), 3: ("tri3", "quad4")}
+"""Faces that may touch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +54,12 @@ def touch(
 ) -> tuple[Touch, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
     words = f"contact({', '.join(shown(s) for s in sides if s is not None)})"
-    if mesh.dimension != 2:
-        raise StudyError(f"{words}: contact is for meshes in 2-D, this one has {mesh.dimension}")
-    names = ("u_x", "u_y") if of is None else tuple(of)
-    if len(names) != 2:
-        raise StudyError(f"{words}: of={list(names)}: two displacements are needed")
+    if mesh.dimension not in KINDS:
+        raise StudyError(f"{words}: contact is for meshes in 2-D and 3-D, this one is a line")
+    usual = tuple(f"u_{axis}" for axis in "xyz"[: mesh.dimension])
+    names = usual if of is None else tuple(of)
+    if len(names) != len(usual):
+        raise StudyError(f"{words}: of={list(names)}: {len(usual)} displacements are needed")
     numbers = {k: None if v is None else finite(f"{words}: {k}", v) for k, v in given.items()}
     for key, value in numbers.items():
         if value is not None and (value < 0.0 if key == "friction" else value <= 0.0):
@@ -65,6 +69,13 @@ def touch(
     mine = mesh.outer_faces(side)
     theirs = mine if other is None or other == side else mesh.outer_faces(other)
     alone = theirs is mine
+    for kind in (*mine, *theirs):
+        if kind not in KINDS[mesh.dimension]:
+            raise StudyError(
+                f"{words}: {kind} cannot touch; {' and '.join(KINDS[mesh.dimension])} can"
+            )
+    if mesh.dimension == 3 and (alone or numbers["friction"]):
+        raise StudyError(f"{words}: in 3-D contact is of two sides, without friction")
     if alone:
         mine = theirs = {kind: in_chains(faces) for kind, faces in mine.items()}
     blocks = {}
@@ -85,9 +96,11 @@ def _block(
     names: tuple[str, ...],
     ring: float,
 ) -> Block:
-    kernel = load_kernel(f"mortar_side_{len(CELLS[elements[0]].nodes)}")
-    block = page_on(mesh, label, kernel, elements, (), {"rho": 1.0, "ring": ring})
-    told = dict(zip(("u_x", "u_y"), names, strict=True))
-    told |= {m: f"{name}:{m}" for m in MULTIPLIERS}
+    family = "mortar" if mesh.dimension == 2 else "touch"
+    kernel = load_kernel(f"{family}_side_{len(CELLS[elements[0]].nodes)}")
+    given = {"rho": 1.0, "ring": ring} if mesh.dimension == 2 else {"rho": 1.0}
+    block = page_on(mesh, label, kernel, elements, (), given)
+    told = {f"u_{axis}": name for axis, name in zip("xyz", names, strict=False)}
+    told |= {m: f"{name}:{m}" for m in MULTIPLIERS[mesh.dimension]}
     slots = tuple(Slot(told[s.name], s.node) for s in block.slots)
     return replace(block, slots=slots)
