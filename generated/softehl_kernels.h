@@ -726,6 +726,202 @@ void softehl_contact_corner_tangent(
     const double *direction,
     const double *rule, const double *basis,
     double *values, double *tangent);
+void softehl_mortar_22_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_22_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_23_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_23_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_32_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_32_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_33_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_33_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_side_2_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_side_2_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_side_2_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_side_3_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_side_3_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_mortar_side_3_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_33_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_33_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_34_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_34_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_43_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_43_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_44_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_44_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_side_3_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_side_3_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_side_3_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_side_4_residual(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_side_4_tangent(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+void softehl_touch_side_4_fields(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
 void softehl_film_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *coordinates, const double *dofs,

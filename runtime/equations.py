@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.contacts import contact_of, with_contacts
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.unknowns import Elements, Numbering
@@ -34,7 +35,9 @@ def equations(statement: Statement) -> System:
     )
     writer = _Writer(mesh, replace(numbering, layout=layout))
     blocks = [writer.page(b) for b in pages] + [writer.force(f) for f in forces if len(f.nodes)]
-    return System(
+    contacts = {t.name: contact_of(statement, numbering, t) for t in statement.contacts}
+    blocks += [block for contact in contacts.values() for block in contact.empty()]
+    system = System(
         mesh,
         writer.numbering,
         Assembler.build(layout.total, blocks),
@@ -45,6 +48,7 @@ def equations(statement: Statement) -> System:
         statement=statement,
         written=statement.count,
     )
+    return with_contacts(system, contacts)
 
 
 def _forces(

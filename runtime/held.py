@@ -35,6 +35,7 @@ def require_held(system: System, problem: Any, x: Array) -> None:
     """
     if not isinstance(problem, Problem):
         return
+    problem = problem.at(x)
     with np.errstate(all="ignore"):
         tangent = problem.assembler.linearise(x, problem.parameters)[1]
     if not np.isfinite(tangent.data).all():

@@ -57,7 +57,7 @@ class _Reached:
         problem = self.problem_at(point.parameter)
         self.x = point.solution.x
         self.histories = self.system.committed(problem, self.x, self.histories)
-        result = Result(self.system, problem, point, self.histories)
+        result = Result(self.system, problem.at(self.x), point, self.histories)
         if not self.keep_all:
             self.results.clear()
         self.results.append(result)

@@ -241,7 +241,7 @@ class _ByTime(Way):
         times = (posed.t, *self.clock.times)[:3]
         assert trial.following is not None
         self.clock = Clock(times, states, after, trial.following)
-        self.result = Result(system, problem, Point(posed.t, solution), after)
+        self.result = Result(system, problem.at(solution.x), Point(posed.t, solution), after)
 
     def end(self) -> End | None:
         """See `Way`."""

@@ -35,6 +35,7 @@ from softehl.runtime.periodic import Cell, periodic
 from softehl.runtime.result import Result
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement import given as read
+from softehl.runtime.statement.contacts import touch
 from softehl.runtime.statement.pages import (
     elements_of,
     geometry_of,
@@ -204,6 +205,35 @@ class Study:
         for name in names:
             pairs = np.stack([ours, partners], axis=1)
             self._add_force("tie", where, Tie(offset), pairs, (name,))
+
+    def contact(
+        self,
+        side: str | Predicate,
+        other: str | Predicate | None = None,
+        *,
+        friction: float = 0.0,
+        name: str = "contact",
+        of: Sequence[str] | None = None,
+        stiffness: float | None = None,
+        depth: float | None = None,
+    ) -> None:
+        """Contact of two sides of deformable bodies, which may slide far; of one side with itself
+        where there is no other.
+
+        side: which has the pressure as an unknown, the finer or the softer one; `fields(name)` has
+        its pressure and shear stress. friction: Coulomb's coefficient. of: displacements, u_x and
+        u_y if left out. stiffness: of the augmented Lagrangian [MPa/mm], which changes iterations,
+        not results; left out, that of the bodies. depth: penetration beyond which sides do not
+        notice each other; left out, half of the thickness of the body.
+        Raises StudyError, MeshError.
+        """
+        if name in self._statement.blocks:
+            known = listed(self._statement.blocks)
+            raise StudyError(f"contact(name={name!r}): the name is taken; blocks: {known}")
+        given = {"friction": friction, "stiffness": stiffness, "depth": depth}
+        found, blocks = touch(self.mesh, name, (side, other), of, self._ring, given)
+        self._statement.blocks.update(blocks)
+        self._statement.contacts.append(found)
 
     def start(self, where: Where | None = None, **values: Datum) -> None:
         """Values of unknowns at the start, numbers or functions of places; zero if left out.

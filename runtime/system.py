@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.loads import Tie, amount
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.touching import Sought, TouchingProblem
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.share import ALONE, Share
@@ -50,6 +52,7 @@ class System:
     are prescribed: checked, not solved. start: name -> (points,) initial values, nan where nothing
     was said. share: how the unknowns are spread over processes; whole: where they are, the system
     of all of them. statement: what was written down, and written: how much of it there was.
+    contacts: whose elements are sought at each iterate.
     """
 
     mesh: Mesh
@@ -63,6 +66,7 @@ class System:
     whole: System | None = None
     statement: Statement | None = field(default=None, repr=False)
     written: int = 0
+    contacts: tuple[Sought, ...] = ()
 
     @property
     def everywhere(self) -> System:
@@ -139,7 +143,11 @@ class System:
             numbers = [given[name] for name in block.kernel.parameters]
             parameters[block.name] = np.array([v(step.t) if callable(v) else v for v in numbers])
         layout = self.numbering.layout
-        here = Problem(assembler, layout, parameters, fixed=fixed, values=values)
+        posed_on: dict[str, Any] = {"fixed": fixed, "values": values}
+        if self.contacts:
+            posed_on |= {"contacts": self.contacts, "old": step.old}
+        kind = TouchingProblem if self.contacts else Problem
+        here = kind(assembler, layout, parameters, **posed_on)
         posed: Problem = self.share.posed(here)
         return posed
 

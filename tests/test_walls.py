@@ -41,6 +41,7 @@ ORDER = {
             "share",
             "statement",
             "system",
+            "contacts",
             "equations output",
             "result",
             "begin",

@@ -12,10 +12,12 @@ from softehl.codegen.models import (
     contact,
     film,
     mixed_film,
+    mortar,
     rheology,
     sheet,
     solid,
     support,
+    touch,
 )
 
 MATERIALS = {
@@ -49,6 +51,10 @@ ALL: dict[str, Callable[[], Definition]] = {
     "contact": contact.augmented_lagrangian,
     "contact_friction": contact.coulomb,
     "contact_corner": contact.corner,
+    **{f"mortar_{a}{b}": partial(mortar.pair, a, b) for a in (2, 3) for b in (2, 3)},
+    **{f"mortar_side_{a}": partial(mortar.side, a) for a in (2, 3)},
+    **{f"touch_{a}{b}": partial(touch.point, a, b) for a in (3, 4) for b in (3, 4)},
+    **{f"touch_side_{a}": partial(touch.face, a) for a in (3, 4)},
     "film": film.reynolds_segment,
     "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,

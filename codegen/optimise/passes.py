@@ -153,8 +153,11 @@ def inverses(g: Graph, roots: Roots) -> Roots:
 def assume(g: Graph, roots: Roots) -> Roots:
     """Inside one side of a branch its condition is known: drop inner branches on it."""
     memo: dict[tuple[Node, tuple[tuple[Node, bool], ...]], Node] = {}
+    nodes = reachable(roots)
+    asked = _asked(nodes)
 
     def visit(n: Node, known: tuple[tuple[Node, bool], ...]) -> Recursion[Node]:
+        known = tuple(k for k in known if k[0] in asked[n])  # others decide nothing below it
         key = (n, known)
         if key not in memo:
             memo[key] = yield build(n, known)
@@ -175,12 +178,20 @@ def assume(g: Graph, roots: Roots) -> Roots:
         decides = yield visit(c, known)
         return g.branch(decides, (yield visit(then, order)), (yield visit(otherwise, negated)))
 
-    nodes = reachable(roots)
     if all(n.op is not Op.BRANCH for n in nodes):
         return roots
     for n in nodes:
         recursion(visit(n, ()))  # in ascending order, as every pass goes
     return [memo[r, ()] for r in roots]
+
+
+def _asked(nodes: Sequence[Node]) -> dict[Node, frozenset[Node]]:
+    """Conditions of the branches at and below each node; operands come before their users."""
+    found: dict[Node, frozenset[Node]] = {}
+    for n in nodes:
+        own = frozenset(n.args[:1]) if n.op is Op.BRANCH else frozenset()
+        found[n] = own.union(*(found[a] for a in n.args))
+    return found
 
 
 def literals(g: Graph, roots: Roots) -> Roots:

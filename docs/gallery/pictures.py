@@ -357,6 +357,26 @@ def fracture(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="upper left")
 
 
+def contact(figure: Figure, space: dict[str, Any]) -> None:
+    left, middle, right = figure.subplots(1, 3, width_ratios=[1, 1, 1.2])
+    x, p, a = space["x"], space["p"], space["a"]
+    order = np.argsort(x)
+    s = np.linspace(-1, 1, 200)
+    left.plot(x[order] / a, p[order], ".", color=BLUE, label="computed")
+    left.plot(s, p.max() * np.sqrt(1 - s**2), color=GREY, lw=1, label="Hertz")
+    left.set(xlabel="x / a", ylabel="pressure [MPa]", xlim=(-1.5, 1.5))
+    left.legend(loc="lower center")
+    middle.plot(space["way"], 1e3 * space["load"], "o-", color=BLUE)
+    middle.set(xlabel="way of the disc [mm]", ylabel="reaction [mN/mm]", ylim=(0, 160))
+    result = space["closed"][-1]
+    mesh, found = result.system.mesh, result.fields("contact")
+    places = result.deformed(("u_x", "u_y"))
+    flat = np.zeros(len(mesh.cells["quad4"]))
+    draw_cells(right, places, mesh.cells["quad4"], flat, cmap="Greys", clim=(-1, 5))
+    drawn = right.scatter(found["x"], found["y"], 4, found["pressure"], cmap="magma_r")
+    figure.colorbar(drawn, ax=right, label="pressure [MPa]", shrink=0.8)
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
@@ -370,6 +390,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "finite-plasticity": finite_plasticity,
     "stick-slip": stick_slip,
     "fracture": fracture,
+    "contact": contact,
 }
 
 if __name__ == "__main__":

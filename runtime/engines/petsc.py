@@ -18,6 +18,7 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import petsc, world
 from softehl.runtime.share import Share
 from softehl.runtime.solve.newton import Newton
+from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
 
 _AXES = ("x", "y", "z")
@@ -40,6 +41,8 @@ class Petsc:
     def spread(self, system: System) -> System:
         """See `Engine`."""
         system = system.everywhere
+        if system.contacts:
+            raise StudyError('contact: its pairs are sought in one process, engine="serial"')
         comm = world()
         cells = Cells.of(system)
         cut = partition(system, cells, _cut(system, cells), comm.size)

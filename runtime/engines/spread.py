@@ -117,6 +117,10 @@ class Spread:
         """Fields of a block at the points of this process's elements."""
         return self.problem.fields(name, x)
 
+    def at(self, x: Array) -> Any:
+        """See `Problem`: it has no elements that are sought."""
+        return self
+
     def residual(self, x: Array) -> Array:
         """See the class."""
         r = self.team.exchange.added(self.problem.assembler.residual(x, self.parameters))

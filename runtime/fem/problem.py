@@ -105,6 +105,10 @@ class Problem:
         """The element whose residual or tangent is not finite at x, (n,); empty if none is."""
         return self.assembler.not_finite(x, self.parameters)
 
+    def at(self, x: Array) -> Problem:
+        """The problem with the elements that it has at x, (n,): its own, unless they are sought."""
+        return self
+
     def residual(self, x: Array) -> Array:
         """R(x), (n,): internal minus external virtual work; x - value for prescribed unknowns."""
         r = self.assembler.residual(x, self.parameters)

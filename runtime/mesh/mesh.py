@@ -113,6 +113,16 @@ class Mesh:
         return grid(tuple(size), cells, order, shape)
 
     @classmethod
+    def union(cls, **parts: Mesh) -> Mesh:
+        """Meshes as one that share no nodes: cells "disc", sides "disc:bottom", "disc:boundary".
+
+        Groups of cells keep their names behind that of their mesh, too.
+        """
+        from softehl.runtime.mesh.union import union
+
+        return union(parts)
+
+    @classmethod
     def read(cls, path: str | Path) -> Mesh:
         """A mesh file of any format that meshio reads; its groups become names.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -92,6 +92,7 @@ class Statement:
     conditions: list[Condition] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
     start: list[Start] = field(default_factory=list)
+    contacts: list[Any] = field(default_factory=list)
 
     @property
     def count(self) -> int:

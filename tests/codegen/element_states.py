@@ -14,9 +14,16 @@ from softehl.runtime.fem.rules import Kind, facet_rule, film_rule
 from softehl.runtime.kernels import Kernel, Rule, load_kernel
 from tests.reference.calling import rule_of
 from tests.reference.states import State as Known
-from tests.reference.states import mixed_states, thinning_states, void_states
+from tests.reference.states import (
+    mixed_states,
+    mortar_states,
+    thinning_states,
+    touch_states,
+    void_states,
+)
 from tests.shipped import RUBBERS
 
+SIDES = (*mortar_states(), *touch_states())
 MATERIALS = ((3.04, 0.62, 500.0), (0.9, 0.0, 40.0), (1.2, 2.1, 2.0e3))
 
 
@@ -215,8 +222,10 @@ def thinning() -> Iterator[Known]:
 
 
 def ruptured() -> Iterator[Case]:
-    """Films with void fractions, rough and moving ones, those that thin: of the other reference."""
-    for state in [*mixed_states((1, 3)), *void_states(), *thinning()]:
+    """Films with void fractions, rough and moving ones, those that thin, and sides that touch: of
+    the other reference.
+    """
+    for state in [*mixed_states((1, 3)), *void_states(), *thinning(), *SIDES]:
         given = state.coordinates, state.dofs, state.parameters, state.data
         plain = _case(state.family, state.label, *given)
         data = np.array(state.point_data)[:, None] if state.point_data else None

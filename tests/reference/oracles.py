@@ -8,7 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from tests.reference import boundary, facet, film, mixed, section, sheet, solids, upwind
+from tests.reference import (
+    boundary,
+    facet,
+    film,
+    mixed,
+    mortar,
+    section,
+    sheet,
+    solids,
+    touch,
+    upwind,
+)
 from tests.reference.differentiate import Matrix, Number, Vector, mpf, numbers
 from tests.reference.material import LAWS
 from tests.reference.states import State
@@ -82,6 +93,10 @@ RESIDUALS: dict[str, Oracle] = {
     "mean_axial": _plain(section.residual_axial),
     "axial_spring": _single(section.residual_spring),
     **{family: _mixed(residual) for family, residual in mixed.RESIDUALS.items()},
+    **{
+        family: _contact(residual)
+        for family, residual in {**mortar.RESIDUALS, **touch.RESIDUALS}.items()
+    },
 }
 TANGENTS: dict[str, Oracle] = {
     "solid_q4": _plain(solids.tangent_q4),
@@ -104,6 +119,10 @@ TANGENTS: dict[str, Oracle] = {
     "mean_axial": _plain(section.tangent_axial),
     "axial_spring": _single(section.tangent_spring),
     **{family: _mixed(partial(mixed.tangent, family)) for family in mixed.RESIDUALS},
+    **{
+        family: _contact(tangent)
+        for family, tangent in {**mortar.TANGENTS, **touch.TANGENTS}.items()
+    },
 }
 ENERGIES: dict[str, Oracle] = {
     "solid_q4": _plain(solids.energy_q4),
@@ -131,6 +150,7 @@ FIELDS: dict[str, Oracle] = {
     **{name: _film(film.fields_film) for name in SEGMENTS},
     "film_facet": _plain(facet.fields_facet),
     **{family: _mixed(fields) for family, fields in mixed.FIELDS.items()},
+    **{family: _contact(fields) for family, fields in {**mortar.FIELDS, **touch.FIELDS}.items()},
 }
 
 
@@ -174,6 +194,10 @@ def blocks(family: str, count: int) -> tuple[Block, ...]:
         **dict.fromkeys(SEGMENTS, 4),
         "film_upwind": 4,
         "film_facet": 6,
+        **{family: 2 * sum(map(int, family[-2:])) for family in mortar.FAMILIES},
+        **{family: 2 * nodes for family, nodes in mortar.SIDES.items()},
+        **{family: 3 * sum(map(int, family[-2:])) for family in touch.FAMILIES},
+        **{family: 3 * nodes for family, nodes in touch.SIDES.items()},
     }
     known |= {"mean_rotation": 8, "mean_axial": 8, "film_upwind_rough": 4}
     if family in PAIRS:

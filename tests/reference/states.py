@@ -175,6 +175,70 @@ def boundary_states() -> Iterator[State]:
         yield State("contact_friction", label, (0.2, 25.2), dofs, (0.0125, 0.4), data)
 
 
+MEETINGS = (
+    ("sticking", (0.8, -0.3), -0.01, (0.5, 0.8), 1e-3),
+    ("slipping", (1.3, 0.2), -0.012, (0.6, 0.7), 0.3),
+    ("slipping-back", (0.9, 0.2), 0.004, (0.9, 0.7), -0.3),
+    ("at-an-edge", (0.9, 0.2), 0.01, (0.4, -0.2), 0.02),
+    ("open", (0.9, 0.2), 0.3, (0.5, 0.8), 0.0),
+    ("beyond", (0.9, 0.2), 1.5, (30.0, 30.0), 0.0),
+    ("missed-right", (2.0, 1.5), -0.01, (0.5, 0.8), 0.0),
+    ("missed-left", (-0.5, -1.0), -0.01, (0.5, 0.8), 0.0),
+)
+"""Label, ends of the other side along the first one, from 0 to 1; gap, multipliers, slip."""
+
+
+def mortar_states() -> Iterator[State]:
+    """Two sides, turned: pressed, slipping, apart, missed; rings and plane; sides alone."""
+    c, s = np.cos(0.4), np.sin(0.4)
+    turn, shift = np.array([[c, s], [-s, c]]), np.array([0.3, 3.0])
+    for a, b in ((2, 2), (2, 3), (3, 2), (3, 3)):
+        rng = np.random.default_rng(2015)
+        for k, (label, (first, last), gap, pressures, slip) in enumerate(MEETINGS):
+            side = np.array([[0.0, 0.01], [1.0, -0.01], [0.52, -0.03]])[:a]
+            middle = 0.7 * last + 0.3 * first if "missed" in label else (first + last) / 2 + 0.02
+            other = np.array([[first, -gap], [last, -gap - 0.01], [middle, 0.01 - gap]])[:b]
+            now = np.concatenate([side, other]) @ turn + shift
+            u = 0.1 * rng.uniform(-1, 1, now.shape)
+            old = u + 0.002 * rng.uniform(-1, 1, now.shape)
+            old[:a] -= slip * turn[0]
+            tau = (0.02, -0.03) if label != "at-an-edge" else (0.5, 0.1)
+            multipliers = np.stack([pressures, tau], axis=1)
+            data = (*_tuple(old.T), 10.0, 0.3, 0.5, 1.0, float(k % 2))
+            dofs = (*_tuple(u), *_tuple(multipliers))
+            yield State(f"mortar_{a}{b}", label, _tuple(now - u), dofs, (), data)
+    for a in (2, 3):
+        now = np.array([[0.0, 0.01], [1.0, -0.01], [0.52, -0.03]])[:a] @ turn + shift
+        u = np.array([[0.05, 0.02], [-0.03, 0.04], [0.01, 0.06]])[:a]
+        for label, ring in (("ring", 1.0), ("plane", 0.0)):
+            dofs = (*_tuple(u), 0.5, 0.1, 0.8, -0.2)
+            yield State(f"mortar_side_{a}", label, _tuple(now - u), dofs, (), (10.0, ring))
+
+
+def touch_states() -> Iterator[State]:
+    """Two faces, turned: all points pressed, some of them, none; faces alone."""
+    corners = {3: UNIT[[0, 1, 2]], 4: UNIT}
+    turn = np.linalg.qr(np.array([[1.0, 0.3, -0.2], [-0.1, 1.0, 0.4], [0.3, -0.2, 1.0]]))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    for a, b in ((3, 3), (3, 4), (4, 3), (4, 4)):
+        rng = np.random.default_rng(2015)
+        for label, gap, slope in (("pressed", -0.01, 0.0), ("tilted", 0.06, 0.3), ("open", 0.3, 0)):
+            side = np.column_stack([corners[a] * [1, -1], 0.02 * rng.uniform(-1, 1, a)])
+            other = np.column_stack([3 * corners[b], -gap + slope * corners[b][:, 0]])
+            other[:, 2] += 0.02 * rng.uniform(-1, 1, b)
+            now = np.concatenate([side, other]) @ turn.T + [0.3, 0.1, -0.2]
+            u = 0.1 * rng.uniform(-1, 1, now.shape)
+            start = (10.0, *((0.3, 0.4) if b == 3 else (0.05, -0.1)), gap + 0.01)
+            dofs = (*_tuple(u), *_tuple(rng.uniform(0.2, 0.6, a)))
+            yield State(f"touch_{a}{b}", label, _tuple(now - u), dofs, (), start)
+    for a in (3, 4):
+        rng = np.random.default_rng(2016)
+        now = np.column_stack([corners[a], 0.1 * rng.uniform(-1, 1, a)]) @ turn.T
+        u = 0.1 * rng.uniform(-1, 1, now.shape)
+        dofs = (*_tuple(u), *_tuple(rng.uniform(0.2, 0.6, a)))
+        yield State(f"touch_side_{a}", "turned", _tuple(now - u), dofs, (), (10.0,))
+
+
 def section_states() -> Iterator[State]:
     """Mean rotation and axial spring on distorted quads."""
     rng = np.random.default_rng(2009)
@@ -333,4 +397,4 @@ def all_states() -> list[State]:
     """Every state of every family."""
     bodies = [*solid_states(), *rubber_states(), *boundary_states(), *section_states()]
     films = [*film_states(), *upwind_states(), *facet_states(), *thinning_states()]
-    return [*bodies, *films, *mixed_states(), *void_states()]
+    return [*bodies, *films, *mixed_states(), *void_states(), *mortar_states(), *touch_states()]

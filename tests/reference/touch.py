@@ -1,0 +1,170 @@
+"""Contact of two faces in space: the points of a face against their partners on another one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from tests.reference.differentiate import Matrix, Number, Vector, jacobian, mp, mpf
+from tests.reference.rules import gauss
+
+Points = list[Vector]
+
+
+def residual_point(
+    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
+) -> Vector:
+    """Forces at the nodes of both, then what lambda is short of at the nodes of the face.
+
+    data: rho, and from where the partner is sought: parent coordinates and distance.
+    """
+    rho, *start = data
+    count = len(X) // 3
+    x = _places(X, dofs, range(count))
+    rest = _places(X, [mpf(0)] * len(X), range(nodes))
+    multipliers = dofs[3 * count :]
+    found = [mpf(0)] * len(dofs)
+    for at, weight in _rule(nodes):
+        mine, N = x[:nodes], _shape(nodes, at)
+        across = _cross(*_slopes(mine, at))
+        length = _length(across)
+        n = [v / length for v in across]
+        partner, gap = _partner(x[nodes:], _sum(N, mine), n, start)
+        pressure = sum((a * v for a, v in zip(N, multipliers, strict=True)), mpf(0)) - rho * gap
+        if pressure <= 0:
+            continue
+        push = weight * pressure * _length(_cross(*_slopes(rest, at)))
+        shares = [*N, *(-v for v in _shape(count - nodes, partner))]
+        for a, share in enumerate(shares):
+            for c in range(3):
+                found[3 * a + c] += push * share * n[c]
+        for a, share in enumerate(N):
+            found[3 * count + a] += push * share / rho
+    return found
+
+
+def tangent_point(
+    nodes: int, X: Sequence[Number], dofs: Vector, data: Sequence[Number], _: object
+) -> Matrix:
+    """Differences of the residual."""
+    return jacobian(lambda v: residual_point(nodes, X, v, data, _), dofs)
+
+
+def residual_side(
+    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
+) -> Vector:
+    """Minus the integrals of lambda over rho, with each shape function."""
+    (rho,) = data
+    rest = _places(X, [mpf(0)] * len(X), range(nodes))
+    found, multipliers = [mpf(0)] * len(dofs), dofs[3 * nodes :]
+    for at, weight in _rule(nodes):
+        N, area = _shape(nodes, at), weight * _length(_cross(*_slopes(rest, at)))
+        value = sum((a * v for a, v in zip(N, multipliers, strict=True)), mpf(0))
+        for a, share in enumerate(N):
+            found[3 * nodes + a] -= area * share * value / rho
+    return found
+
+
+def tangent_side(
+    nodes: int, X: Sequence[Number], dofs: Vector, data: Sequence[Number], _: object
+) -> Matrix:
+    """Differences of the residual."""
+    return jacobian(lambda v: residual_side(nodes, X, v, data, _), dofs)
+
+
+def fields_side(
+    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
+) -> Matrix:
+    """True pressure, place, and area of each point."""
+    rest, moved = (_places(X, u, range(nodes)) for u in ([mpf(0)] * len(X), dofs))
+    rows, multipliers = [], dofs[3 * nodes :]
+    for at, weight in _rule(nodes):
+        N = _shape(nodes, at)
+        before, now = (_length(_cross(*_slopes(p, at))) for p in (rest, moved))
+        value = sum((a * v for a, v in zip(N, multipliers, strict=True)), mpf(0))
+        rows.append([value * before / now, *_sum(N, moved), now * weight])
+    return rows
+
+
+FAMILIES = {f"touch_{a}{b}": a for a in (3, 4) for b in (3, 4)}
+SIDES = {f"touch_side_{a}": a for a in (3, 4)}
+RESIDUALS = {
+    **{name: partial(residual_point, a) for name, a in FAMILIES.items()},
+    **{name: partial(residual_side, a) for name, a in SIDES.items()},
+}
+TANGENTS = {
+    **{name: partial(tangent_point, a) for name, a in FAMILIES.items()},
+    **{name: partial(tangent_side, a) for name, a in SIDES.items()},
+}
+FIELDS = {name: partial(fields_side, a) for name, a in SIDES.items()}
+
+
+def _rule(nodes: int) -> list[tuple[Vector, Number]]:
+    """Three by three points; on a triangle Gauss's, and Jacobi's for the weight 1 - y."""
+    line = list(zip(*gauss(3), strict=True))
+    if nodes == 4:
+        return [([x, y], v * w) for x, v in line for y, w in line]
+    found = []
+    for y, w in _jacobi():
+        found += [([(1 + x) / 2 * (1 - y), y], v / 2 * w) for x, v in line]
+    return found
+
+
+def _jacobi() -> list[tuple[Number, Number]]:
+    """Points and weights on [0, 1] of the weight 1 - y: zeros of 35 y^3 - 45 y^2 + 15 y - 1."""
+    points = mp.polyroots([35, -45, 15, -1], maxsteps=500, extraprec=500)
+    found = []
+    for y in points:
+        others = [z for z in points if z != y]
+        # integral over [0, 1] of (1 - y) times the Lagrange polynomial of the point
+        total, product = others[0] + others[1], others[0] * others[1]
+        integral = mpf(1) / 12 - total / 6 + product / 2
+        found.append((y, integral / ((y - others[0]) * (y - others[1]))))
+    return found
+
+
+def _places(X: Sequence[Number], u: Sequence[Number], nodes: range) -> Points:
+    return [[X[3 * a + c] + u[3 * a + c] for c in range(3)] for a in nodes]
+
+
+def _shape(nodes: int, at: Sequence[Number]) -> Vector:
+    x, y = at
+    if nodes == 3:
+        return [1 - x - y, x, y]
+    ends = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    return [(1 + a * x) * (1 + b * y) / 4 for a, b in ends]
+
+
+def _slopes(points: Points, at: Sequence[Number]) -> tuple[Vector, Vector]:
+    """Exact as central differences: along each parent coordinate the place is linear."""
+    found = []
+    for d in (0, 1):
+        ahead, behind = ([v + s * (k == d) for k, v in enumerate(at)] for s in (1, -1))
+        pairs = zip(*(_sum(_shape(len(points), p), points) for p in (ahead, behind)), strict=True)
+        found.append([(a - b) / 2 for a, b in pairs])
+    return found[0], found[1]
+
+
+def _partner(
+    points: Points, at: Vector, n: Vector, start: Sequence[Number]
+) -> tuple[Vector, Number]:
+    """One Newton step for x(xi, eta) = at + gap n from the start."""
+    xi, eta, gap = start
+    a, b = _slopes(points, (xi, eta))
+    place = _sum(_shape(len(points), (xi, eta)), points)
+    off = [at[c] + gap * n[c] - place[c] for c in range(3)]
+    K = mp.matrix([[a[c], b[c], -n[c]] for c in range(3)])
+    step = mp.lu_solve(K, mp.matrix(off))
+    return [xi + step[0], eta + step[1]], gap + step[2]
+
+
+def _sum(shares: Vector, points: Points) -> Vector:
+    return [sum((s * p[c] for s, p in zip(shares, points, strict=True)), mpf(0)) for c in range(3)]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return [a[k - 2] * b[k - 1] - a[k - 1] * b[k - 2] for k in range(3)]
+
+
+def _length(a: Vector) -> Number:
+    return mp.sqrt(sum((v * v for v in a), mpf(0)))

@@ -1,0 +1,271 @@
+"""Contact of deformable bodies: patch, tangent, Hertz, rolling, ironing, a side with itself."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softehl import Mesh, Study
+from softehl.runtime.fem.touching import TouchingProblem
+from softehl.runtime.mesh.mesh import MeshError
+from softehl.runtime.mesh.thickness import in_chains, inner_radii, thickness
+from softehl.runtime.result import Result
+from softehl.runtime.statement.records import StudyError
+from tests.runtime.touching_bodies import (
+    elastic,
+    force,
+    gasket,
+    half_space,
+    lower_disc,
+)
+
+RUBBER: dict[str, Any] = {"mu": 1.0, "K": 5.0}
+
+
+def stacked(
+    upper: int, lower: int, *, apart: float = 0.0, geometry: str | None = None, friction: float = 0
+) -> Study:
+    """Two blocks of these orders, one on the other, on meshes that do not match."""
+    below = Mesh.rectangle(1, 1, cells=(3, 2), order=lower).map(lambda x: np.add(x, [0, 1]))
+    above = Mesh.rectangle(1, 1, cells=(4, 3), order=upper).map(lambda x: np.add(x, [0, 2 + apart]))
+    study = Study(Mesh.union(lower=below, upper=above), geometry=geometry)
+    study.add("body", elastic, **RUBBER)
+    study.contact("upper:bottom", "lower:top", friction=friction)
+    return study
+
+
+@pytest.mark.parametrize("orders", [(1, 1), (1, 2), (2, 1), (2, 2)])
+def test_a_uniform_pressure_passes_between_meshes_that_do_not_match(
+    orders: tuple[int, int],
+) -> None:
+    study = stacked(*orders)
+    study.fix("lower:bottom", u_y=0)
+    study.fix("upper:top", u_y=-0.2)
+    study.fix("lower:left", u_x=0)
+    study.fix("upper:left", u_x=0)
+    result = study.solve()
+    before, last = result.residual_norms[-2:]
+    assert last < max(1e2 * before**2, 1e-10)
+    pressure = study.solve(start=result).fields("contact")["pressure"]
+    assert np.ptp(pressure) < 1e-10 * pressure.max()
+    assert pressure.min() > 0.1
+
+
+@pytest.mark.parametrize("apart", [0.05, 0.0, -0.05])
+def test_bodies_may_start_apart_or_overlap(apart: float) -> None:
+    study = stacked(1, 1, apart=apart)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.fix("upper:top", u_x=0, u_y=-0.1 - apart)
+    touching = stacked(1, 1)
+    touching.fix("lower:bottom", u_x=0, u_y=0)
+    touching.fix("upper:top", u_x=0, u_y=-0.1)
+    expected = force(touching.solve())
+    assert force(study.solve()) == pytest.approx(expected, rel=0.15 * abs(apart) / 0.05 + 1e-9)
+
+
+def test_bodies_that_stay_apart_do_not_notice_each_other() -> None:
+    study = stacked(1, 1, apart=0.3)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.fix("upper:top", u_x=0, u_y=-0.2)
+    result = study.solve()
+    assert force(result) == pytest.approx(0.0, abs=1e-12)
+    assert np.abs(result.values("u_y")[result.system.mesh.nodes("lower:top")]).max() < 1e-12
+
+
+@pytest.mark.parametrize("orders", [(1, 2), (2, 1)])
+@pytest.mark.parametrize("geometry", ["plane strain", "axisymmetric"])
+def test_the_tangent_is_the_derivative(orders: tuple[int, int], geometry: str) -> None:
+    study = stacked(*orders, geometry=geometry, friction=0.3)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.fix("upper:top", u_x=0.05, u_y=-0.2)
+    result = study.solve(steps=2)
+    system = result.system
+    problem = system.problem(system.still(1.0, result.x, {}))
+    rng = np.random.default_rng(1)
+    x = result.x.copy()
+    for name in ("u_x", "u_y"):
+        part = system.numbering.layout.part(name)
+        x[part] += 0.004 * rng.normal(size=part.stop - part.start)
+    _, K = problem.linearise(x)
+    y = rng.normal(size=len(x))
+    y[problem.fixed] = 0.0
+    h = 1e-6
+    half, whole = (
+        (problem.residual(x + s * y) - problem.residual(x - s * y)) / (2 * s) for s in (h / 2, h)
+    )
+    difference = (4 * half - whole) / 3
+    size = np.abs(difference).max()
+    assert np.abs(K @ y - difference).max() < 1e-8 * size
+    assert isinstance(problem, TouchingProblem)
+    frozen = replace(problem, contacts=(), latest=[])  # a tangent without contact is seen
+    assert np.abs(frozen.linearise(x)[1] @ y - difference).max() > 1e-2 * size
+
+
+def test_hertz() -> None:
+    """Two elastic bodies, a disc of radius 10 on a half-space: a = sqrt(4 P R / (pi E*))."""
+    E, nu, R = 1000.0, 0.3, 10.0
+    mesh = Mesh.union(disc=lower_disc(16, R, 2), block=half_space(14, 100.0, 2))
+    study = Study(mesh)
+    study.add("body", elastic, mu=E / 2 / (1 + nu), K=E / 3 / (1 - 2 * nu))
+    study.contact("disc:bottom", "block:top")
+    study.fix("block:bottom", u_x=0, u_y=0)
+    study.fix("disc:top", u_x=0, u_y=-0.06)
+    result = study.solve()
+    assert result.iterations <= 12
+    tail = result.residual_norms[-3:]
+    assert tail[1] < 10 * tail[0] ** 1.5
+    assert tail[2] < 1e-9
+    P, found = force(result), result.fields("contact")
+    assert result.reaction("block:bottom")["u_y"] == pytest.approx(P, rel=1e-3)
+    a = np.sqrt(4 * P * R / np.pi / (E / (1 - nu**2) / 2))
+    assert found["pressure"].max() == pytest.approx(2 * P / np.pi / a, rel=0.01)
+    second = (found["pressure"] * found["area"] * found["x"] ** 2).sum()
+    assert np.sqrt(4 * second / P) == pytest.approx(a, rel=0.02)  # a^2 / 4 of the half ellipse
+
+
+def rolled(friction: float) -> tuple[list[Result], Result]:
+    """A disc of radius 2, pressed 0.1 mm and rolled 1 mm over a block; every step."""
+    R, d, way = 2.0, 0.1, 1.0
+    block = Mesh.rectangle(8, 2, cells=(20, 4), order=2).map(lambda x: x - [4, 2])
+    mesh = Mesh.union(disc=lower_disc(12, R, 2, rate=0), block=block)
+    study = Study(mesh)
+    study.add("body", elastic, **RUBBER)
+    study.contact("disc:bottom", "block:top", friction=friction)
+    study.fix("block:bottom", u_x=0, u_y=0)
+
+    def motion(x: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        done = way * max(t - 1, 0)
+        X, c, s = x - [0, R], np.cos(done / (R - d / 2)), np.sin(done / (R - d / 2))
+        along = c * X[:, 0] + s * X[:, 1] - X[:, 0] + done - way / 2
+        return along, c * X[:, 1] - s * X[:, 0] - X[:, 1] - d * min(t, 1)
+
+    study.fix("disc:top", u_x=lambda x, t: motion(x, t)[0], u_y=lambda x, t: motion(x, t)[1])
+    steps: list[Result] = []
+    pressed = study.solve(steps=3)
+    study.solve(steps=12, start=pressed, until=2.0, on_step=steps.append)
+    return steps, pressed
+
+
+def test_a_disc_rolls_without_chatter() -> None:
+    steps, _ = rolled(0.3)
+    reaction = np.array([r.reaction("block:bottom")["u_y"] for r in steps])
+    trend = np.polyval(np.polyfit(np.arange(len(reaction)), reaction, 2), np.arange(len(reaction)))
+    assert np.abs(reaction - trend).max() < 0.01 * reaction.mean()
+    assert max(r.iterations for r in steps) <= 6
+
+
+def ironed(friction: float) -> list[Result]:
+    """A stiff die of radius 0.75, pressed 0.2 mm into a block and drawn along it by 1.5 mm."""
+    die = lower_disc(8, 0.75, 1, rate=0)
+    block = Mesh.rectangle(5, 1.5, cells=(25, 6)).map(lambda x: x - [2, 1.5])
+    study = Study(Mesh.union(die=die, block=block))
+    study.add("die", elastic, cells="die", mu=100.0, K=500.0)
+    study.add("block", elastic, cells="block", **RUBBER)
+    study.contact("block:top", "die:bottom", friction=friction)
+    study.fix("block:bottom", u_x=0, u_y=0)
+    study.fix(
+        "die:top",
+        u_x=lambda x, t: 1.5 * max(t - 1, 0) + 0 * x[:, 0],
+        u_y=lambda x, t: -0.2 * min(t, 1),
+    )
+    steps: list[Result] = []
+    pressed = study.solve(steps=3)
+    study.solve(steps=12, start=pressed, until=2.0, on_step=steps.append)
+    return steps
+
+
+def test_ironing_slips_at_the_coefficient_of_friction() -> None:
+    steps = ironed(0.3)
+    for result in steps[4:]:
+        found = result.fields("contact")
+        p, q = ((found[n] * found["area"]).sum() for n in ("pressure", "shear"))
+        assert abs(q) == pytest.approx(0.3 * p, rel=1e-6)
+    pull = [r.reaction("block:bottom") for r in steps]
+    assert pull[-1]["u_x"] < -0.2 * pull[-1]["u_y"]
+
+
+def test_friction_holds_what_it_can_hold() -> None:
+    """Below the limit nothing slips: the blocks shear as one."""
+    study = stacked(1, 1, friction=0.5)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.fix(
+        "upper:top",
+        u_x=lambda x, t: 0.02 * max(t - 1, 0) + 0 * x[:, 0],
+        u_y=lambda x, t: -0.2 * min(t, 1) + 0 * x[:, 0],
+    )
+    pressed = study.solve()
+    sheared = study.solve(start=pressed, until=2.0)
+    lower, upper = (sheared.at((0.5, y))["u_x"] for y in (1.999, 2.001))
+    assert lower == pytest.approx(upper, abs=1e-4)
+    assert lower > 0.005
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_gasket_is_pressed_until_it_touches_itself(order: int) -> None:
+    study = Study(gasket(2, order))
+    study.add("body", elastic, **RUBBER)
+    study.contact("boundary")
+    study.fix("upper", u_x=0, u_y=-0.5)
+    study.fix("lower", u_x=0, u_y=0.5)
+    steps: list[Result] = []
+    study.solve(steps=10, on_step=steps.append)
+    found = [r.fields("contact") for r in steps]
+    assert found[2]["pressure"].max() < 1e-9  # not yet, nor at the corners of the arms
+    pressed = found[-1]["pressure"] > 0.05
+    assert pressed.sum() > 10
+    x, y = (found[-1][n][pressed] for n in "xy")
+    assert (x > 0.1).any()
+    assert (x < -0.1).any()
+    assert np.abs(y).max() < 0.2  # between the arms, on either side
+
+
+def test_misspelt_names_are_told_in_one_line() -> None:
+    mesh = Mesh.union(
+        disc=Mesh.rectangle(1, 1, cells=(1, 1)), block=Mesh.rectangle(1, 1, cells=(1, 1))
+    )
+    study = Study(mesh)
+    study.add("body", elastic, **RUBBER)
+    with pytest.raises(
+        MeshError, match=re.escape("no side 'disk:bottom' (did you mean 'disc:bottom'?)")
+    ):
+        study.contact("disk:bottom", "block:top")
+    with pytest.raises(StudyError, match=re.escape("friction = -0.1, must be at least 0")):
+        study.contact("disc:bottom", "block:top", friction=-0.1)
+    study.contact("disc:bottom", "block:top", of=("v_x", "v_y"))
+    with pytest.raises(StudyError, match=re.escape("no unknown 'v_x'")):
+        study.solve()
+    with pytest.raises(StudyError, match="the name is taken"):
+        study.contact("disc:bottom", "block:top")
+
+
+def test_a_union_has_the_names_of_its_parts() -> None:
+    disc = Mesh.rectangle(1, 1, cells=(2, 1)).with_group("left", lambda x: x[:, 0] < 0.5)
+    block = Mesh.rectangle(2, 1, cells=(3, 2), shape="triangle")
+    mesh = Mesh.union(disc=disc, block=block)
+    assert len(mesh.points) == 6 + 12
+    assert set(mesh.groups) == {"disc", "disc:left", "block"}
+    assert {"disc:bottom", "disc:boundary", "block:top"} <= set(mesh.sides)
+    assert mesh.nodes("block:bottom").min() >= 6
+    assert mesh.points[mesh.nodes("block:right")][:, 0].tolist() == [2.0] * 3
+    with pytest.raises(MeshError, match="one number of coordinates"):
+        Mesh.union(disc=disc, bar=Mesh.line(1, cells=1))
+    with pytest.raises(MeshError, match="disc is str"):
+        Mesh.union(disc="disc")  # type: ignore[arg-type]
+
+
+def test_how_thick_a_body_is() -> None:
+    mesh = Mesh.rectangle(4, 1, cells=(8, 2))
+    bottom = mesh.faces("bottom")["line2"]
+    assert thickness(mesh.points, mesh.boundary, bottom).tolist() == [1.0] * 8
+    radii = inner_radii(mesh.points, mesh.boundary, bottom)
+    assert sorted(radii.round(9))[:2] == [0.25, 0.25]  # towards the corners
+    assert radii.max() == pytest.approx(0.5)
+
+
+def test_chains_are_put_in_order() -> None:
+    lines = np.array([[3, 4], [0, 1], [1, 2], [4, 3], [2, 5]])
+    assert in_chains(lines).tolist() == [[0, 1], [1, 2], [2, 5], [3, 4], [4, 3]]
