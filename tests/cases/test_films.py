@@ -13,10 +13,10 @@ from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.adaptation import FITS, Adaptation, Adapted
 from softehl.cases.seal.solve.carried import Carrier
-from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.method import DryContact, run
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.solve.placement import film_layout, misfit
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
@@ -60,11 +60,11 @@ def a_film(found: Film | NoFilm) -> Film:
 
 
 def solver(dry: DryContact, system: Any = None) -> FilmSolver:
-    return FilmSolver(system or dry.system, dry.newton, dry.observer, dry.offset)
+    return dry.films.on(system or dry.system)
 
 
 def adaptation(p: ORing, dry: DryContact) -> Adaptation:
-    return Adaptation(p, dry.loading, dry.newton, dry.observer, dry.offset)
+    return Adaptation(p, dry.solver, dry.films)
 
 
 def gap(film: Film) -> Array:
@@ -109,8 +109,7 @@ def test_a_film_that_is_carried_is_that_from_the_contact_of_its_mesh(
     new = build_system(P, film_layout(film.system, film.x, film.squeezing.scales.thickness))
     carried = adaptation(P, dry)._carried(film, new)
     assert isinstance(carried, Film)
-    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
-    contact = route.loading.carried(dry.system, dry.x, new)
+    contact = ContactSolver(PathDriver(Silent())).from_mesh(dry.system, dry.x, new)
     assert not isinstance(contact, StageFailed)
     own = a_film(solver(dry, new).from_contact("out", 400.0, contact[1]))
     assert gap(carried) == pytest.approx(gap(own), rel=1e-6)

@@ -9,6 +9,7 @@ import pytest
 
 from softehl.cases.seal.equations.system import DISPLACEMENT
 from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact import OFFSET
 from softehl.cases.seal.solve.film_correctors import FilmCorrectors
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.method import DryContact
@@ -64,7 +65,7 @@ def test_pressures_of_the_film_add_up_to_the_force_of_the_contact(
     z0 = z[system.dam]  # half of a segment beyond which there is no sealed pressure
     low = 0.5 * (z[system.dam - 1] + z0) + 0.5 * (z0 - z[system.dam - 1])
     pressing = -float((system.rod_multipliers(x) * system.rod_areas).sum())
-    r = system.rod_radius + dry.offset
+    r = system.rod_radius + OFFSET
     force = pressing + 3.0 * 2.0 * np.pi * r * (low - z[0])
     system.rod_multipliers(x)[:] *= share
     rows = pressed_film(system, x, 3.0)[system.pressure_dofs()]

@@ -7,20 +7,18 @@ estimated from the same film on a coarser mesh of the same spacing (`states.esti
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.carried import Carrier
+from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
-from softehl.cases.seal.solve.loading import Loading
 from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.solve.placement import film_layout, misfit
 from softehl.cases.seal.states.estimate import coarser_density, system_at
-from softehl.cases.seal.states.state import Observer, StageRecord
 from softehl.cases.seal.states.verdict import FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.solve.newton import Newton
 
 FITS = 2.2
 """Segments that a film may ask for in the place of one. Where it asked for at most three, h*
@@ -53,16 +51,12 @@ class Adapted:
 class Adaptation:
     """Makes meshes for films.
 
-    p: the case, whose density they have. loading: carries contact to them. newton, observer,
-    offset: as of `FilmSolver`.
+    p: the case, whose density they have. contacts, films: solve for either on them.
     """
 
     p: ORing
-    loading: Loading
-    newton: Newton
-    observer: Observer
-    offset: float
-    records: list[StageRecord] = field(default_factory=list)
+    contacts: ContactSolver
+    films: FilmSolver
 
     def adapted(self, found: Film | NoFilm, last: Sequence[Adapted] = ()) -> Adapted | NoFilm:
         """A film on a mesh that fits it, from that on another mesh.
@@ -108,7 +102,7 @@ class Adaptation:
             return None
         before = [a.coarser for a in last if a.coarser and a.film.system is film.system]
         if before:
-            near = self._solver(before[-1].system).from_neighbour(before, film.loads.speed)
+            near = self.films.on(before[-1].system).from_neighbour(before, film.loads.speed)
             if isinstance(near, Film):
                 return near
         try:
@@ -125,10 +119,10 @@ class Adaptation:
         """
         assert found.begun is not None
         squeezing, now = found.begun
-        dry = self.loading.carried(squeezing.system, squeezing.dry, system)
+        dry = self.contacts.from_mesh(squeezing.system, squeezing.dry, system)
         if isinstance(dry, StageFailed):
             return None
-        solver, again = self._solver(system), None
+        solver, again = self.films.on(system), None
         if isinstance(found, Film):
             carrier = Carrier(squeezing.system, system, (squeezing.dry, dry[1]))
             start, pressures = replace(now, x=carrier.state(now.x)), carrier.pressures(now.x)
@@ -137,6 +131,3 @@ class Adaptation:
         if isinstance(again, Film):
             return again
         return solver.from_contact(squeezing.film.stroke, squeezing.film.speed, dry[1])
-
-    def _solver(self, system: SealSystem) -> FilmSolver:
-        return FilmSolver(system, self.newton, self.observer, self.offset, self.records)

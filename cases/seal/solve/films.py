@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, inf, log
 
@@ -18,14 +18,15 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.film_correctors import FilmCorrectors
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.solve.squeezing import InletScales, Squeezing, film_loads, pressed_film
 from softehl.cases.seal.states.results import film_numbers
-from softehl.cases.seal.states.state import Observer, StageRecord, place
+from softehl.cases.seal.states.state import StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.homotopy import Continuation
-from softehl.runtime.solve.newton import Newton, NonlinearProblem
+from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
 from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.solve.steps import StepRule
@@ -100,19 +101,20 @@ class NoFilm:
     begun: tuple[Squeezing, Moment] | None = None
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class FilmSolver:
     """Films on the mesh of a system.
 
-    newton: finishes what the modified iterations do not, and holds the linear solver. offset: of
-    the rod in the contact state, mm. records: cost of each film; it grows.
+    driver: its Newton's method finishes what the modified iterations do not, and holds the linear
+    solver; its records of the cost of each film grow.
     """
 
     system: SealSystem
-    newton: Newton
-    observer: Observer
-    offset: float
-    records: list[StageRecord] = field(default_factory=list)
+    driver: PathDriver
+
+    def on(self, system: SealSystem) -> FilmSolver:
+        """The same on the mesh of another system."""
+        return replace(self, system=system)
 
     def from_contact(self, stroke: Stroke, speed: float, x: Array) -> Film | NoFilm:
         """The film at |U|, mm/s, squeezed out from the contact state x (n,)."""
@@ -122,9 +124,9 @@ class FilmSolver:
             return NoFilm(stroke, speed, Status.DIVERGED, words)
         film = film_loads(self.system, stroke, speed, x)
         layer, moment = film_layer(self.system, x), self.system.moment(x)
-        squeezing = Squeezing(self.system, layer, film, scales, x, self.offset, moment)
+        squeezing = Squeezing(self.system, layer, film, scales, x, moment)
         pressed = pressed_film(self.system, x, film.sealed_pressure)
-        correctors = FilmCorrectors.of(self.system, self.newton)
+        correctors = FilmCorrectors.of(self.system, self.driver.newton)
         return self._followed(squeezing, Moment(pressed, squeezing.first), correctors)
 
     def from_neighbour(self, last: Sequence[Film], speed: float) -> Film | NoFilm:
@@ -161,7 +163,7 @@ class FilmSolver:
 
         pressures: (Q,) of the elements.
         """
-        correctors, x = FilmCorrectors.of(self.system, self.newton), start.x
+        correctors, x = FilmCorrectors.of(self.system, self.driver.newton), start.x
         with self._told(carried.film) as told:
             problem = self.system.film_problem(carried.film).since(x)
             found = told(correctors.whole.steady(problem, x, pressures, _AT_ONCE))
@@ -209,11 +211,11 @@ class FilmSolver:
         """Tell the observer of solutions, and keep a record of them."""
         name, begin, found = f"film at {film.rod_speed:+g} mm/s", time.perf_counter(), []
         p_s, stroke = film.sealed_pressure, film.stroke
-        self.observer.stage(name, sealed_pressure=p_s, stroke=stroke, steps=None)
+        self.driver.observer.stage(name, sealed_pressure=p_s, stroke=stroke, steps=None)
 
         def told(solution: Solution) -> Solution:
             found.append(solution.forget())
-            self.observer.step(
+            self.driver.observer.step(
                 label=name,
                 parameter=float(len(found)),
                 iterations=solution.iterations,
@@ -225,7 +227,7 @@ class FilmSolver:
         try:
             yield told
         finally:
-            self.records.append(
+            self.driver.records.append(
                 StageRecord(
                     name=name,
                     seconds=time.perf_counter() - begin,

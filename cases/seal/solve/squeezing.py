@@ -23,7 +23,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import DISPLACEMENT
-from softehl.cases.seal.solve.contact import held_moment, held_place
+from softehl.cases.seal.solve.contact import OFFSET, held_moment, held_place
 from softehl.cases.seal.solve.grading import MULTIPLE, film_thickness, inlet_time
 from softehl.cases.seal.states.contacts import Edge, contact_edges
 from softehl.runtime.arrays import Array
@@ -79,9 +79,9 @@ def film_loads(system: SealSystem, stroke: Stroke, speed: float, x: Array) -> Fi
 class Squeezing:
     """A film that is squeezed out; satisfies `Transient`, its time in units of T.
 
-    film: loads of the steady film. dry: (n,) the contact state on its mesh. offset: of the rod in
-    that, mm. moment: that holds the rotation of the section at the start, N mm; it fades as the
-    shear stress begins to act, where the section is free to roll.
+    film: loads of the steady film. dry: (n,) the contact state on its mesh. moment: that holds the
+    rotation of the section at the start, N mm; it fades as the shear stress begins to act, where
+    the section is free to roll.
     """
 
     system: SealSystem
@@ -89,7 +89,6 @@ class Squeezing:
     film: FilmLoads
     scales: InletScales
     dry: Array
-    offset: float
     moment: float = 0.0
 
     def at(self, speed: float) -> Squeezing:
@@ -101,7 +100,7 @@ class Squeezing:
         """The same film on the mesh of another system; x: (n,) carried to it, dry: contact."""
         film = replace(
             self.film,
-            gap=system.arc_film(x)[1] + self.offset,
+            gap=system.arc_film(x)[1] + OFFSET,
             entrance=0.0,
         )
         return replace(self, system=system, layer=film_layer(system, x), film=film, dry=dry)
@@ -131,8 +130,7 @@ class Squeezing:
     @property
     def first(self) -> float:
         """Length of the first step from the contact state; see `FIRST`."""
-        thicker = self.scales.thickness / self.offset if self.offset else 1.0
-        return float(FIRST * min(1.0, thicker) ** EXPONENT)
+        return float(FIRST * min(1.0, self.scales.thickness / OFFSET) ** EXPONENT)
 
     def _masses(self, x: Array) -> csc_array[np.float64]:
         """Rates of what the film holds, by the local time steps; see `gap_masses`."""
