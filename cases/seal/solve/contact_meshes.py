@@ -63,7 +63,7 @@ class ContactMeshes:
         state: State | StageFailed = x if isinstance(x, StageFailed) else (uniform, x)
         for number in range(1, PASSES):
             # the edges are seen only roughly: no reason for many segments
-            state = self._next(state, _at(p, coarse), number, most=0)
+            state = self._next(state, _at(p, coarse if number == 1 else guide), number, most=0)
         state = self._sealed(_at(p, guide), state)
         return state if isinstance(state, StageFailed) else self._finer(*state, p.density)
 
