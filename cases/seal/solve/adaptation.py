@@ -101,15 +101,17 @@ class Adaptation:
         if not (p.error_estimate and p.mesh == "graded"):
             return None
         before = [a.coarser for a in last if a.coarser and a.film.system is film.system]
+        found: Film | NoFilm | None = None
         if before:
-            near = self.films.on(before[-1].system).from_neighbour(before, film.loads.speed)
-            if isinstance(near, Film):
-                return near
-        try:
-            system = system_at(film.system, coarser_density(p.density))
-        except MeshError:
-            return None  # too coarse for the corners of a section
-        found = self._carried(film, system)
+            system = before[-1].system
+            found = self.films.on(system).from_neighbour(before, film.loads.speed)
+        else:
+            try:
+                system = system_at(film.system, coarser_density(p.density))
+            except MeshError:
+                return None  # too coarse for the corners of a section
+        if not isinstance(found, Film):
+            found = self._carried(film, system)
         return found if isinstance(found, Film) else None
 
     def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:
