@@ -312,10 +312,10 @@ FAULTS = (
         "tests/cases/test_contact_store.py",
     ),
     Fault(
-        "cases/seal/solve/squeezing.py",
+        "cases/seal/solve/squeeze_film.py",
         "rate=-1.0 / (tau",
         "rate=1.0 / (tau",
-        "tests/cases/test_squeezing.py",
+        "tests/cases/test_squeeze_film.py",
     ),
     Fault(
         "cases/seal/equations/loads.py",

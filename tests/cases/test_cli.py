@@ -27,6 +27,7 @@ from softehl.cases.oring import ORingCase
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.report import PICTURES
 from softehl.cases.seal.solve.method import run as solve_really
+from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.state import (
     COLLAPSED,
     UNCERTAIN,
@@ -39,7 +40,6 @@ from softehl.cases.seal.states.state import (
     StageRecord,
     place,
 )
-from softehl.cases.seal.states.telling import Teller
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.kernels import MissingKernelsError
 from softehl.runtime.library import library_of
@@ -80,7 +80,7 @@ class Fake(ORingCase):
     def solve(
         self, parameters: ORing, observer: harness.Observer, shared: Path | None
     ) -> harness.Outcome:
-        return self.solver(parameters, Teller(observer))
+        return self.solver(parameters, ObserverAdapter(observer))
 
 
 # --- a case that answers at once ---------------------------------------------------------------

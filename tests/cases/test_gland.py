@@ -16,7 +16,7 @@ from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.failure import explained, without_films
 from softehl.cases.seal.solve.films import NoFilm
-from softehl.cases.seal.solve.grading import film_thickness
+from softehl.cases.seal.solve.inlet import film_thickness
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import unsealed

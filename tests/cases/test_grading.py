@@ -12,9 +12,9 @@ from softehl.cases.seal.section import round_layout
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.round_layout import MOST_LAYERS, STEEPEST_GROWTH, RoundLayout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.solve.contact_layout import graded_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.grading import graded_layout
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contacts import contact_edges

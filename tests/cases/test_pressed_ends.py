@@ -12,9 +12,9 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.section.round_layout import RoundLayout
+from softehl.cases.seal.solve.contact_layout import placed_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
-from softehl.cases.seal.solve.grading import placed_layout
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import contact_pressure, unsealed
 from softehl.cases.seal.states.state import Silent

@@ -13,7 +13,7 @@ from softehl.cases.seal.equations.loads import ContactLoads
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.rubbers.regions import PRESETS
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.grading import inlet_length
+from softehl.cases.seal.solve.inlet import inlet_length
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import contact_pressure
 from softehl.cases.seal.states.state import Silent

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.solve.carried import Carrier
 from softehl.cases.seal.solve.contact_solver import ContactSolver
+from softehl.cases.seal.solve.film_layout import film_layout, misfit
+from softehl.cases.seal.solve.film_transfer import FilmTransfer
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.path import StageFailed
-from softehl.cases.seal.solve.placement import film_layout, misfit
 from softehl.cases.seal.states.estimate import coarser_density, system_at
 from softehl.cases.seal.states.verdict import FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
@@ -80,7 +80,7 @@ class Adaptation:
         if p.mesh != "graded":
             return True
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
-        thickness = film.squeezing.scales.thickness
+        thickness = film.squeeze_film.scales.thickness
         shown = numbers.inlet_segments >= fewest or numbers.touching
         return shown and misfit(film.system, film.x, thickness, p.density) <= FITS
 
@@ -88,8 +88,8 @@ class Adaptation:
         """The film on the mesh that is made for it; None where there is none."""
         if found.begun is None or self.p.mesh != "graded":
             return None
-        squeezing, now = found.begun
-        layout = film_layout(squeezing.system, now.x, squeezing.scales.thickness)
+        squeeze_film, now = found.begun
+        layout = film_layout(squeeze_film.system, now.x, squeeze_film.scales.thickness)
         try:
             return self._carried(found, build_system(self.p, layout))
         except MeshError:
@@ -120,16 +120,16 @@ class Adaptation:
         Where none was found, or does not lead on, it is squeezed out anew.
         """
         assert found.begun is not None
-        squeezing, now = found.begun
-        dry = self.contacts.from_mesh(squeezing.system, squeezing.dry, system)
+        squeeze_film, now = found.begun
+        dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)
         if isinstance(dry, StageFailed):
             return None
         solver, again = self.films.on(system), None
         if isinstance(found, Film):
-            carrier = Carrier(squeezing.system, system, (squeezing.dry, dry[1]))
-            start, pressures = replace(now, x=carrier.state(now.x)), carrier.pressures(now.x)
-            carried = squeezing.carried(system, start.x, dry[1])
+            transfer = FilmTransfer(squeeze_film.system, system, (squeeze_film.dry, dry[1]))
+            start, pressures = replace(now, x=transfer.state(now.x)), transfer.pressures(now.x)
+            carried = squeeze_film.carried(system, start.x, dry[1])
             again = solver.from_film(carried, start, pressures)
         if isinstance(again, Film):
             return again
-        return solver.from_contact(squeezing.film.stroke, squeezing.film.speed, dry[1])
+        return solver.from_contact(squeeze_film.film.stroke, squeeze_film.film.speed, dry[1])

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact_layout import MOST_SEGMENTS, graded_layout, placed_layout
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
 from softehl.cases.seal.solve.contact_store import ContactStore, stored_contact
-from softehl.cases.seal.solve.grading import MOST_SEGMENTS, graded_layout, placed_layout
 from softehl.cases.seal.solve.path import Followed, StageFailed
 from softehl.cases.seal.states.contact_results import unsealed
 

@@ -20,8 +20,8 @@ from softehl.cases.seal.solve.contact import (
     path_corrector,
     release_stage,
 )
+from softehl.cases.seal.solve.contact_transfer import carried_contact
 from softehl.cases.seal.solve.path import Followed, PathDriver, Stage, StageFailed
-from softehl.cases.seal.solve.transfer import carried_contact
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Point
 

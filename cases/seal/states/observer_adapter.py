@@ -22,7 +22,7 @@ from softehl.runtime.io import number_text, read_columns, read_vtu
 
 
 @dataclass(frozen=True)
-class Teller(Observer):
+class ObserverAdapter(Observer):
     """Passes on what a run tells to an observer of the harness."""
 
     to: harness.Observer
