@@ -9,6 +9,8 @@ it stays held, as friction on the housing would hold it, and the force of that i
 
 from __future__ import annotations
 
+import numpy as np
+
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import ContactLoads
 from softehl.cases.seal.equations.system import BORE, ROD
@@ -24,6 +26,10 @@ from softehl.runtime.solve.steps import StepRule
 
 OFFSET = 0.01
 """Distance of the rod in contact, mm."""
+
+TOUCH = 1e-4
+"""How far the section is moved into the wall before the pressure holds it there, in section
+diameters: enough to tell which nodes touch."""
 
 STEPS = StepRule(0.05, 3e-4, 0.3)
 """Steps of the way of the rod, of the pressure over the shear modulus, of what friction takes."""
@@ -87,15 +93,26 @@ def approach_stage(system: SealSystem) -> Stage:
     )
 
 
-def at_air_wall(system: SealSystem, x: Array) -> Array:
-    """The section x (n,), held in the groove, moved until it touches the wall of the air side.
+def at_air_wall(system: SealSystem, x: Array) -> tuple[Array, float]:
+    """The section x (n,), held in the groove, moved to the wall of the air side; how far, mm.
 
-    It fulfils the equations at its new place: rod and housing are cylinders.
+    It fulfils the equations, but for those of the wall: rod and housing are cylinders.
     """
-    y = x.copy()
-    shift = system.parameters.air_wall - float(system.deformed(x)[:, 0].max())
+    p, y, (z, r) = system.parameters, x.copy(), system.deformed(x).T
+    shift = float((_air_wall(p, r) - z).min()) + TOUCH * p.section_diameter
     system.displacements(y)[:, 0] += shift
-    return y
+    return y, shift
+
+
+def _air_wall(p: ORing, r: Array) -> Array:
+    """Where the wall of the air side is at radii (n,), mm: inf in a gap below its rounded edge."""
+    wall = np.full(len(r), p.air_wall)
+    if p.opens:
+        fillet = p.corner_fillet
+        below = np.maximum(0.5 * p.rod_diameter + p.extrusion_gap + fillet - r, 0.0)
+        wall += fillet - np.sqrt(np.maximum(fillet**2 - below**2, 0.0))
+        wall[below > fillet] = np.inf
+    return wall
 
 
 def release_stage(system: SealSystem, x: Array) -> Stage:
@@ -119,12 +136,21 @@ def release_stage(system: SealSystem, x: Array) -> Stage:
     )
 
 
-def load_stage(system: SealSystem, begin: float = 0.0) -> Stage:
-    """Last stage: the sealed pressure rises, from where it began before, MPa."""
+def load_stage(system: SealSystem, begin: float = 0.0, place: float | None = None) -> Stage:
+    """Last stage: the sealed pressure rises, from where it began before, MPa.
+
+    place: where the section is held as long as there is no pressure, mm.
+    """
     p = system.parameters
+
+    def at(p_s: float) -> Problem:
+        if p_s > 0.0 or place is None:
+            return contact_problem(system, p_s)
+        return system.contact_problem(ContactLoads(0.0, {ROD: OFFSET}, place))
+
     return Stage(
         name="sealed pressure",
-        problem_at=lambda p_s: contact_problem(system, p_s),
+        problem_at=at,
         start=begin,
         stop=p.sealed_pressure,
         steps=STEPS.scaled(p.shear_modulus),

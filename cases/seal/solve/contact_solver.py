@@ -43,11 +43,12 @@ class ContactSolver:
         x = self._follow(system, approach_stage(system), system.at_rest())
         if isinstance(x, StageFailed) or held_place(system.parameters) is not None:
             return x
+        place = None
         if system.parameters.sealed_pressure > 0.0:
-            x = at_air_wall(system, x)
+            x, place = at_air_wall(system, x)
         if system.parameters.rubs:
-            x = self._follow(system, release_stage(system, x), x)
-        return x if isinstance(x, StageFailed) else self._loaded(system, x)
+            x, place = self._follow(system, release_stage(system, x), x), None
+        return x if isinstance(x, StageFailed) else self._loaded(system, x, place=place)
 
     def from_mesh(
         self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
@@ -70,14 +71,16 @@ class ContactSolver:
         stage, start = carried_contact(state.system, new, state.x, state.pressure, name)
         return self.driver.follow(stage, start)
 
-    def _loaded(self, system: SealSystem, x: Array, begin: float = 0.0) -> Followed:
-        """From the section x (n,) under a pressure, MPa, to the sealed pressure."""
+    def _loaded(
+        self, system: SealSystem, x: Array, begin: float = 0.0, place: float | None = None
+    ) -> Followed:
+        """From the section x (n,) to the sealed pressure; begin, place: as of `load_stage`."""
         self.checkpoints.begin(begin)
 
         def keep(point: Point) -> None:
             self.checkpoints.keep(Checkpoint(system, point.parameter, point.solution.x))
 
-        return self._follow(system, replace(load_stage(system, begin), on_point=keep), x)
+        return self._follow(system, replace(load_stage(system, begin, place), on_point=keep), x)
 
     def _follow(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
         """To the end of a stage, roughly, and there as exactly as any state."""
