@@ -43,11 +43,11 @@ def watched(clock: Clock) -> Iterator[None]:
     from softehl.cases.harness.session import Reporter
     from softehl.cases.oring import ORingCase
     from softehl.cases.seal.solve.adaptation import Adaptation
-    from softehl.cases.seal.solve.contact_route import ContactRoute
+    from softehl.cases.seal.solve.contact_meshes import ContactMeshes
     from softehl.cases.seal.solve.method import DryContact
 
     watched = [
-        (ContactRoute, "contact", lambda *_: "contact"),
+        (ContactMeshes, "contact", lambda *_: "contact"),
         (DryContact, "adapted", lambda *_: "films"),
         (Adaptation, "_coarser", lambda *_: "coarser films"),
         (Reporter, "state", lambda *_: "files"),

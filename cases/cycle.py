@@ -19,12 +19,12 @@ from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.seal.cycle.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.gland.assumed import assumed
 from softehl.cases.seal.gland.headings import CYCLE
-from softehl.cases.seal.gland.idle import idle
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.rubbers.rubber import outside
 from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
 from softehl.cases.seal.gland.trade.said import understood
+from softehl.cases.seal.gland.unused_keys import unused_keys
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.states.answer import far, leaks
 from softehl.runtime.arrays import Array
@@ -214,7 +214,7 @@ class CycleCase(Case[Cycle, CycleRow]):
     def warnings(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
         highest = parameters.path.pressure.largest
-        words = [*beyond_reach(parameters, highest), *idle(parameters), *unused(parameters)]
+        words = [*beyond_reach(parameters, highest), *unused_keys(parameters), *unused(parameters)]
         words += outside(parameters.compound, parameters.temperature)
         if parameters.rough:
             return words

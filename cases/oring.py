@@ -11,22 +11,22 @@ from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.assumed import assumed
-from softehl.cases.seal.gland.idle import idle
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.rubbers.rubber import outside, soft
 from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
 from softehl.cases.seal.gland.trade.said import understood
+from softehl.cases.seal.gland.unused_keys import unused_keys
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.states import plan
 from softehl.cases.seal.states.answer import answer
 from softehl.cases.seal.states.leakage import net_leakage
+from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.sensitivity_table import resolved
 from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.seal.states.state import Observer as SealObserver
 from softehl.cases.seal.states.state import Outcome as SealOutcome
-from softehl.cases.seal.states.telling import Teller
 
 
 class ORingCase(Case[ORing, FilmRow]):
@@ -48,7 +48,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def solve(self, parameters: ORing, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`; runs of one section share their contact states."""
-        return run_oring(parameters, Teller(observer), shared)
+        return run_oring(parameters, ObserverAdapter(observer), shared)
 
     def requested(self, parameters: ORing) -> list[float]:
         """See :class:`Case`."""
@@ -97,7 +97,7 @@ class ORingCase(Case[ORing, FilmRow]):
         gland = p.rod_diameter, p.housing_diameter, p.groove_width
         advised = catalogue.warnings(p.free_ring, *gland)
         unusual = [*soft(p), *outside(p.compound, p.temperature), *advised]
-        return [*beyond_reach(p, p.sealed_pressure), *idle(p), *unusual]
+        return [*beyond_reach(p, p.sealed_pressure), *unused_keys(p), *unusual]
 
     def answer(self, parameters: ORing, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""

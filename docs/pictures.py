@@ -22,7 +22,7 @@ from softehl.cases.paper.states import PAPER
 from softehl.cases.seal.report import PICTURES, style, write_plots
 from softehl.cases.seal.report.curve import plain_ticks
 from softehl.cases.seal.report.section import Scale, View, draw_view
-from softehl.cases.seal.states.telling import read_profile, read_section
+from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 
 SIZE = (2.5, 2.3)
 """Of each picture, inches: four stand side by side."""

@@ -147,7 +147,8 @@ class _Path:
     def __post_init__(self) -> None:
         basis, w = self.cell.fluctuations, self.x - self._moved(self.before)
         counts: Array = np.asarray(basis.sum(axis=0)).ravel()
-        self.z = np.concatenate([np.asarray(basis.T @ w) / counts, (self.before - self._unit)[self.free]])
+        opened = (self.before - self._unit)[self.free]
+        self.z = np.concatenate([np.asarray(basis.T @ w) / counts, opened])
 
     @property
     def _unit(self) -> Array:

@@ -18,14 +18,12 @@ from softehl.runtime.solve.solution import Status
 class State:
     """A state that was asked for: its row of curve.csv and the contents of the row's files.
 
-    advice: what to do about a row that is no result. final: whether no better one of the row
-    follows in this run.
+    advice: what to do about a row that is no result.
     """
 
     row: Row
     contents: Sequence[Content] = ()
     advice: str = ""
-    final: bool = True
 
 
 @dataclass(frozen=True)

@@ -155,12 +155,9 @@ class RunRecord:
             write_content(self.folder / name, content)
 
     def state(self, state: State) -> Row:
-        """Write a state where it belongs and the run record after it.
-
-        One that is not final is kept with those that are no results: a resumed run tries it again.
-        """
+        """Write a state where it belongs and the run record after it."""
         self.begin()
-        result = state.row.usable and state.final
+        result = state.row.usable
         row: Row = (self.curve if result else self.rejected).add(state)
         if result:
             self.rejected.drop(row.key)

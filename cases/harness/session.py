@@ -103,8 +103,7 @@ class Reporter(Observer):
         """See :class:`Observer`."""
         with writing(self.record.folder):
             row = self.record.state(state)
-        if state.final:
-            self.display.state(row)
+        self.display.state(row)
 
     def files(self, contents: Mapping[str, Content]) -> None:
         """See :class:`Observer`."""

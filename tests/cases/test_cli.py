@@ -27,6 +27,7 @@ from softehl.cases.oring import ORingCase
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.report import PICTURES
 from softehl.cases.seal.solve.method import run as solve_really
+from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.state import (
     COLLAPSED,
     UNCERTAIN,
@@ -39,7 +40,6 @@ from softehl.cases.seal.states.state import (
     StageRecord,
     place,
 )
-from softehl.cases.seal.states.telling import Teller
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.kernels import MissingKernelsError
 from softehl.runtime.library import library_of
@@ -80,7 +80,7 @@ class Fake(ORingCase):
     def solve(
         self, parameters: ORing, observer: harness.Observer, shared: Path | None
     ) -> harness.Outcome:
-        return self.solver(parameters, Teller(observer))
+        return self.solver(parameters, ObserverAdapter(observer))
 
 
 # --- a case that answers at once ---------------------------------------------------------------
@@ -188,18 +188,6 @@ def solve_and_forget(parameters: ORing, observer: Observer) -> Outcome:
     """Claims convergence without having reached everything."""
     observer.film_state(film_state(parameters, max(parameters.speeds)))
     return outcome()
-
-
-def solve_and_better(parameters: ORing, observer: Observer) -> Outcome:
-    """A state that another mesh betters."""
-    observer.film_draft(film_state(parameters, max(parameters.speeds), UNCERTAIN))
-    return solve(parameters, observer)
-
-
-def solve_and_break_before_bettering(parameters: ORing, observer: Observer) -> Outcome:
-    """A state that another mesh may better, then an error in the program."""
-    observer.film_draft(film_state(parameters, max(parameters.speeds), UNCERTAIN))
-    raise ArithmeticError("broken")
 
 
 def solve_and_break(parameters: ORing, observer: Observer) -> Outcome:
@@ -575,27 +563,6 @@ def test_a_collapsed_film_is_no_result(here: Path, invoke: Invoke) -> None:
     assert [state["verdict"] for state in run_json(folder)["rejected"]] == [COLLAPSED]
     assert invoke(*arguments, "--resume")[0] == 0
     assert names(folder / "rejected") == set()
-
-
-def test_a_state_that_is_bettered_leaves_nothing(here: Path, invoke: Invoke) -> None:
-    code, out, _ = invoke("run", "oring", *FAST, "--set", "stroke=out", solver=solve_and_better)
-    folder = here / "results" / "oring"
-    assert (code, speeds(folder)) == (0, [400.0, 100.0])
-    assert not (folder / "rejected").exists()
-    assert not [line for line in out if UNCERTAIN in line]
-
-
-def test_a_state_that_was_to_be_bettered_is_kept(here: Path, invoke: Invoke) -> None:
-    arguments = ("run", "oring", *FAST, "--set", "stroke=out")
-    with pytest.raises(ArithmeticError, match="broken"):
-        invoke(*arguments, solver=solve_and_break_before_bettering)
-    folder = here / "results" / "oring"
-    assert (speeds(folder), speeds(folder / "rejected")) == ([], [400.0])
-    assert [state["verdict"] for state in run_json(folder)["rejected"]] == [UNCERTAIN]
-    assert (folder / "rejected" / "profile_1_400.csv").exists()
-    assert invoke(*arguments, "--resume")[0] == 0
-    assert speeds(folder) == [400.0, 100.0]
-    assert not (folder / "rejected").exists() or names(folder / "rejected") == set()
 
 
 # --- killed and resumed ------------------------------------------------------------------------

@@ -22,10 +22,9 @@ from softehl.cases.seal.solve.contact_store import (
     stored_contact,
 )
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.runtime.io import read_arrays, write_arrays
-from softehl.runtime.solve.newton import Newton
 
 Damage = Callable[[Path, np.random.Generator], None]
 """Stages of the path of the pressure: roughly on the way, then at its end."""
@@ -186,7 +185,7 @@ def test_a_second_curve_has_no_contact_path(solved: tuple[Path, Outcome], contac
 def test_a_state_holds_whatever_the_film_is(contacts: Path) -> None:
     def residual(of: ORing) -> float:
         system = build_system(of)
-        problem = contact_problem(system, PathSettings(), 0.5)
+        problem = contact_problem(system, 0.5)
         return problem.norm(problem.residual(ContactStore(contacts).read(system)))
 
     assert max(residual(case()), residual(case(**OTHER))) < 1e-8
@@ -266,7 +265,7 @@ def test_a_stale_state_is_corrected(contacts: Path) -> None:
     changed = build_system(case(mu_2=0.63))
     (path,) = contacts.iterdir()
     path.rename(contacts / f"{contact_key(changed.parameters)}.npz")
-    stage = stored_contact(changed, PathSettings(), Newton())
+    stage = stored_contact(changed)
     driver = PathDriver(Silent())
     assert not isinstance(driver.follow(stage, ContactStore(contacts).read(changed)), StageFailed)
     (record,) = driver.records

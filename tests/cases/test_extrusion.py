@@ -10,10 +10,10 @@ import pytest
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.contact import load_stage
-from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.contact_meshes import ContactMeshes
+from softehl.cases.seal.solve.contact_solver import ContactSolver, State
 from softehl.cases.seal.solve.failure import explained
-from softehl.cases.seal.solve.loading import State
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import contact_numbers
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.solve.solution import Branch, Status
@@ -22,7 +22,7 @@ from softehl.runtime.solve.solution import Branch, Status
 def found(**changes: Any) -> State:
     driver = PathDriver(Silent())
     p = ORing(**{"density": 1, "extrusion_gap": 0.1, **changes})
-    state = ContactRoute(PathSettings(), driver.follow).contact(p)
+    state = ContactMeshes(ContactSolver(driver)).contact(p)
     assert not isinstance(state, StageFailed), state.message
     return state
 
@@ -69,7 +69,7 @@ def test_the_mesh_is_fine_where_the_section_meets_the_edge() -> None:
 
 def test_a_run_that_ends_in_the_gap_says_so() -> None:
     p = ORing(density=1, extrusion_gap=0.05, corner_fillet=0.2, sealed_pressure=9.0)
-    stage = load_stage(build_system(p), PathSettings())
+    stage = load_stage(build_system(p))
     failed = StageFailed(stage, Branch((), Status.STEP_TOO_SMALL, ""))
     text = explained(failed, "contact", p)[1]
     for word in ("9 MPa", "gap of 0.05 mm", "fillet 0.2 mm", "backup = true"):

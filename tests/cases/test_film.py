@@ -13,7 +13,7 @@ from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve import film_correctors
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.squeezing import film_loads
+from softehl.cases.seal.solve.squeeze_film import film_loads
 from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layered

@@ -12,12 +12,12 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.adaptation import FITS, Adaptation, Adapted
-from softehl.cases.seal.solve.carried import Carrier
-from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.contact_solver import ContactSolver
+from softehl.cases.seal.solve.film_layout import film_layout, misfit
+from softehl.cases.seal.solve.film_transfer import FilmTransfer
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.method import DryContact, run
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
-from softehl.cases.seal.solve.placement import film_layout, misfit
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Status
@@ -60,11 +60,11 @@ def a_film(found: Film | NoFilm) -> Film:
 
 
 def solver(dry: DryContact, system: Any = None) -> FilmSolver:
-    return FilmSolver(system or dry.system, dry.newton, dry.observer, dry.offset)
+    return dry.films.on(system or dry.system)
 
 
 def adaptation(p: ORing, dry: DryContact) -> Adaptation:
-    return Adaptation(p, dry.loading, dry.newton, dry.observer, dry.offset)
+    return Adaptation(p, dry.solver, dry.films)
 
 
 def gap(film: Film) -> Array:
@@ -92,10 +92,10 @@ def test_a_film_that_goes_on_from_a_moment_is_the_same(
 ) -> None:
     """From its steady state, and from that of another speed."""
     film = films[100.0 if moment == "steady" else 800.0]
-    squeezing, start = film.begun
-    carrier = Carrier(film.system, film.system, (dry.x, dry.x))
-    at = squeezing if moment == "steady" else squeezing.at(100.0)
-    found = a_film(solver(dry).from_film(at, start, carrier.pressures(film.x)))
+    squeeze_film, start = film.begun
+    transfer = FilmTransfer(film.system, film.system, (dry.x, dry.x))
+    at = squeeze_film if moment == "steady" else squeeze_film.at(100.0)
+    found = a_film(solver(dry).from_film(at, start, transfer.pressures(film.x)))
     assert gap(found) == pytest.approx(gap(films[100.0]), rel=1e-6)
 
 
@@ -106,11 +106,10 @@ def test_a_film_that_is_carried_is_that_from_the_contact_of_its_mesh(
     dry: DryContact, films: dict[float, Film]
 ) -> None:
     film = films[400.0]
-    new = build_system(P, film_layout(film.system, film.x, film.squeezing.scales.thickness))
+    new = build_system(P, film_layout(film.system, film.x, film.squeeze_film.scales.thickness))
     carried = adaptation(P, dry)._carried(film, new)
     assert isinstance(carried, Film)
-    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
-    contact = route.loading.carried(dry.system, dry.x, new)
+    contact = ContactSolver(PathDriver(Silent())).from_mesh(dry.system, dry.x, new)
     assert not isinstance(contact, StageFailed)
     own = a_film(solver(dry, new).from_contact("out", 400.0, contact[1]))
     assert gap(carried) == pytest.approx(gap(own), rel=1e-6)
@@ -121,8 +120,8 @@ def test_a_film_that_is_carried_to_its_own_mesh_stays(
     dry: DryContact, films: dict[float, Film]
 ) -> None:
     film = films[400.0]
-    carrier = Carrier(film.system, film.system, (dry.x, dry.x))
-    x = carrier.state(film.x)
+    transfer = FilmTransfer(film.system, film.system, (dry.x, dry.x))
+    x = transfer.state(film.x)
     assert film.system.arc_film(x)[1] == pytest.approx(gap(film), rel=1e-6)
     assert film.system.pressures(x) == pytest.approx(film.system.pressures(film.x), abs=1e-9)
 
@@ -134,7 +133,7 @@ def test_a_mesh_that_does_not_fit_is_made_anew_and_h_star_moves_to_its_limit() -
     assert isinstance(found, Adapted)
     assert found.fits
     for one, fits in ((film, False), (found.film, True)):
-        asked = misfit(one.system, one.x, one.squeezing.scales.thickness, 2)
+        asked = misfit(one.system, one.x, one.squeeze_film.scales.thickness, 2)
         assert (asked <= FITS) is fits
     assert 1e3 * found.film.numbers.h_star == pytest.approx(0.0403, rel=5e-3)
     assert 1e3 * film.numbers.h_star != pytest.approx(0.0403, rel=5e-3)
@@ -145,11 +144,11 @@ def test_a_mesh_that_is_given_is_not_made_anew(dry: DryContact, films: dict[floa
     film = films[400.0]
     uniform = P.model_copy(update={"mesh": "uniform"})
     system = dry.system.moved(uniform, dry.system.section)
-    squeezing, now = film.begun
-    begun = squeezing.carried(system, film.x, dry.x), now
+    squeeze_film, now = film.begun
+    begun = squeeze_film.carried(system, film.x, dry.x), now
     no = NoFilm("out", 400.0, Status.DIVERGED, "no film", begun)
     assert adaptation(uniform, dry).adapted(no) is no
-    found = adaptation(uniform, dry).adapted(replace(film, squeezing=begun[0]))
+    found = adaptation(uniform, dry).adapted(replace(film, squeeze_film=begun[0]))
     assert isinstance(found, Adapted)
     assert found.fits
     assert found.film.system is system

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,13 +11,14 @@ from softehl.cases.oring import CASE
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.solve.contact import along, lean_stage, load_stage, squeeze_stage
-from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.contact import approach_stage, load_stage, release_stage
+from softehl.cases.seal.solve.contact_meshes import ContactMeshes
+from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.failure import explained, without_films
 from softehl.cases.seal.solve.films import NoFilm
-from softehl.cases.seal.solve.grading import film_thickness
+from softehl.cases.seal.solve.inlet import film_thickness
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import unsealed
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.state import (
@@ -75,9 +75,9 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
     p = ORing(ring="AS568-210", rod=19.0, sealed_pressure=9.0)
     system = build_system(p.model_copy(update={"mesh": "uniform", "density": 1}))
     stages = {
-        "% of the way": squeeze_stage(system, PathSettings()),
-        "pushed against the wall of the air side": lean_stage(system, PathSettings(), 0.0),
-        "sealed pressure 9 MPa was not reached": load_stage(system, PathSettings()),
+        "% of the way": approach_stage(system),
+        "friction of the housing does not hold a ring": release_stage(system, system.at_rest()),
+        "sealed pressure 9 MPa was not reached": load_stage(system),
     }
     for says, stage in stages.items():
         failed = StageFailed(stage, Branch((), Status.MAX_ITERATIONS, "last norms"))
@@ -142,10 +142,8 @@ def test_a_path_from_rest_takes_few_steps_however_incompressible_the_rubber() ->
     p = drawn(0)
     system = build_system(p.model_copy(update={"mesh": "uniform", "density": 1}))
     driver = PathDriver(Silent())
-    stage = squeeze_stage(system, PathSettings())
-    x = driver.follow(replace(stage, corrector=along(system, driver.newton)), system.at_rest())
-    assert not isinstance(x, StageFailed)
-    assert driver.records[-1].iterations < 60
+    assert not isinstance(ContactSolver(driver).from_rest(system), StageFailed)
+    assert driver.records[0].iterations < 60
 
 
 def test_pressure_that_ends_where_nothing_touches_is_told() -> None:
@@ -241,7 +239,7 @@ def test_settings_of_a_trial_are_right_by_a_finer_mesh_and_by_the_dry_contact(na
 def _by_the_law(**given: Any) -> tuple[float, float]:
     """h* (um) of an outstroke, and that over `film_thickness` at the edge of its inlet."""
     p = ORing(**given, stroke="out", error_estimate=False)
-    found = ContactRoute(PathSettings(), PathDriver(Silent()).follow).contact(p)
+    found = ContactMeshes(ContactSolver(PathDriver(Silent()))).contact(p)
     assert not isinstance(found, StageFailed)
     state = run(p, Silent()).states[0]
     assert state.verdict == OK

@@ -12,10 +12,11 @@ from softehl.cases.seal.section import round_layout
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.round_layout import MOST_LAYERS, STEEPEST_GROWTH, RoundLayout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
-from softehl.cases.seal.solve.contact_route import ContactRoute
-from softehl.cases.seal.solve.grading import graded_layout
+from softehl.cases.seal.solve.contact_layout import graded_layout
+from softehl.cases.seal.solve.contact_meshes import ContactMeshes
+from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.runtime.arrays import Array
@@ -26,7 +27,7 @@ from tests.cases.oring_cases import oring
 
 @cache
 def _contact(density: int, mesh: str = "graded", p_s: float = 1.0) -> tuple[SealSystem, Array]:
-    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+    route = ContactMeshes(ContactSolver(PathDriver(Silent())))
     found = route.contact(oring(density=density, mesh=mesh, sealed_pressure=p_s))
     assert not isinstance(found, StageFailed)
     return found

@@ -11,9 +11,10 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.system import FRICTION, SHEAR, WALLS
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.contact_meshes import ContactMeshes
+from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.state import Outcome, Silent
 
 
@@ -50,7 +51,7 @@ def test_strokes_without_pressure_are_mirror_images_with_friction() -> None:
 def test_stresses_of_the_walls_stay_within_coulombs_cone() -> None:
     """In contact: nowhere above the limit, somewhere at it; a smaller coefficient is exceeded."""
     driver = PathDriver(Silent())
-    route = ContactRoute(PathSettings(), driver.follow)
+    route = ContactMeshes(ContactSolver(driver))
     p = ORing(density=1, mesh="uniform", arc_start=-60.0, arc_end=60.0, housing_friction=0.2)
     found = route.contact(p)
     assert not isinstance(found, StageFailed)
@@ -62,9 +63,7 @@ def test_stresses_of_the_walls_stay_within_coulombs_cone() -> None:
         shares += list(abs(shear[normal > 0.0]) / normal[normal > 0.0])
     assert max(shares) == pytest.approx(0.2, rel=1e-9)
     assert max(shares) > 0.19
-    assert contact_problem(system, PathSettings(), 1.0).since(x).residual(x) == pytest.approx(
-        0.0, abs=1e-6
-    )
+    assert contact_problem(system, 1.0).since(x).residual(x) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_without_friction_nothing_of_it_is_in_the_system() -> None:

@@ -17,8 +17,8 @@ from softehl.cases.oring import CASE
 from softehl.cases.seal.cycle.transient import March, Reading
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
+from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.state import OSCILLATING, UNDER_RESOLVED, FilmRow
-from softehl.cases.seal.states.telling import Teller
 from softehl.runtime.io import read_csv, read_json
 from tests.cases.test_cli import film_state
 
@@ -66,7 +66,7 @@ def test_the_worse_verdict_of_the_two_is_kept() -> None:
 def test_a_run_of_both_strokes_writes_the_table(tmp_path: Path) -> None:
     run = Run(CASE, ORing(speeds=(400.0, 100.0)))
     record = RunRecord(tmp_path / "both", run, "refuse")
-    observer = Teller(Reporter(record, Display(), "both"))
+    observer = ObserverAdapter(Reporter(record, Display(), "both"))
     for speed in (400.0, -400.0, 100.0):
         observer.film_state(film_state(run.parameters, speed))
         assert (record.folder / "leakage.csv").exists() == (speed != 400.0)

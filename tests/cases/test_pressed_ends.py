@@ -12,10 +12,10 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.section.round_layout import RoundLayout
-from softehl.cases.seal.solve.contact_route import ContactRoute
-from softehl.cases.seal.solve.grading import placed_layout
-from softehl.cases.seal.solve.loading import State
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.contact_layout import placed_layout
+from softehl.cases.seal.solve.contact_meshes import ContactMeshes
+from softehl.cases.seal.solve.contact_solver import ContactSolver, State
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import contact_pressure, unsealed
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
@@ -24,17 +24,15 @@ from softehl.runtime.mesh.sections import Disc
 P = ORing(ring="AS568-210", rod=19.0, gland="dynamic", density=1, sealed_pressure=3.0)
 
 
-def route() -> ContactRoute:
-    return ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+def route() -> ContactMeshes:
+    return ContactMeshes(ContactSolver(PathDriver(Silent())))
 
 
 def elsewhere(system: SealSystem, x: Array, new: SealSystem) -> Array:
     """The contact state x on another mesh: carried to it, else from rest."""
-    ways = route()
-    found = ways.loading.carried(system, x, new)
-    y = ways._loaded(new) if isinstance(found, StageFailed) else found[1]
-    assert not isinstance(y, StageFailed)
-    return y
+    found = ContactSolver(PathDriver(Silent())).from_mesh(system, x, new)
+    assert not isinstance(found, StageFailed)
+    return found[1]
 
 
 @cache

@@ -12,9 +12,9 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import ContactLoads
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.rubbers.regions import PRESETS
-from softehl.cases.seal.solve.contact_route import ContactRoute
-from softehl.cases.seal.solve.grading import inlet_length
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.contact_solver import ContactSolver
+from softehl.cases.seal.solve.inlet import inlet_length
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import contact_pressure
 from softehl.cases.seal.states.state import Silent
 from softehl.cases.shipped import SHIPPED
@@ -134,11 +134,8 @@ WIDE = 28.0
 
 
 def _squeezed(**changes: Any) -> tuple[SealSystem, Array]:
-    route, system = (
-        ContactRoute(PathSettings(), PathDriver(Silent()).follow),
-        build_system(ORing(**changes)),
-    )
-    x = route._loaded(system)
+    system = build_system(ORing(**changes))
+    x = ContactSolver(PathDriver(Silent())).from_rest(system)
     assert not isinstance(x, StageFailed)
     return system, x
 

@@ -11,7 +11,6 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.solve.path import PathSettings
 from softehl.cases.seal.states.contact_results import contact_pressure
 from softehl.cases.seal.states.film_signs import (
     THIN,
@@ -198,7 +197,7 @@ def test_contact_pressure_is_the_multiplier_plus_the_sealed_pressure() -> None:
 
 def test_sealed_pressure_changes_the_load_of_the_contact_problem_only() -> None:
     system = build_system(oring(density=1))
-    problem = contact_problem(system, PathSettings(), 2.5)
+    problem = contact_problem(system, 2.5)
     assert problem.parameters["sealed_side"].tolist() == [2.5]
     assert "film" not in problem.parameters
     assert "spring" not in problem.parameters

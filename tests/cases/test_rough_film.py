@@ -14,7 +14,7 @@ from softehl.cases.oring import CASE
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.surfaces import Surfaces, regime
-from softehl.cases.seal.solve.grading import inlet_length
+from softehl.cases.seal.solve.inlet import inlet_length
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmRow, FilmState, Silent
 from softehl.runtime.fem.guards import ChangesLittle

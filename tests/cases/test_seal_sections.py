@@ -18,10 +18,11 @@ from softehl.cases.seal.section.layout import dam
 from softehl.cases.seal.section.outline_layout import OutlineLayout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.contact_meshes import ContactMeshes
+from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.contact_store import contact_key
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure
 from softehl.cases.seal.states.contacts import (
     CONTACT_FILM,
@@ -48,7 +49,7 @@ X_RING: dict[str, Any] = {"section": "x_ring", "lobe_radius": 0.9, "fillet_radiu
 
 @cache
 def _contact(**changes: Any) -> tuple[SealSystem, Array]:
-    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+    route = ContactMeshes(ContactSolver(PathDriver(Silent())))
     found = route.contact(ORing(**changes))
     assert not isinstance(found, StageFailed)
     return found
@@ -363,16 +364,16 @@ def test_without_pressure_the_mirror_image_of_a_state_is_one(section: str) -> No
     system = build_system(
         ORing(**{**X_RING, **_plain(section), "density": 1, "sealed_pressure": 0.0})
     )
-    x = ContactRoute(PathSettings(), PathDriver(Silent()).follow)._loaded(system)
+    x = ContactSolver(PathDriver(Silent())).from_rest(system)
     assert not isinstance(x, StageFailed)
     norms = []
     for one, state in ((system, x), mirrored(system, x)):
-        problem = contact_problem(one, PathSettings(), 0.0)
+        problem = contact_problem(one, 0.0)
         norms.append(problem.norm(problem.residual(state)))
     assert max(norms) < 1e-9
     image, y = mirrored(system, x)
     y[image.layout.part("displacement")] = x[system.layout.part("displacement")]
-    problem = contact_problem(image, PathSettings(), 0.0)
+    problem = contact_problem(image, 0.0)
     assert problem.norm(problem.residual(y)) > 1.0
 
 

@@ -17,9 +17,10 @@ from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import finer, outline_of, read_mesh, read_outline
-from softehl.cases.seal.solve.contact_route import ContactRoute
+from softehl.cases.seal.solve.contact_meshes import ContactMeshes
+from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, PathSettings, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.cases.shipped import solve_cases
 from softehl.runtime.mesh.outline import Arc, Outline, Shape
@@ -301,7 +302,7 @@ def test_an_o_ring_from_a_drawing_has_the_film_of_the_built_in_one(tmp_path: Pat
 
 def saved_as_it_is(p: ORing, path: Path) -> tuple[ORing, FilmState]:
     """A case with the mesh that a graded run came to as its file, and what that run found."""
-    route = ContactRoute(PathSettings(), PathDriver(Silent()).follow)
+    route = ContactMeshes(ContactSolver(PathDriver(Silent())))
     found = route.contact(p)
     assert not isinstance(found, StageFailed)
     section = found[0].section

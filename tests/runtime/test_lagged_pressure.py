@@ -7,7 +7,6 @@ import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.solve.path import PathSettings
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.fem.problem import Problem
@@ -24,7 +23,7 @@ def system() -> SealSystem:
 
 @pytest.fixture(scope="module")
 def problem(system: SealSystem) -> Problem:
-    return contact_problem(system, PathSettings(), 1.0)
+    return contact_problem(system, 1.0)
 
 
 @pytest.fixture

@@ -27,7 +27,7 @@ from softehl.cases.seal.solve.film_correctors import film_corrector
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.method import DryContact
 from softehl.cases.seal.solve.path import StageFailed
-from softehl.cases.seal.states.telling import Teller
+from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.schur import StaleTangent
@@ -67,7 +67,7 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
     speed = motion.speed.at(0.0)
     changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}
     p: ORing = parameters.model_copy(update={**changes, "sealed_pressure": motion.pressure.at(0.0)})
-    contact = DryContact.of(p, Teller(observer))
+    contact = DryContact.of(p, ObserverAdapter(observer))
     if isinstance(contact, StageFailed):
         return _outcome(p, *explained(contact, "contact", p))
     begun, linear = contact.film("out", speed), contact.newton.linear

@@ -10,8 +10,8 @@ import numpy as np
 from softehl.cases.harness.report.part import FinishedRun
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.report import style
+from softehl.cases.seal.states.observer_adapter import read_profile
 from softehl.cases.seal.states.state import FilmRow
-from softehl.cases.seal.states.telling import read_profile
 from softehl.runtime.arrays import Array
 
 _WIDTH, _HEIGHT = 460, 300

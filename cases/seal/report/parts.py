@@ -22,7 +22,7 @@ from softehl.cases.seal.report.interactive import curve_plot, film_plot, frictio
 from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.report.stribeck import stribeck_figure
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
-from softehl.cases.seal.states.telling import read_profile, read_section
+from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 from softehl.runtime.io import read_csv
 
 if TYPE_CHECKING:

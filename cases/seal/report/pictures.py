@@ -13,8 +13,8 @@ from softehl.cases.seal.report.fit import fit_figure, fit_of, write_residuals
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.report.stribeck import stribeck_figure
+from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 from softehl.cases.seal.states.state import FilmRow
-from softehl.cases.seal.states.telling import read_profile, read_section
 
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import ORing

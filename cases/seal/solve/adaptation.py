@@ -7,21 +7,19 @@ estimated from the same film on a coarser mesh of the same spacing (`states.esti
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.solve.carried import Carrier
+from softehl.cases.seal.solve.contact_solver import ContactSolver
+from softehl.cases.seal.solve.film_layout import film_layout, misfit
+from softehl.cases.seal.solve.film_transfer import FilmTransfer
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
-from softehl.cases.seal.solve.loading import Loading
 from softehl.cases.seal.solve.path import StageFailed
-from softehl.cases.seal.solve.placement import film_layout, misfit
 from softehl.cases.seal.states.estimate import coarser_density, system_at
-from softehl.cases.seal.states.state import Observer, StageRecord
 from softehl.cases.seal.states.verdict import FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.solve.newton import Newton
 
 FITS = 2.2
 """Segments that a film may ask for in the place of one. Where it asked for at most three, h*
@@ -58,16 +56,12 @@ class Adapted:
 class Adaptation:
     """Makes meshes for films.
 
-    p: the case, whose density they have. loading: carries contact to them. newton, observer,
-    offset: as of `FilmSolver`.
+    p: the case, whose density they have. contacts, films: solve for either on them.
     """
 
     p: ORing
-    loading: Loading
-    newton: Newton
-    observer: Observer
-    offset: float
-    records: list[StageRecord] = field(default_factory=list)
+    contacts: ContactSolver
+    films: FilmSolver
 
     def adapted(self, found: Film | NoFilm, last: Sequence[Adapted] = ()) -> Adapted | NoFilm:
         """A film on a mesh that fits it, from that on another mesh.
@@ -115,8 +109,8 @@ class Adaptation:
         """The film on the mesh that is made for it; None where there is none."""
         if found.begun is None or self.p.mesh != "graded":
             return None
-        squeezing, now = found.begun
-        layout = film_layout(squeezing.system, now.x, squeezing.scales.thickness)
+        squeeze_film, now = found.begun
+        layout = film_layout(squeeze_film.system, now.x, squeeze_film.scales.thickness)
         try:
             return self._carried(found, build_system(self.p, layout, density))
         except MeshError:
@@ -131,12 +125,15 @@ class Adaptation:
         before = [a.coarser for a in last if a.coarser and a.film.system is film.system]
         found: Film | NoFilm | None = None
         if before:
-            found = self._solver(before[-1].system).from_neighbour(before, film.loads.speed)
-        if not isinstance(found, Film):
+            system = before[-1].system
+            found = self.films.on(system).from_neighbour(before, film.loads.speed)
+        else:
             try:
-                found = self._carried(film, system_at(film.system, density))
+                system = system_at(film.system, density)
             except MeshError:
                 return None  # too coarse for the corners of a section
+        if not isinstance(found, Film):
+            found = self._carried(film, system)
         if isinstance(found, Film):
             found, _ = self._settled(found, density, film)
         return found if isinstance(found, Film) else None
@@ -147,23 +144,20 @@ class Adaptation:
         Where none was found, or does not lead on, it is squeezed out anew.
         """
         assert found.begun is not None
-        squeezing, now = found.begun
-        dry = self.loading.carried(squeezing.system, squeezing.dry, system)
+        squeeze_film, now = found.begun
+        dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)
         if isinstance(dry, StageFailed):
             return None
-        solver, again = self._solver(system), None
+        solver, again = self.films.on(system), None
         if isinstance(found, Film):
-            carrier = Carrier(squeezing.system, system, (squeezing.dry, dry[1]))
-            start, pressures = replace(now, x=carrier.state(now.x)), carrier.pressures(now.x)
-            carried = squeezing.carried(system, start.x, dry[1])
+            transfer = FilmTransfer(squeeze_film.system, system, (squeeze_film.dry, dry[1]))
+            start, pressures = replace(now, x=transfer.state(now.x)), transfer.pressures(now.x)
+            carried = squeeze_film.carried(system, start.x, dry[1])
             again = solver.from_film(carried, start, pressures)
         if isinstance(again, Film):
             return again
-        return solver.from_contact(squeezing.film.stroke, squeezing.film.speed, dry[1])
-
-    def _solver(self, system: SealSystem) -> FilmSolver:
-        return FilmSolver(system, self.newton, self.observer, self.offset, self.records)
+        return solver.from_contact(squeeze_film.film.stroke, squeeze_film.film.speed, dry[1])
 
 
 def _misfit(film: Film, density: float) -> float:
-    return misfit(film.system, film.x, film.squeezing.scales.thickness, density)
+    return misfit(film.system, film.x, film.squeeze_film.scales.thickness, density)

@@ -12,7 +12,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +20,11 @@ import numpy as np
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import contact_kernels
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.solve.contact import contact_problem, contact_stage
-from softehl.cases.seal.solve.path import PathSettings, Stage
+from softehl.cases.seal.solve.contact import contact_problem, correction_stage
+from softehl.cases.seal.solve.path import Stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.kernels import load_kernel
-from softehl.runtime.solve.newton import Newton
 
 WITHOUT_INFLUENCE = (
     *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
@@ -39,8 +38,6 @@ WITHOUT_INFLUENCE = (
     *("tolerance", "sensitivity", "tolerances"),
 )
 """Parameters that the contact stage does not know."""
-
-_ITERATIONS = 10  # a state that needs more belongs to another section
 
 
 def contact_key(parameters: ORing) -> str:
@@ -95,11 +92,10 @@ def _fields(system: SealSystem) -> tuple[str, ...]:
     return tuple(field.name for field in system.contact_fields())
 
 
-def stored_contact(system: SealSystem, settings: PathSettings, newton: Newton) -> Stage:
+def stored_contact(system: SealSystem) -> Stage:
     """A stage of one step that verifies a stored state, or corrects it in a few iterations."""
-    return contact_stage(
+    return correction_stage(
         system,
-        contact_problem(system, settings, system.parameters.sealed_pressure),
+        contact_problem(system, system.parameters.sealed_pressure),
         method="newton, from a stored contact state",
-        corrector=replace(newton, max_iterations=_ITERATIONS),
     )

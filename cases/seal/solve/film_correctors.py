@@ -148,11 +148,8 @@ class FilmCorrectors:
 
     def steady(self, problem: Problem, layer: Layer, x: Array) -> Solution:
         """The steady film from the last step in time, x (n,)."""
-        if self.fast:
-            end = self.fast.solve(self.layered(problem, layer), x)
-            if end.converged:
-                return end
-        return self.whole.steady(problem, x)
+        fast = (self.fast,) if self.fast else ()
+        return Ladder((*fast, Steady(self.whole))).solve(self.layered(problem, layer), x)
 
     def _refused(self, x: Array) -> str:
         system = self.whole.system

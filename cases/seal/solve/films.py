@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, inf, log
 
@@ -18,14 +18,16 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.film_correctors import FilmCorrectors
-from softehl.cases.seal.solve.squeezing import InletScales, Squeezing, film_loads, pressed_film
+from softehl.cases.seal.solve.inlet import InletScales
+from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.squeeze_film import SqueezeFilm, film_loads, pressed_film
 from softehl.cases.seal.states.results import film_numbers
-from softehl.cases.seal.states.state import Observer, StageRecord, place
+from softehl.cases.seal.states.state import StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.homotopy import Continuation
-from softehl.runtime.solve.newton import Newton, NonlinearProblem
+from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
 from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.solve.steps import StepRule
@@ -47,10 +49,10 @@ _AT_ONCE = 8
 class Film:
     """A steady film on a mesh, its unknowns x (n,).
 
-    squeezing: how it was squeezed out. correctors: what solved it, for films near by.
+    squeeze_film: how it was squeezed out. correctors: what solved it, for films near by.
     """
 
-    squeezing: Squeezing
+    squeeze_film: SqueezeFilm
     x: Array
     iterations: int
     correctors: FilmCorrectors
@@ -58,17 +60,17 @@ class Film:
     @property
     def system(self) -> SealSystem:
         """The system whose film it is."""
-        return self.squeezing.system
+        return self.squeeze_film.system
 
     @property
     def loads(self) -> FilmLoads:
         """The loads that it bears."""
-        return self.squeezing.film
+        return self.squeeze_film.film
 
     @property
-    def begun(self) -> tuple[Squeezing, Moment]:
+    def begun(self) -> tuple[SqueezeFilm, Moment]:
         """The moment from which it is squeezed out where it is not found at once."""
-        return self.squeezing, Moment(self.x, _AGAIN, 1.0)
+        return self.squeeze_film, Moment(self.x, _AGAIN, 1.0)
 
     @property
     def solution(self) -> Solution:
@@ -97,22 +99,23 @@ class NoFilm:
     speed: float
     status: Status
     message: str
-    begun: tuple[Squeezing, Moment] | None = None
+    begun: tuple[SqueezeFilm, Moment] | None = None
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class FilmSolver:
     """Films on the mesh of a system.
 
-    newton: finishes what the modified iterations do not, and holds the linear solver. offset: of
-    the rod in the contact state, mm. records: cost of each film; it grows.
+    driver: its Newton's method finishes what the modified iterations do not, and holds the linear
+    solver; its records of the cost of each film grow.
     """
 
     system: SealSystem
-    newton: Newton
-    observer: Observer
-    offset: float
-    records: list[StageRecord] = field(default_factory=list)
+    driver: PathDriver
+
+    def on(self, system: SealSystem) -> FilmSolver:
+        """The same on the mesh of another system."""
+        return replace(self, system=system)
 
     def from_contact(self, stroke: Stroke, speed: float, x: Array) -> Film | NoFilm:
         """The film at |U|, mm/s, squeezed out from the contact state x (n,)."""
@@ -122,10 +125,10 @@ class FilmSolver:
             return NoFilm(stroke, speed, Status.DIVERGED, words)
         film = film_loads(self.system, stroke, speed, x)
         layer, moment = film_layer(self.system, x), self.system.moment(x)
-        squeezing = Squeezing(self.system, layer, film, scales, x, self.offset, moment)
+        squeeze_film = SqueezeFilm(self.system, layer, film, scales, x, moment)
         pressed = pressed_film(self.system, x, film.sealed_pressure)
-        correctors = FilmCorrectors.of(self.system, self.newton)
-        return self._followed(squeezing, Moment(pressed, squeezing.first), correctors)
+        correctors = FilmCorrectors.of(self.system, self.driver.newton)
+        return self._followed(squeeze_film, Moment(pressed, squeeze_film.first), correctors)
 
     def from_neighbour(self, last: Sequence[Film], speed: float) -> Film | NoFilm:
         """The film at |U|, mm/s, along those at speeds between, from the last film on our mesh.
@@ -133,16 +136,16 @@ class FilmSolver:
         last: films at other speeds, the latest last.
         """
         film, correctors = last[-1], last[-1].correctors
-        squeezing, before = film.squeezing.at(speed), [film.x]
+        squeeze_film, before = film.squeeze_film.at(speed), [film.x]
         known = [Point(log(f.loads.speed), f.solution) for f in last if f.system is film.system]
         start, stop = known[-1].parameter, log(speed)
 
         def problem_at(t: float) -> NonlinearProblem:
-            loads = replace(squeezing.film, speed=speed if t == stop else exp(t))
+            loads = replace(squeeze_film.film, speed=speed if t == stop else exp(t))
             problem = self.system.film_problem(loads).since(before[0])
-            return correctors.layered(problem, squeezing.layer)
+            return correctors.layered(problem, squeeze_film.layer)
 
-        with self._told(squeezing.film) as told:
+        with self._told(squeeze_film.film) as told:
 
             def tell(point: Point) -> None:
                 before[0] = told(point.solution).x
@@ -151,17 +154,17 @@ class FilmSolver:
             path = Continuation(correctors.first, rule, name="ln U")
             previous = known[-2] if len(known) > 1 else None
             branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
-        if branch.converged and squeezing.change(film.x, branch.last.x) < inf:
-            return self._entered(squeezing, correctors, branch.last)
+        if branch.converged and squeeze_film.change(film.x, branch.last.x) < inf:
+            return self._entered(squeeze_film, correctors, branch.last)
         x = branch.last.x if branch.points else film.x
-        return self._followed(squeezing, Moment(x, _NEIGHBOUR, 1.0), correctors)
+        return self._followed(squeeze_film, Moment(x, _NEIGHBOUR, 1.0), correctors)
 
-    def from_film(self, carried: Squeezing, start: Moment, pressures: Array) -> Film | NoFilm:
+    def from_film(self, carried: SqueezeFilm, start: Moment, pressures: Array) -> Film | NoFilm:
         """The steady film of another mesh, carried to ours: at once, else squeezed out from there.
 
         pressures: (Q,) of the elements.
         """
-        correctors, x = FilmCorrectors.of(self.system, self.newton), start.x
+        correctors, x = FilmCorrectors.of(self.system, self.driver.newton), start.x
         with self._told(carried.film) as told:
             problem = self.system.film_problem(carried.film).since(x)
             found = told(correctors.whole.steady(problem, x, pressures, _AT_ONCE))
@@ -171,35 +174,37 @@ class FilmSolver:
 
     def _followed(
         self,
-        squeezing: Squeezing,
+        squeeze_film: SqueezeFilm,
         start: Moment,
         correctors: FilmCorrectors,
         pressures: Array | None = None,
     ) -> Film | NoFilm:
-        film = squeezing.film
+        film = squeeze_film.film
         steps = PseudoTransient(correctors.steps(pressures))
         with self._told(film) as told:
-            branch, reached = steps.follow(squeezing, start, on_point=lambda p: told(p.solution))
+            branch, reached = steps.follow(squeeze_film, start, on_point=lambda p: told(p.solution))
             if not branch.converged:
                 words = branch.message
-                begun = None if reached is start else (squeezing, reached)
+                begun = None if reached is start else (squeeze_film, reached)
                 return NoFilm(film.stroke, film.speed, branch.status, words, begun)
             problem = self.system.film_problem(film).since(reached.x)
-            end = told(correctors.steady(problem, squeezing.layer, reached.x))
+            end = told(correctors.steady(problem, squeeze_film.layer, reached.x))
         if not end.converged:
             words = f"steady film: {end.message}"
-            return NoFilm(film.stroke, film.speed, end.status, words, (squeezing, reached))
-        return self._entered(squeezing, correctors, end)
+            return NoFilm(film.stroke, film.speed, end.status, words, (squeeze_film, reached))
+        return self._entered(squeeze_film, correctors, end)
 
-    def _entered(self, squeezing: Squeezing, correctors: FilmCorrectors, found: Solution) -> Film:
+    def _entered(
+        self, squeeze_film: SqueezeFilm, correctors: FilmCorrectors, found: Solution
+    ) -> Film:
         """The film, with the pressure of the wedge before its arc where it lacks much of it.
 
         Without it where no such film is found.
         """
-        film = Film(squeezing, found.x, found.iterations, correctors)
+        film = Film(squeeze_film, found.x, found.iterations, correctors)
         if not film.numbers.enters:
             return film
-        more = replace(squeezing, film=replace(film.loads, entrance=film.numbers.entrance))
+        more = replace(squeeze_film, film=replace(film.loads, entrance=film.numbers.entrance))
         problem = self.system.film_problem(more.film).since(found.x)
         end = correctors.steady(problem, more.layer, found.x)
         return Film(more, end.x, end.iterations, correctors) if end.converged else film
@@ -209,11 +214,11 @@ class FilmSolver:
         """Tell the observer of solutions, and keep a record of them."""
         name, begin, found = f"film at {film.rod_speed:+g} mm/s", time.perf_counter(), []
         p_s, stroke = film.sealed_pressure, film.stroke
-        self.observer.stage(name, sealed_pressure=p_s, stroke=stroke, steps=None)
+        self.driver.observer.stage(name, sealed_pressure=p_s, stroke=stroke, steps=None)
 
         def told(solution: Solution) -> Solution:
             found.append(solution.forget())
-            self.observer.step(
+            self.driver.observer.step(
                 label=name,
                 parameter=float(len(found)),
                 iterations=solution.iterations,
@@ -225,7 +230,7 @@ class FilmSolver:
         try:
             yield told
         finally:
-            self.records.append(
+            self.driver.records.append(
                 StageRecord(
                     name=name,
                     seconds=time.perf_counter() - begin,

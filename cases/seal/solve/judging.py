@@ -58,7 +58,7 @@ class Judge:
         numbers = film.numbers
         error, friction = errors(p.density, numbers, other)
         wanted = p.error_estimate and p.mesh == "graded"
-        verdict = verdict_of_contact(film.system, film.squeezing.dry)
+        verdict = verdict_of_contact(film.system, film.squeeze_film.dry)
         verdict = replace(verdict, last=faster).after(numbers)
         verdict = replace(verdict, error=error if wanted else None)
         state = film_state(film.system, film.problem, film.loads, film.x, verdict, film.iterations)

@@ -16,31 +16,11 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
-from softehl.runtime.solve.predictor import Predictor
 from softehl.runtime.solve.solution import Branch, Point
 from softehl.runtime.solve.steps import StepRule
 
-
-@dataclass(frozen=True)
-class PathSettings:
-    """Numbers that steer the path; none of them changes a result.
-
-    offset: distance of the rod in the contact stage, mm. first_contact: where the squeeze begins
-    at density 1, 0 = just touching and 1 = all the way; it falls with density^2, so that the first
-    contact is as many nodes wide. first_way: the same in section diameters of way. lean: how far
-    the section is pushed against its wall before the pressure does it, in section diameters.
-    load_steps, reload_steps: in shear moduli, from rest and from a loaded state that was carried to
-    another mesh. The rest: step rules.
-    """
-
-    offset: float = 0.01
-    first_contact: float = 0.2
-    first_way: float = 0.004
-    lean: float = 0.01
-    longest_squeeze: float = 0.3
-    load_steps: StepRule = field(default_factory=lambda: StepRule(0.055, 3e-4, 0.3))
-    reload_steps: StepRule = field(default_factory=lambda: StepRule(0.15, 3e-4, 0.3))
-    release_steps: StepRule = field(default_factory=lambda: StepRule(0.1, 1e-3))
+_BOTH = "both"
+"""Strokes that a contact state serves."""
 
 
 def _nothing(point: Point) -> None:
@@ -51,9 +31,9 @@ def _nothing(point: Point) -> None:
 class Stage:
     """A family of problems in one parameter, to be followed from `start` to `stop`.
 
-    name, sealed_pressure, stroke: what observers and records call it. method: how it is
-    solved, for the record. corrector: what solves it, None for the path driver's Newton. predictor:
-    how it is guessed.
+    name, sealed_pressure: labels for observers and records. method: how it is solved, for the
+    record. ended: words for a path that ends at a parameter. corrector: what solves it, None for
+    the driver's Newton.
     """
 
     name: str
@@ -62,10 +42,9 @@ class Stage:
     stop: float
     steps: StepRule
     sealed_pressure: float
-    stroke: str
+    ended: Callable[[float], str]
     method: str = "newton"
     corrector: Corrector | None = None
-    predictor: Predictor = "secant"
     on_point: Callable[[Point], None] = _nothing
 
     def fraction(self, parameter: float) -> float:
@@ -84,12 +63,8 @@ class StageFailed:
 
     @property
     def message(self) -> str:
-        """How far the stage came, in its own units."""
-        stage, branch = self.stage, self.branch
-        goal = f"{stage.name} {stage.stop:.5g}"
-        if not branch.points:
-            return f"{goal} was not reached, not even its start"
-        return f"{goal} was not reached, only {self.reached:.5g}"
+        """How far the stage came, and what may help."""
+        return self.stage.ended(self.reached)
 
     @property
     def reached(self) -> float:
@@ -106,14 +81,12 @@ Followed: TypeAlias = Array | StageFailed
 class PathDriver:
     """Follows stages, reports every step and keeps a record of each stage.
 
-    newton: corrector of every step. start_iterations: iterations allowed at the start of a stage,
-    which has no predictor; a step that needs as many is better cut. Only `records` changes, by one
+    newton: corrector of every step, but where a stage has its own. Only `records` changes, by one
     with each stage.
     """
 
     observer: Observer
     newton: Newton = field(default_factory=lambda: Newton(max_iterations=10))
-    start_iterations: int = 40
     records: list[StageRecord] = field(default_factory=list)
 
     def follow(self, stage: Stage, x0: Array) -> Followed:
@@ -123,7 +96,7 @@ class PathDriver:
         """
         begin = time.perf_counter()
         self.observer.stage(
-            stage.name, sealed_pressure=stage.sealed_pressure, stroke=stage.stroke, steps=None
+            stage.name, sealed_pressure=stage.sealed_pressure, stroke=_BOTH, steps=None
         )
         points, before = list[Point](), [x0]
 
@@ -143,24 +116,10 @@ class PathDriver:
             before[0] = point.solution.x
             stage.on_point(point)
 
-        branch = self._continuation(stage).follow(
-            problem_at,
-            stage.start,
-            stage.stop,
-            x0,
-            on_point=report,
-        )
+        continuation = Continuation(stage.corrector or self.newton, stage.steps, name=stage.name)
+        branch = continuation.follow(problem_at, stage.start, stage.stop, x0, on_point=report)
         self.records.append(_record(stage, branch, points, time.perf_counter() - begin))
         return branch.last.x if branch.converged else StageFailed(stage, branch)
-
-    def _continuation(self, stage: Stage) -> Continuation:
-        return Continuation(
-            stage.corrector or self.newton,
-            stage.steps,
-            stage.predictor,
-            name=stage.name,
-            starter=stage.corrector or replace(self.newton, max_iterations=self.start_iterations),
-        )
 
 
 def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -> StageRecord:
@@ -171,6 +130,6 @@ def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -
         iterations=branch.iterations,
         residual_histories=tuple(p.solution.residual_norms for p in points),
         parameters=tuple(p.parameter for p in points),
-        where=place(stage.sealed_pressure, stage.stroke),
+        where=place(stage.sealed_pressure, _BOTH),
         method=stage.method if branch.converged else f"{stage.method}; ended: {branch.message}",
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.runtime.arrays import Array
@@ -12,27 +12,6 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution
-
-_ROUGH = 1e-3
-_PATIENT = 30
-
-
-def roughly(newton: Newton) -> Newton:
-    """Newton's method for states on the way, which are no results.
-
-    On a fine mesh half of the iterations go from there to what rounding leaves. A residual that is
-    above that and does not fall is no rounding.
-    """
-    return replace(newton, tolerance=max(_ROUGH, newton.tolerance), stagnation=1.0)
-
-
-def patient(newton: Newton, iterations: int = _PATIENT) -> Newton:
-    """Newton's method for a state of another mesh where fewer iterations lead nowhere.
-
-    Each has to reduce the residual: that helps where the ring is squeezed into the corners of its
-    groove, and the edges of contact there lie elsewhere.
-    """
-    return replace(newton, max_iterations=iterations, line_search=True)
 
 
 def lagged(system: SealSystem, problem: Problem, pressures: Array) -> LaggedPressure:
@@ -48,24 +27,22 @@ class PressureNewton:
     A predictor of continuation spoils volume ratios like any interpolation: with the pressures of
     the last solution, steps are as long as those of a compressible solid. `pressures`, (Q,), None
     until the first solve, changes with every solution; the rest are settings: solids, follower and
-    stiffness as of `LaggedPressure.of`, starts the iterations of the first solve.
+    stiffness as of `LaggedPressure.of`.
     """
 
     newton: Newton
     solids: tuple[str, ...]
     follower: ElementKernel
     stiffness: Array
-    starts: int = 40
     pressures: Array | None = None
 
     def solve(self, problem: Problem, x0: Array) -> Solution:
         """Solve R(x) = 0 from x0, (n,)."""
-        newton, pressures = self.newton, self.pressures
+        pressures = self.pressures
         if pressures is None:
-            newton = replace(newton, max_iterations=self.starts)
             pressures = element_pressures(problem, self.solids, x0)
         lagged = LaggedPressure.of(problem, self.solids, self.follower, pressures, self.stiffness)
-        solution = newton.solve(lagged, x0)
+        solution = self.newton.solve(lagged, x0)
         if solution.converged:
             self.pressures = element_pressures(problem, self.solids, solution.x)
         return solution

@@ -273,10 +273,6 @@ class Observer(Protocol):
         """A requested speed converged: keep it now."""
         return None
 
-    def film_draft(self, state: FilmState) -> None:
-        """The same, where another mesh may better it: keep it for a run that is cut short."""
-        return None
-
 
 class Silent(Observer):
     """The observer that does nothing (for tests and scripts)."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.solve.placement import (
+from softehl.cases.seal.solve.film_layout import (
     COARSEST,
     GROWTH,
     RISE,

@@ -6,9 +6,9 @@ An implicit step of length tau,
     dq/dx + w (h - h_n) / tau = 0,
 
 is contact for tau -> 0 and the steady film for tau -> infinity; the section bears the same load all
-the way. The scales are those of the inlet (`solve.grading`): a length l, the time T = l / U in
-which the rod passes it, and a thickness h_r. The local weight w = min(1, (h_r / h_n)^a) lets the
-oil flow sooner where there is much more of it than the film needs, as in a groove.
+the way. The scales are those of the inlet (`solve.inlet`): a length l, the time T = l / U in which
+the rod passes it, and a thickness h_r. The local weight w = min(1, (h_r / h_n)^a) lets the oil flow
+sooner where there is much more of it than the film needs, as in a groove.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import DISPLACEMENT
-from softehl.cases.seal.solve.contact import held_moment, held_place
-from softehl.cases.seal.solve.grading import MULTIPLE, film_thickness, inlet_time
-from softehl.cases.seal.states.contacts import Edge, contact_edges
+from softehl.cases.seal.solve.contact import OFFSET, held_moment, held_place
+from softehl.cases.seal.solve.inlet import InletScales
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer
 from softehl.runtime.fem.relaxed import Relaxed
@@ -39,26 +38,6 @@ FIRST = 1e-3
 
 _NO_WIDTH = 1e-6
 """Of the widest part of the arc around a node, below which it is between segments on a wall."""
-
-
-@dataclass(frozen=True)
-class InletScales:
-    """Time T (s) and thickness h_r (mm) of a film at its inlet."""
-
-    time: float
-    thickness: float
-
-    @classmethod
-    def of(cls, system: SealSystem, stroke: Stroke, speed: float, x: Array) -> InletScales | None:
-        """By the edge of the contact x (n,) where a stroke draws its oil in; None without one."""
-        edge, p = inlet_edge(system, stroke, x), system.parameters
-        if edge is None:
-            return None
-        return cls(inlet_time(p, edge, speed), MULTIPLE * film_thickness(p, [edge], speed))
-
-    def at(self, ratio: float) -> InletScales:
-        """Those at another speed, which is so many times ours: l is as U^0.4, h as U^0.6."""
-        return InletScales(self.time * ratio**-0.6, self.thickness * ratio**0.6)
 
 
 def film_loads(system: SealSystem, stroke: Stroke, speed: float, x: Array) -> FilmLoads:
@@ -76,12 +55,12 @@ def film_loads(system: SealSystem, stroke: Stroke, speed: float, x: Array) -> Fi
 
 
 @dataclass(frozen=True, eq=False)
-class Squeezing:
+class SqueezeFilm:
     """A film that is squeezed out; satisfies `Transient`, its time in units of T.
 
-    film: loads of the steady film. dry: (n,) the contact state on its mesh. offset: of the rod in
-    that, mm. moment: that holds the rotation of the section at the start, N mm; it fades as the
-    shear stress begins to act, where the section is free to roll.
+    film: loads of the steady film. dry: (n,) the contact state on its mesh. moment: that holds the
+    rotation of the section at the start, N mm; it fades as the shear stress begins to act, where
+    the section is free to roll.
     """
 
     system: SealSystem
@@ -89,19 +68,18 @@ class Squeezing:
     film: FilmLoads
     scales: InletScales
     dry: Array
-    offset: float
     moment: float = 0.0
 
-    def at(self, speed: float) -> Squeezing:
+    def at(self, speed: float) -> SqueezeFilm:
         """The same at another |U|, mm/s."""
         film = replace(self.film, speed=speed, entrance=0.0)
         return replace(self, film=film, scales=self.scales.at(speed / self.film.speed))
 
-    def carried(self, system: SealSystem, x: Array, dry: Array) -> Squeezing:
+    def carried(self, system: SealSystem, x: Array, dry: Array) -> SqueezeFilm:
         """The same film on the mesh of another system; x: (n,) carried to it, dry: contact."""
         film = replace(
             self.film,
-            gap=system.arc_film(x)[1] + self.offset,
+            gap=system.arc_film(x)[1] + OFFSET,
             entrance=0.0,
         )
         return replace(self, system=system, layer=film_layer(system, x), film=film, dry=dry)
@@ -131,8 +109,7 @@ class Squeezing:
     @property
     def first(self) -> float:
         """Length of the first step from the contact state; see `FIRST`."""
-        thicker = self.scales.thickness / self.offset if self.offset else 1.0
-        return float(FIRST * min(1.0, thicker) ** EXPONENT)
+        return float(FIRST * min(1.0, self.scales.thickness / OFFSET) ** EXPONENT)
 
     def _masses(self, x: Array) -> csc_array[np.float64]:
         """Rates of what the film holds, by the local time steps; see `gap_masses`."""
@@ -176,13 +153,6 @@ def gap_masses(system: SealSystem, x: Array, weights: Array | None = None) -> cs
     at = np.broadcast_arrays(pressures[..., None], radii[:, None])
     places = tuple(part.ravel() for part in at)
     return csc_array(coo_array((masses.ravel(), places), shape=(n, n)))
-
-
-def inlet_edge(system: SealSystem, stroke: Stroke, x: Array) -> Edge | None:
-    """The edge of the contact x (n,) where a stroke draws its film in; None without one."""
-    edges = contact_edges(system, x)
-    found = edges[0 if stroke == "out" else -1] if edges else None
-    return found if found and 0.0 < found.rise < inf else None
 
 
 def _shapes(order: int) -> Array:

@@ -14,10 +14,9 @@ from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.section.round_layout import RoundLayout
-from softehl.cases.seal.solve.contact import contact_problem, contact_stage
-from softehl.cases.seal.solve.path import PathSettings, Stage
+from softehl.cases.seal.solve.contact import contact_problem, correction_stage
+from softehl.cases.seal.solve.path import Stage
 from softehl.cases.seal.solve.pressure_newton import lagged
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.lagged_pressure import element_pressures
@@ -46,11 +45,6 @@ from softehl.runtime.mesh.transfer import (
     transfer_loop,
     transfer_nodes,
 )
-
-
-def finer(parameters: ORing) -> ORing:
-    """The same case at twice the density."""
-    return parameters.model_copy(update={"density": 2 * parameters.density})
 
 
 @dataclass(frozen=True)
@@ -133,23 +127,21 @@ def _closed(system: SealSystem, chain: str) -> bool:
 def carried_contact(
     old: SealSystem,
     new: SealSystem,
-    settings: PathSettings,
     x: Array,
+    sealed_pressure: float,
     name: str = "",
-    sealed_pressure: float | None = None,
 ) -> tuple[Stage, Array]:
     """A stage of one step that solves for contact on another mesh of a section, and its start.
 
-    x: unknowns of the contact state on the old mesh. name: of the stage, by the density if left
-    out. sealed_pressure: that of the state, MPa, if it is not that of the case.
+    x: unknowns of the contact state on the old mesh, under a sealed pressure, MPa. name: of the
+    stage, by the density if left out.
     """
     carry = _carrier(old, new)
-    p_s = new.parameters.sealed_pressure if sealed_pressure is None else sealed_pressure
-    pressures = element_pressures(contact_problem(old, settings, p_s), old.solids, x)
+    pressures = element_pressures(contact_problem(old, sealed_pressure), old.solids, x)
     y = _carried(old, new, carry, x)
-    bare = contact_problem(new, settings, p_s).since(y)
+    bare = contact_problem(new, sealed_pressure).since(y)
     problem = lagged(new, bare, carry.elements(pressures))
-    stage = contact_stage(new, problem, method=f"newton, {carry.words}", name=name)
+    stage = correction_stage(new, problem, method=f"newton, {carry.words}", name=name)
     return stage, y
 
 

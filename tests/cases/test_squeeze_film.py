@@ -9,11 +9,13 @@ import pytest
 
 from softehl.cases.seal.equations.system import DISPLACEMENT
 from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact import OFFSET
 from softehl.cases.seal.solve.film_correctors import FilmCorrectors
 from softehl.cases.seal.solve.films import NoFilm
+from softehl.cases.seal.solve.inlet import InletScales
 from softehl.cases.seal.solve.method import DryContact
 from softehl.cases.seal.solve.path import StageFailed
-from softehl.cases.seal.solve.squeezing import InletScales, Squeezing, gap_masses, pressed_film
+from softehl.cases.seal.solve.squeeze_film import SqueezeFilm, gap_masses, pressed_film
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.relaxed import Anchored, Relaxed
@@ -30,17 +32,17 @@ def dry() -> DryContact:
 
 
 @pytest.fixture(scope="module")
-def squeezing(dry: DryContact) -> Squeezing:
+def squeeze_film(dry: DryContact) -> SqueezeFilm:
     found = dry.film("out", 400.0)
     assert not isinstance(found, NoFilm), found.message
-    return found.squeezing
+    return found.squeeze_film
 
 
 @pytest.fixture
-def begun(dry: DryContact, squeezing: Squeezing) -> tuple[Relaxed, Array]:
+def begun(dry: DryContact, squeeze_film: SqueezeFilm) -> tuple[Relaxed, Array]:
     """A step of a thousandth of T from the start, and that start."""
     start = pressed_film(dry.system, dry.x, 3.0)
-    problem = squeezing.step(start, 1e-3, 0.5)
+    problem = squeeze_film.step(start, 1e-3, 0.5)
     return problem, problem.admissible(start)
 
 
@@ -64,7 +66,7 @@ def test_pressures_of_the_film_add_up_to_the_force_of_the_contact(
     z0 = z[system.dam]  # half of a segment beyond which there is no sealed pressure
     low = 0.5 * (z[system.dam - 1] + z0) + 0.5 * (z0 - z[system.dam - 1])
     pressing = -float((system.rod_multipliers(x) * system.rod_areas).sum())
-    r = system.rod_radius + dry.offset
+    r = system.rod_radius + OFFSET
     force = pressing + 3.0 * 2.0 * np.pi * r * (low - z[0])
     system.rod_multipliers(x)[:] *= share
     rows = pressed_film(system, x, 3.0)[system.pressure_dofs()]
@@ -96,14 +98,14 @@ def test_what_holds_no_length_of_the_rod_has_no_pressure_of_its_own(dry: DryCont
 
 @pytest.mark.parametrize("viscosity", [P.viscosity, 1e-11], ids=["usual", "thin"])
 def test_the_first_step_holds_the_film_where_it_is(
-    dry: DryContact, squeezing: Squeezing, viscosity: float
+    dry: DryContact, squeeze_film: SqueezeFilm, viscosity: float
 ) -> None:
     """Also of an oil whose film is a thousand times thinner than the gap of the contact."""
     p = P.model_copy(update={"viscosity": viscosity})
     system, start = dry.system.moved(p, dry.system.section), pressed_film(dry.system, dry.x, 3.0)
     scales = InletScales.of(system, "out", 400.0, dry.x)
     assert scales is not None
-    begun = replace(squeezing, system=system, scales=scales)
+    begun = replace(squeeze_film, system=system, scales=scales)
     steps, first = FilmCorrectors.of(system, dry.newton).steps(), begun.first
     found = steps.solve(begun.step(start, first, 0.0), start)
     assert found.converged, found.message
@@ -170,11 +172,11 @@ def test_a_step_is_the_same_for_newton_s_method(begun: tuple[Relaxed, Array]) ->
 
 
 def test_an_implicit_step_conserves_what_the_film_holds(
-    dry: DryContact, squeezing: Squeezing
+    dry: DryContact, squeeze_film: SqueezeFilm
 ) -> None:
     """Outflow minus inflow is what the film has lost, by the local time steps."""
     system, start = dry.system, pressed_film(dry.system, dry.x, 3.0)
-    step = squeezing.step(start, 0.3, 0.0)
+    step = squeeze_film.step(start, 0.3, 0.0)
     solution = FilmCorrectors.of(system, dry.newton).whole.solve(step, start)
     assert solution.converged, solution.message
     rows = np.setdiff1d(system.layout.dofs("pressure"), step.problem.fixed)
@@ -186,20 +188,20 @@ def test_an_implicit_step_conserves_what_the_film_holds(
 
 @pytest.mark.parametrize("ratio", [0.5, 2.0])
 def test_a_change_is_that_of_the_logarithm_of_the_gap(
-    dry: DryContact, squeezing: Squeezing, ratio: float
+    dry: DryContact, squeeze_film: SqueezeFilm, ratio: float
 ) -> None:
     system, x = dry.system, dry.x.copy()
     node = system.mesh.arc_nodes[5]
     _, h = system.arc_film(x)
     system.displacements(x)[node, 1] += (ratio - 1.0) * h[5]
-    assert squeezing.change(dry.x, x) == pytest.approx(np.log(2.0), rel=1e-6)
+    assert squeeze_film.change(dry.x, x) == pytest.approx(np.log(2.0), rel=1e-6)
     system.displacements(x)[node, 1] -= 2.0 * ratio * h[5]
-    assert squeezing.change(dry.x, x) == np.inf
+    assert squeeze_film.change(dry.x, x) == np.inf
 
 
-def test_scales_are_those_of_the_speed(dry: DryContact, squeezing: Squeezing) -> None:
-    slower = squeezing.at(100.0)
+def test_scales_are_those_of_the_speed(dry: DryContact, squeeze_film: SqueezeFilm) -> None:
+    slower = squeeze_film.at(100.0)
     own = dry.film("out", 100.0)
     assert not isinstance(own, NoFilm)
-    assert slower.scales.time == pytest.approx(own.squeezing.scales.time, rel=1e-12)
-    assert slower.scales.thickness == pytest.approx(own.squeezing.scales.thickness, rel=1e-12)
+    assert slower.scales.time == pytest.approx(own.squeeze_film.scales.time, rel=1e-12)
+    assert slower.scales.thickness == pytest.approx(own.squeeze_film.scales.thickness, rel=1e-12)

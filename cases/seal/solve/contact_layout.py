@@ -1,11 +1,8 @@
 """Where the mesh of the section is to be fine: at both edges of its contact, and below them.
 
-Film and dry contact differ most at the edges of the contact, where the dry pressure begins like a
-square root, p = K sqrt(distance): the inlet draws the film in just outside one edge, the exit dip
-lies just inside the other. Balance of viscous and elastic forces there, K / sqrt(l) = eta U / h^2
-with h = K l^(3/2) / E, gives both the length l = (eta U E^2 / K^3)^(2/5) at every speed (Snoeijer,
-Eggers and Venner, Phys. Fluids 25, 2013, 101705). So segments that grow with the distance from the
-edges and are as K^(-6/5) at them resolve every speed, and one mesh serves both strokes.
+There `solve.inlet` has a length of the film for every speed, which is as K^(-6/5). So segments that
+grow with the distance from the edges and are as K^(-6/5) at them resolve every speed, and one mesh
+serves both strokes.
 """
 
 from __future__ import annotations
@@ -19,7 +16,8 @@ from softehl.cases.seal.equations.system import AIR_WALL, BORE, ROD, SEALED_WALL
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
-from softehl.cases.seal.states.contacts import Edge, contact_edges
+from softehl.cases.seal.solve.inlet import film_thickness, inlet_length
+from softehl.cases.seal.states.contacts import contact_edges
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.sections import LONG
 from softehl.runtime.mesh.spacing import Spot, graded
@@ -76,9 +74,6 @@ one at density 2 is so much of the inlet at the slowest speed."""
 DEPTH = 2.5
 """Elements on such an arc are nowhere thicker than so many inlets at the slowest speed: with ten h*
 was two per cent too small, with half as many as this it changes by 0.2 %."""
-
-MULTIPLE = 1.75
-"""About h* in `film_thickness`, whatever the ring."""
 
 _THIRDS = 3  # of segments at density 1: meshes exist for thirds of a density
 _PLACED_COARSEST, _FLAT_COARSEST = 12, 24
@@ -140,28 +135,6 @@ def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) ->
     place = system.section.places[int(np.argmin(away))]
     fine = 0.25 * p.corner_fillet
     return Spot(min(place, ends[1]) - ends[0], np.inf, most=fine)
-
-
-def inlet_length(p: ORing, rise: float) -> float:
-    """Length l (mm) of the inlet at an edge of this K^2, at the slowest speed; see the head.
-
-    Between rough surfaces at least that over which h = K l^(3/2) / E rises by sigma.
-    """
-    flow, E = p.viscosity * min(p.speeds), 3.0 * p.surface_modulus
-    asperities = (p.surfaces.sigma * E / rise**0.5) ** (2.0 / 3.0)
-    return float(max((flow * E**2 / rise**1.5) ** 0.4, asperities))
-
-
-def inlet_time(p: ORing, edge: Edge, speed: float) -> float:
-    """Time (s) in which a rod passes the inlet at an edge at |U|."""
-    at_speed = p.model_copy(update={"speeds": (speed,)})
-    return inlet_length(at_speed, edge.rise) / speed
-
-
-def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
-    """About half of h* (mm) at |U|, K l^(3/2) / E with the l of the head of this page."""
-    flow, E = p.viscosity * speed, 3.0 * p.surface_modulus
-    return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
 
 
 def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) -> float:

@@ -19,7 +19,7 @@ _NEEDS: Mapping[str, tuple[Callable[[ORing], Any], str]] = {
 """Key -> whether it has an effect, and what it has none without."""
 
 
-def idle(p: ORing) -> list[str]:
+def unused_keys(p: ORing) -> list[str]:
     """Keys with a value of their own that have no effect, in words."""
     fields = type(p).model_fields
     return [

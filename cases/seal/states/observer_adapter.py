@@ -22,7 +22,7 @@ from softehl.runtime.io import number_text, read_columns, read_vtu
 
 
 @dataclass(frozen=True)
-class Teller(Observer):
+class ObserverAdapter(Observer):
     """Passes on what a run tells to an observer of the harness."""
 
     to: harness.Observer
@@ -49,16 +49,9 @@ class Teller(Observer):
             table = rows_of(row, state.sensitivity)
             columns = {n: np.array([getattr(r, n) for r in table]) for n in table[0].header()}
             self.to.files({f"sensitivity_{row.name}.csv": columns})
-        self._row(state, final=True)
-
-    def film_draft(self, state: FilmState) -> None:
-        """A row, its profile and its section, until the run has a better one."""
-        self._row(state, final=False)
-
-    def _row(self, state: FilmState, *, final: bool) -> None:
         profile = {name: getattr(state.profile, name) for name in PROFILE_COLUMNS}
         row, contents = FilmRow.part_of(state), (profile, state.section)
-        self.to.state(harness.State(row, contents, state.advice, final))
+        self.to.state(harness.State(row, contents, state.advice))
 
 
 def read_profile(folder: Path, row: FilmRow) -> Profile:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.solve.refinement import carried_elements, carried_unknowns
+from softehl.cases.seal.solve.contact_transfer import carried_elements, carried_unknowns
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.rules import lagrange, pressure_nodes
@@ -24,7 +24,7 @@ from softehl.runtime.mesh.carried_mesh import potential
 
 
 @dataclass(frozen=True, eq=False)
-class Carrier:
+class FilmTransfer:
     """From a mesh to another one of the same section; dry: contact states (n,), (n',) on both."""
 
     old: SealSystem

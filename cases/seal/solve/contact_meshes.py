@@ -1,0 +1,120 @@
+"""The meshes of the dry contact, each made for the contact that was seen on the one before.
+
+A path from rest is followed on a coarse mesh with equal segments, unless another run has left a
+state there. Graded meshes follow, and finer ones of the same layout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.solve.contact_layout import MOST_SEGMENTS, graded_layout, placed_layout
+from softehl.cases.seal.solve.contact_solver import ContactSolver, State
+from softehl.cases.seal.solve.contact_store import ContactStore, stored_contact
+from softehl.cases.seal.solve.path import Followed, StageFailed
+from softehl.cases.seal.states.contact_results import unsealed
+
+COARSE = 1
+"""Density of the mesh on which the path from rest is followed."""
+
+GUIDE = 2
+"""Density of the last graded mesh; finer ones have its layout."""
+
+PASSES = 3
+"""Graded meshes."""
+
+SEALS = 3
+"""How often a mesh is made anew because the sealed pressure ends where nothing touches."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMeshes:
+    """Finds the contact of a case on a mesh that fits it.
+
+    store: states of meshes with equal segments that runs leave for each other.
+    """
+
+    solver: ContactSolver
+    store: ContactStore = field(default_factory=ContactStore)
+
+    def contact(self, p: ORing) -> State | StageFailed:
+        """The system of a case and its unknowns (n,) in contact under p_s."""
+        graded = p.mesh == "graded" or (p.mesh == "uniform" and p.given_arc is None)
+        return self._graded(p) if graded else self._uniform(p)
+
+    def _uniform(self, p: ORing) -> State | StageFailed:
+        """On equal segments: the path on the coarsest mesh, then finer ones."""
+        first = p.density if p.solver != "auto" else COARSE
+        densities = list(_doublings(first, p.density))
+        kept = self.store.densities(p, densities) if p.solver == "auto" else []
+        system = build_system(_at(p, (*kept, first)[0]))
+        return self._finer(system, self._begun(system), p.density)
+
+    def _graded(self, p: ORing) -> State | StageFailed:
+        """On meshes that the contact places, the last of which is finer."""
+        # what sticks keeps the rotation of the mesh on which it began to
+        guide = min(GUIDE, p.density)
+        coarse = guide if p.rubs else COARSE
+        uniform = build_system(_at(p.model_copy(update={"mesh": "uniform"}), coarse))
+        x = self._begun(uniform)
+        state: State | StageFailed = x if isinstance(x, StageFailed) else (uniform, x)
+        for number in range(1, PASSES):
+            # the edges are seen only roughly: no reason for many segments
+            state = self._next(state, _at(p, coarse if number == 1 else guide), number, most=0)
+        state = self._sealed(_at(p, guide), state)
+        return state if isinstance(state, StageFailed) else self._finer(*state, p.density)
+
+    def _sealed(self, p: ORing, state: State | StageFailed) -> State | StageFailed:
+        """On the last of the graded meshes; on more where pressure ends outside the contact."""
+        for number in range(PASSES, PASSES + SEALS):
+            state = self._next(state, p, number)
+            if isinstance(state, StageFailed) or p.given_arc or not unsealed(*state):
+                break
+        return state
+
+    def _next(
+        self, state: State | StageFailed, p: ORing, number: int, most: int = MOST_SEGMENTS
+    ) -> State | StageFailed:
+        """On a mesh that is made for the contact on another one; most: as of `placed_layout`."""
+        if isinstance(state, StageFailed):
+            return state
+        layout = graded_layout(*state) if p.given_arc else placed_layout(*state, p, most)
+        return self.solver.from_mesh(
+            *state, build_system(p, layout), f"contact on graded mesh {number}"
+        )
+
+    def _begun(self, system: SealSystem) -> Followed:
+        """Unknowns (n,) on the first mesh: a stored state if there is a good one, else the path."""
+        p = system.parameters
+        if p.solver == "auto" and self.store.densities(p, (p.density,)):
+            x = self.solver.driver.follow(stored_contact(system), self.store.read(system))
+            if not isinstance(x, StageFailed):
+                return x
+        x = self.solver.from_rest(system)
+        if not isinstance(x, StageFailed):
+            self.store.keep(system, x)
+        return x
+
+    def _finer(self, system: SealSystem, x: Followed, density: int) -> State | StageFailed:
+        """On meshes of the same layout up to a density, doubling by doubling."""
+        state: State | StageFailed = x if isinstance(x, StageFailed) else (system, x)
+        while not isinstance(state, StageFailed) and state[0].parameters.density < density:
+            p, layout = state[0].parameters, state[0].section.layout
+            state = self.solver.from_mesh(*state, build_system(_at(p, 2 * p.density), layout))
+            if not isinstance(state, StageFailed) and p.mesh != "graded":
+                self.store.keep(*state)
+        return state
+
+
+def _doublings(first: int, last: int) -> Iterator[int]:
+    """first, 2 first, ... up to last."""
+    while first <= last:
+        yield first
+        first *= 2
+
+
+def _at(p: ORing, density: int) -> ORing:
+    return p.model_copy(update={"density": density})

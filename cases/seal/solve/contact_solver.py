@@ -1,0 +1,93 @@
+"""The dry contact on one mesh: by its path from rest, or from the state of another mesh.
+
+A loaded state of another mesh is carried over and corrected by Newton's method. Where that fails
+the path is taken up at a checkpoint under less pressure, carried in the same way; where no
+checkpoint leads on, at rest, which is the same on every mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.solve.checkpoints import Checkpoint, Checkpoints
+from softehl.cases.seal.solve.contact import (
+    approach_stage,
+    at_air_wall,
+    held_place,
+    load_stage,
+    path_corrector,
+    release_stage,
+)
+from softehl.cases.seal.solve.contact_transfer import carried_contact
+from softehl.cases.seal.solve.path import Followed, PathDriver, Stage, StageFailed
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.solution import Point
+
+State: TypeAlias = tuple[SealSystem, Array]
+
+_ON_THE_WAY = 1e-3
+"""Residual of states on the way to the sealed pressure, which are no results."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSolver:
+    """Finds contact states. driver: follows their paths; checkpoints: of the last of these."""
+
+    driver: PathDriver
+    checkpoints: Checkpoints = field(default_factory=Checkpoints)
+
+    def from_rest(self, system: SealSystem) -> Followed:
+        """The contact state (n,) by its path: rod approach, then the sealed pressure."""
+        x = self._follow(system, approach_stage(system), system.at_rest())
+        if isinstance(x, StageFailed) or held_place(system.parameters) is not None:
+            return x
+        place = None
+        if system.parameters.sealed_pressure > 0.0:
+            x, place = at_air_wall(system, x)
+        if system.parameters.rubs:
+            x, place = self._follow(system, release_stage(system, x), x), None
+        return x if isinstance(x, StageFailed) else self._loaded(system, x, place=place)
+
+    def from_mesh(
+        self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
+    ) -> State | StageFailed:
+        """The contact state x (n,) of one mesh on another; name: of the stage."""
+        pressure = new.parameters.sealed_pressure
+        found = self._corrected(Checkpoint(old, pressure, x), new, name)
+        for state in self.checkpoints.restarts(new.parameters):
+            if not isinstance(found, StageFailed):
+                break
+            found = self._corrected(state, new, f"contact at {state.pressure:.4g} MPa")
+            if not isinstance(found, StageFailed):
+                found = self._loaded(new, found, state.pressure)
+        if isinstance(found, StageFailed):
+            found = self.from_rest(new)
+        return found if isinstance(found, StageFailed) else (new, found)
+
+    def _corrected(self, state: Checkpoint, new: SealSystem, name: str) -> Followed:
+        """A state of another mesh on ours, (n,), under the same pressure."""
+        stage, start = carried_contact(state.system, new, state.x, state.pressure, name)
+        return self.driver.follow(stage, start)
+
+    def _loaded(
+        self, system: SealSystem, x: Array, begin: float = 0.0, place: float | None = None
+    ) -> Followed:
+        """From the section x (n,) to the sealed pressure; begin, place: as of `load_stage`."""
+        self.checkpoints.begin(begin)
+
+        def keep(point: Point) -> None:
+            self.checkpoints.keep(Checkpoint(system, point.parameter, point.solution.x))
+
+        return self._follow(system, replace(load_stage(system, begin, place), on_point=keep), x)
+
+    def _follow(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
+        """To the end of a stage, roughly, and there as exactly as any state."""
+        newton = self.driver.newton
+        rough = path_corrector(system, replace(newton, tolerance=_ON_THE_WAY, stagnation=1.0))
+        end = self.driver.follow(replace(stage, corrector=rough), x)
+        if rough is None or isinstance(end, StageFailed):
+            return end
+        last = replace(stage, start=stage.stop, corrector=path_corrector(system, newton))
+        return self.driver.follow(last, end)

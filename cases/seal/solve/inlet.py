@@ -1,0 +1,72 @@
+"""The scales of a film at the edge of the dry contact where it is drawn in.
+
+The dry pressure begins like a square root there, p = K sqrt(distance): the inlet draws the film in
+just outside one edge, the exit dip lies just inside the other. Balance of viscous and elastic
+forces, K / sqrt(l) = eta U / h^2 with h = K l^(3/2) / E, gives the length
+l = (eta U E^2 / K^3)^(2/5) at every speed (Snoeijer, Eggers and Venner, Phys. Fluids 25, 2013,
+101705).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+
+from softehl.cases.seal.equations.equations import SealSystem
+from softehl.cases.seal.equations.loads import Stroke
+from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.states.contacts import Edge, contact_edges
+from softehl.runtime.arrays import Array
+
+MULTIPLE = 1.75
+"""About h* in `film_thickness`, whatever the ring."""
+
+
+@dataclass(frozen=True)
+class InletScales:
+    """Time T (s) and thickness h_r (mm) of a film at its inlet."""
+
+    time: float
+    thickness: float
+
+    @classmethod
+    def of(cls, system: SealSystem, stroke: Stroke, speed: float, x: Array) -> InletScales | None:
+        """By the edge of the contact x (n,) where a stroke draws its oil in; None without one."""
+        edge, p = inlet_edge(system, stroke, x), system.parameters
+        if edge is None:
+            return None
+        return cls(inlet_time(p, edge, speed), MULTIPLE * film_thickness(p, [edge], speed))
+
+    def at(self, ratio: float) -> InletScales:
+        """Those at another speed, which is so many times ours: l is as U^0.4, h as U^0.6."""
+        return InletScales(self.time * ratio**-0.6, self.thickness * ratio**0.6)
+
+
+def inlet_length(p: ORing, rise: float) -> float:
+    """Length l (mm) of the inlet at an edge of this K^2, at the slowest speed, see above.
+
+    Between rough surfaces at least that over which h = K l^(3/2) / E rises by sigma.
+    """
+    flow, E = p.viscosity * min(p.speeds), 3.0 * p.surface_modulus
+    asperities = (p.surfaces.sigma * E / rise**0.5) ** (2.0 / 3.0)
+    return float(max((flow * E**2 / rise**1.5) ** 0.4, asperities))
+
+
+def inlet_time(p: ORing, edge: Edge, speed: float) -> float:
+    """Time (s) in which a rod passes the inlet at an edge at |U|."""
+    at_speed = p.model_copy(update={"speeds": (speed,)})
+    return inlet_length(at_speed, edge.rise) / speed
+
+
+def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
+    """About half of h* (mm) at |U|, K l^(3/2) / E with the l above."""
+    flow, E = p.viscosity * speed, 3.0 * p.surface_modulus
+    return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
+
+
+def inlet_edge(system: SealSystem, stroke: Stroke, x: Array) -> Edge | None:
+    """The edge of the contact x (n,) where a stroke draws its film in; None without one."""
+    edges = contact_edges(system, x)
+    found = edges[0 if stroke == "out" else -1] if edges else None
+    return found if found and 0.0 < found.rise < inf else None
