@@ -73,6 +73,19 @@ class Outline:
         (z, r), ends = centre, ((centre[0], centre[1] - radius), (centre[0], centre[1] + radius))
         return cls([Arc(ends[0], ends[1], (z, r)), Arc(ends[1], ends[0], (z, r))])
 
+    @cached_property
+    def disc(self) -> tuple[Point, float] | None:
+        """Centre and radius, mm, of an outline that is a circle, in one arc or several."""
+        first = self.pieces[0]
+        if not isinstance(first, Arc):
+            return None
+        whole = Arc(first.start, first.start, first.centre)
+        ends = np.array([piece.start for piece in self.pieces])
+        away = np.linalg.norm(ends - np.array(whole.centre), axis=1) - whole.radius
+        bent = all(abs(piece.curvature * whole.radius - 1.0) < CLOSED for piece in self.pieces)
+        round_ = bent and np.abs(away).max() < CLOSED * self.size
+        return (whole.centre, whole.radius) if round_ else None
+
     @property
     def size(self) -> float:
         """Diagonal of the box around the outline, mm."""

@@ -16,7 +16,13 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.outline_layout import AROUND, SMOOTH, BoundaryLayout, normals
-from softehl.runtime.mesh.sections import LAYERS, SectionMesh, corner_shares, graded_steps
+from softehl.runtime.mesh.sections import (
+    LAYERS,
+    SectionMesh,
+    corner_shares,
+    graded_steps,
+    grid_cells,
+)
 from softehl.runtime.mesh.spacing import Spacing
 from softehl.runtime.mesh.subdivide import subdivided
 from softehl.runtime.mesh.triangles import triangulate
@@ -122,8 +128,7 @@ def _strip(layout: BoundaryLayout, density: Fraction, part: float, growth: float
 
 def _strip_quads(rows: int, around: int) -> Integers:
     numbers = np.arange(rows * around).reshape(rows, around)
-    after = np.roll(numbers, -1, axis=1)
-    return np.stack([numbers[:-1], after[:-1], after[1:], numbers[1:]], axis=-1).reshape(-1, 4)
+    return grid_cells(np.append(numbers, numbers[:, :1], axis=1))
 
 
 def _divisions(density: Fraction) -> int:

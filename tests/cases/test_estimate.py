@@ -23,7 +23,7 @@ from softehl.cases.seal.states.state import (
     Silent,
 )
 from softehl.cases.seal.states.verdict import FilmNumbers
-from softehl.runtime.mesh.sections import Disc, disc_mesh
+from softehl.runtime.mesh.o_grid import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
 CONVERGED = {1600.0: 3.1842, 100.0: 0.59552}

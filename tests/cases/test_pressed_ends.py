@@ -11,7 +11,7 @@ import pytest
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.section.round_layout import RoundLayout
+from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.solve.contact_layout import placed_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
@@ -19,7 +19,8 @@ from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import contact_pressure, unsealed
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.sections import Disc
+from softehl.runtime.mesh.outline import Outline, Shape
+from softehl.runtime.mesh.section_mesh import Sizes
 
 P = ORing(ring="AS568-210", rod=19.0, gland="dynamic", density=1, sealed_pressure=3.0)
 
@@ -42,19 +43,23 @@ def usual() -> State:
     return found
 
 
+def place(angle: float | None) -> float | None:
+    """That on the circle at an angle from its bottom, degrees, mm."""
+    return None if angle is None else float(np.radians(angle)) * 0.5 * P.section_diameter
+
+
 def ending_at(lip: float | None, crown: float | None) -> State:
     """The state on the mesh of the usual one, its pressure ending at other angles, degrees."""
     system, x = usual()
     layout = system.section.layout
-    assert isinstance(layout, RoundLayout)
-    new = build_system(P, replace(layout, dams=(lip, crown)))
+    dams = place(lip), place(crown)
+    new = build_system(P, replace(layout, dams=dams))
     return new, elsewhere(system, x, new)
 
 
-def corrected(system: SealSystem, x: Array) -> RoundLayout:
+def corrected(system: SealSystem, x: Array) -> Layout:
     rod, housing = (system.pressing(name, x) for name in (ROD, BORE))
     layout = system.section.layout.held(system.mesh, rod, housing, P.sealed_pressure)
-    assert isinstance(layout, RoundLayout)
     return layout
 
 
@@ -83,7 +88,7 @@ def test_pressure_that_ends_outside_the_contact_is_led_to_it(
     system, x = ending_at(lip, crown)
     assert where in unsealed(system, x)
     layout = corrected(system, x)
-    assert layout.dams != (lip, crown)
+    assert layout.dams != system.section.layout.dams
     new = build_system(P, layout)
     y = elsewhere(system, x, new)
     assert unsealed(new, y) == ""
@@ -101,16 +106,15 @@ def test_meshes_are_made_until_the_pressure_ends_in_the_contact() -> None:
     system, x = found
     assert unsealed(system, x) == ""
     layout = placed_layout(*start, P)
-    assert isinstance(layout, RoundLayout)
     assert layout.dams[0] is not None
-    assert isinstance(system.section.layout, RoundLayout)
     assert system.section.layout.dams[0] == layout.dams[0]
 
 
-def test_angles_are_measured_round_the_circle() -> None:
-    layout = RoundLayout(Disc(0.0, 10.0, 1.0, -75.0, 75.0, top=118.0), dams=(-20.0, -179.5))
+def test_places_are_measured_round_the_circle() -> None:
+    shape = Shape.facing(Outline.circle((0.0, 10.0), 1.0), (0.0, 11.0), "ring")
+    layout = Layout(shape, shape.film, Sizes(), dams=(np.radians(-20.0), np.radians(-179.5)))
     mesh = layout.mesh(2)
-    z, r = (mesh.points[mesh.arc_nodes[layout.lowest(mesh)]] - layout.disc.centre).T
+    z, r = (mesh.points[mesh.arc_nodes[layout.lowest(mesh)]] - [0.0, 10.0]).T
     assert np.degrees(np.arctan2(z, -r)) == pytest.approx(-20.0, abs=2.0)
-    z, r = (mesh.points[mesh.outer_nodes[layout.pressed(mesh)]] - layout.disc.centre).T
+    z, r = (mesh.points[mesh.outer_nodes[layout.pressed(mesh)]] - [0.0, 10.0]).T
     assert abs(np.degrees(np.arctan2(z, -r))) == pytest.approx(179.5, abs=5.0)

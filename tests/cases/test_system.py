@@ -1,6 +1,7 @@
 """The coupled system: declared once, counts of Table 2, loads, tangent of the whole."""
 
 import ast
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,7 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.scales import film_flux
 from softehl.cases.seal.equations.system import BLOCKS, DISPLACEMENT, FIELDS, PRESSURE
-from softehl.cases.seal.section.round_layout import RoundLayout
-from softehl.cases.seal.section.section import SealSection
-from softehl.runtime.mesh.sections import Disc, disc_mesh
+from softehl.cases.seal.section.section import seal_section
 from tests.cases.oring_cases import oring
 
 TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16: (189941, 1729)}
@@ -21,9 +20,9 @@ TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16:
 
 @pytest.mark.parametrize("d", TABLE_2)
 def test_unknowns_of_table_2(d: int) -> None:
-    disc = Disc(0.0, 26.96, 1.765, -34.0, 43.0)
-    section = SealSection(RoundLayout(disc), disc_mesh(disc, d))
-    layout = Numbering.of(FIELDS, oring(density=1), section).layout
+    p = oring(density=1, mesh="uniform", arc_start=-34.0, arc_end=43.0)
+    section = seal_section(p, density=Fraction(d))
+    layout = Numbering.of(FIELDS, p, section).layout
     total, pressures = TABLE_2[d]
     assert layout.count(PRESSURE) == pressures == 108 * d + 1
     assert layout.total == pytest.approx(total, rel=0.03)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from softehl.runtime.mesh.sections import Disc, SectionMesh, corner_jacobians, disc_mesh
+from softehl.runtime.mesh.o_grid import Disc, disc_mesh
+from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
 
 ARCS = [(-34.0, 43.0), (-45.0, 45.0), (-60.0, 70.0)]
 DENSITIES = [1, 2, 4, 8, 16]

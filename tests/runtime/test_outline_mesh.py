@@ -5,15 +5,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from softehl.runtime.mesh import carrying
-from softehl.runtime.mesh.carrying import (
-    carry_boundary,
-    carry_chain,
-    carry_displacements,
-    carry_elements,
-    carry_nodes,
-    places_of,
-)
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.mesh.outline import Outline, Shape, rounded
 from softehl.runtime.mesh.outline_mesh import outline_mesh
@@ -117,70 +108,3 @@ def test_the_patch_test_is_passed(name: str) -> None:
     mesh = mesh_of(SHAPES[name], 1)
     assert imbalance(mesh, (0.2, -0.1)) < 1e-11
     assert imbalance(mesh, (0.2, -0.1), bow=1e-3) > 1e-5
-
-
-def quadratic(points: np.ndarray) -> np.ndarray:
-    z, r = points[:, 0], points[:, 1] - 26.0
-    return np.stack([1.0 + z - r**2, z * r + 0.5 * z**2], axis=1)
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_quadratic_fields_are_carried_over_exactly(name: str) -> None:
-    old, shape = mesh_of(SHAPES[name], 2), SHAPES[name]
-    new = outline_mesh(shape, (shape.film[0] + 0.1, shape.film[1] - 0.2), None, 42, 2)
-    moved = carry_nodes(old, new, quadratic(old.points))
-    assert moved == pytest.approx(quadratic(new.points), abs=1e-11)
-    cubic = carry_nodes(old, new, old.points[:, :1] ** 3) - new.points[:, :1] ** 3
-    assert 1e-9 < np.abs(cubic).max() < 1e-2
-    assert carry_nodes(old, old, np.sin(old.points)) == pytest.approx(np.sin(old.points), abs=1e-12)
-    constant = carry_elements(old, new, np.full(len(old.quads), 7.0))
-    assert constant == pytest.approx(np.full(len(new.quads), 7.0))
-
-
-def test_displacements_that_a_spline_would_fold_are_carried_bilinearly(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    old, shape = mesh_of(SHAPES["horn"], 2), SHAPES["horn"]
-    new = outline_mesh(shape, (shape.film[0] + 0.1, shape.film[1] - 0.2), None, 42, 2)
-    sheared = 0.1 * quadratic(old.points)
-    smooth = carry_nodes(old, new, sheared)
-    assert (carry_displacements(old, new, sheared) == smooth).all()
-    folded = smooth.copy()
-    layer = np.linalg.norm(np.diff(new.points[new.quads[0]], axis=0), axis=1).max()
-    folded[new.quads[0, 0]] += 2.0 * layer
-    monkeypatch.setattr(carrying, "carry_nodes", lambda *_: folded)
-    plain = carry_displacements(old, new, sheared)
-    assert np.abs(plain - smooth).max() < 1e-2
-    assert not (plain == smooth).all()
-
-
-def test_nothing_is_carried_across_a_mouth() -> None:
-    """Two arms 0.3 mm apart, one of which has moved."""
-    arms = [(0, 0), (4, 0), (4, 1.0), (0.5, 1.0), (0.5, 1.3), (4, 1.3), (4, 2.3), (0, 2.3)]
-    shape = Shape(Outline(rounded(arms, 0.1)), (0.0, 4.0), (12.0, 0.0), "fork")
-    old, new = (outline_mesh(shape, shape.film, None, 33, d) for d in (1, Fraction(4, 3)))
-
-    def moved(mesh: SectionMesh) -> np.ndarray:
-        z, r = mesh.points.T
-        return np.where(r > 1.15, np.maximum(z - 0.5, 0.0) ** 2, 0.0)[:, None]
-
-    assert carry_nodes(old, new, moved(old)) == pytest.approx(moved(new), abs=0.02)
-
-
-def test_places_carry_the_boundary() -> None:
-    shape = SHAPES["horn"]
-    old = mesh_of(shape, 2)
-    new = outline_mesh(shape, (shape.film[0] + 0.1, shape.film[1] - 0.2), None, 42, 2)
-
-    def wave(mesh: SectionMesh) -> np.ndarray:
-        return np.asarray(np.cos(2.0 * np.pi * mesh.places / mesh.length))
-
-    assert carry_boundary(old, new, wave(old)) == pytest.approx(wave(new), abs=1e-3)
-    values = np.zeros(len(old.arc_nodes))
-    values[5:9] = -3.0
-    chain = carry_chain(old, new, old.arc_nodes, new.arc_nodes, values)
-    assert -3.0 <= chain.min() < -2.5
-    assert chain.max() <= 0.0
-    outer = carry_chain(old, new, old.outer_nodes, new.outer_nodes, places_of(old, old.outer_nodes))
-    ends = places_of(old, old.outer_nodes)[[0, -1]]
-    assert outer == pytest.approx(np.clip(places_of(new, new.outer_nodes), *ends), abs=1e-12)

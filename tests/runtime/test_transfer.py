@@ -1,74 +1,90 @@
-"""From mesh to mesh: quadratic fields are carried over exactly, chains keep their bounds."""
+"""From mesh to mesh: linear fields exactly, nothing across a mouth, chains keep their bounds."""
 
-from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from softehl.runtime.mesh.sections import Disc, corner_jacobians, disc_mesh
+from softehl.runtime.mesh.outline import Outline, Shape, rounded
+from softehl.runtime.mesh.section_mesh import Sizes, section_mesh
+from softehl.runtime.mesh.sections import SectionMesh
 from softehl.runtime.mesh.spacing import Spot, graded
-from softehl.runtime.mesh.transfer import transfer_chain, transfer_elements, transfer_nodes
-
-OLD = disc_mesh(Disc(0.0, 26.0, 1.7, -34.0, 43.0), 2)
-NEW = disc_mesh(
-    Disc(
-        *(0.0, 26.0, 1.7, -34.0, 43.0),
-        top=95.0,
-        layer_growth=15.0,
-        spacing=graded(2.28, (Spot(0.5), Spot(1.6)), 54, coarsest=0.1, rate=0.25),
-    ),
-    2,
+from softehl.runtime.mesh.transfer import (
+    places_of,
+    transfer_boundary,
+    transfer_chain,
+    transfer_elements,
+    transfer_nodes,
 )
+from tests.runtime.test_outline_mesh import SHAPES
+
+FORK = [(0, 0), (4, 0), (4, 1.0), (0.5, 1.0), (0.5, 1.3), (4, 1.3), (4, 2.3), (0, 2.3)]
 
 
-def test_quadratic_fields_are_carried_over_exactly() -> None:
-    def field(points: np.ndarray) -> np.ndarray:
-        z, r = points[:, 0], points[:, 1] - 26.0
-        return np.stack([1.0 + z - r**2, z * r + 0.5 * z**2], axis=1)
-
-    assert transfer_nodes(OLD, NEW, field(OLD.points)) == pytest.approx(field(NEW.points), abs=1e-9)
-
-
-def test_a_cubic_field_is_not() -> None:
-    values = OLD.points[:, :1] ** 3
-    error = np.abs(transfer_nodes(OLD, NEW, values) - NEW.points[:, :1] ** 3).max()
-    assert 1e-9 < error < 1e-2
+def meshes(name: str) -> tuple[SectionMesh, SectionMesh]:
+    """One of equal segments, and one of other segments on another part of the outline."""
+    shape = SHAPES[name]
+    film = shape.film[0] + 0.1, shape.film[1] - 0.2
+    length = film[1] - film[0]
+    fine = graded(length, (Spot(0.5), Spot(1.5)), 84, coarsest=0.1 * length, rate=0.3)
+    old = section_mesh(shape, shape.film, Sizes(33), 2)
+    return old, section_mesh(shape, film, Sizes(42, fine, 0.01), 2)
 
 
-def test_constant_element_values_stay_constant() -> None:
-    constant = np.full(len(OLD.quads), 7.0)
-    assert transfer_elements(OLD, NEW, constant) == pytest.approx(np.full(len(NEW.quads), 7.0))
+@pytest.mark.parametrize("name", SHAPES)
+def test_linear_fields_are_exact_and_quadratic_ones_nearly(name: str) -> None:
+    old, new = meshes(name)
+    sag = 0.006  # of the old boundary: what is outside gets what is nearest
+    assert transfer_nodes(old, new, old.points) == pytest.approx(new.points, abs=sag)
+    inside = np.setdiff1d(np.arange(len(new.points)), np.unique(new.quads[: len(new.boundary)]))
+    moved = transfer_nodes(old, new, old.points)[inside]
+    away = np.abs(moved - new.points[inside]).max(axis=1)
+    assert np.quantile(away, 0.9) < 1e-12
+    z = old.points[:, :1]
+    error = np.abs(transfer_nodes(old, new, z**2) - new.points[:, :1] ** 2).max()
+    assert 1e-6 < error < 0.05
+    same = transfer_nodes(old, old, np.sin(old.points))
+    assert same == pytest.approx(np.sin(old.points), abs=1e-12)
 
 
-def test_a_mesh_is_carried_over_to_itself() -> None:
-    values = np.sin(3.0 * OLD.points)
-    assert transfer_nodes(OLD, OLD, values) == pytest.approx(values, abs=1e-12)
+@pytest.mark.parametrize("name", SHAPES)
+def test_values_of_elements_are_those_at_their_middles(name: str) -> None:
+    old, new = meshes(name)
+    values = old.points[old.quads].mean(axis=1)[:, 0]
+    moved = transfer_elements(old, new, values)
+    sides = np.ptp(old.points[old.quads], axis=1).max()
+    assert np.abs(moved - new.points[new.quads].mean(axis=1)[:, 0]).max() < sides
+    assert (transfer_elements(old, old, values) == values).all()
 
 
-@pytest.mark.parametrize("part", ["arc_nodes", "outer_nodes"])
-def test_a_chain_keeps_to_the_values_of_its_neighbours(part: str) -> None:
-    nodes, new_nodes = getattr(OLD, part), getattr(NEW, part)
-    values = np.zeros(len(nodes))
-    values[5:9] = -3.0
-    moved = transfer_chain(OLD, NEW, nodes, new_nodes, values)
-    assert moved.shape == (len(new_nodes),)
-    assert -3.0 <= moved.min() < -2.5
-    assert moved.max() <= 0.0
-    assert moved[[0, -1]].tolist() == [0.0, 0.0]
+def test_nothing_is_carried_across_a_mouth() -> None:
+    """Two arms 0.3 mm apart, one of which has moved."""
+    shape = Shape(Outline(rounded(FORK, 0.1)), (0.0, 4.0), (12.0, 0.0), "fork")
+    old, new = (section_mesh(shape, shape.film, Sizes(33), d) for d in (1, Fraction(4, 3)))
+
+    def moved(mesh: SectionMesh) -> np.ndarray:
+        z, r = mesh.points.T
+        return np.where(r > 1.15, np.maximum(z - 0.5, 0.0) ** 2, 0.0)[:, None]
+
+    assert transfer_nodes(old, new, moved(old)) == pytest.approx(moved(new), abs=0.05)
 
 
-def test_a_field_on_long_elements_is_bilinear() -> None:
-    z, r = np.meshgrid(1e-3 * np.arange(40.0), np.arange(10.0))
-    first = 40 * np.arange(9)[:, None] + np.arange(39)
-    quads = np.stack([first, first + 1, first + 41, first + 40], axis=-1).reshape(-1, 4)
-    rows = replace(OLD, points=np.stack([z.ravel(), r.ravel()], axis=1), quads=quads)
-    inside = replace(NEW, points=np.array([[0.0101, 3.3], [0.0256, 8.9]]))
-    assert transfer_nodes(rows, inside, rows.points) == pytest.approx(inside.points, abs=1e-9)
+@pytest.mark.parametrize("name", SHAPES)
+def test_places_carry_the_boundary(name: str) -> None:
+    old, new = meshes(name)
 
+    def wave(mesh: SectionMesh) -> np.ndarray:
+        return np.asarray(np.cos(2.0 * np.pi * mesh.places / mesh.length))
 
-def test_thin_elements_are_not_turned_over() -> None:
-    thin = Disc(0.0, 26.0, 1.7, -34.0, 43.0, layers=6, layer_growth=2.0**12)
-    old, new = disc_mesh(thin, 2), disc_mesh(replace(thin, arc_end=40.0), 2)
-    moved = transfer_nodes(old, new, 0.3 * np.sin(2.0 * old.points))
-    assert np.abs(moved - 0.3 * np.sin(2.0 * new.points)).max() < 0.006
-    assert corner_jacobians(replace(new, points=new.points + moved)).min() > 0.1
+    assert transfer_boundary(old, new, wave(old)) == pytest.approx(wave(new), abs=0.01)
+    for part in ("arc_nodes", "outer_nodes"):
+        nodes, new_nodes = getattr(old, part), getattr(new, part)
+        values = np.zeros(len(nodes))
+        values[5:9] = -3.0
+        chain = transfer_chain(old, new, nodes, new_nodes, values)
+        assert -3.0 <= chain.min() < -2.5
+        assert chain.max() <= 0.0
+    ends = places_of(old, old.outer_nodes)
+    outer = transfer_chain(old, new, old.outer_nodes, new.outer_nodes, ends)
+    expected = np.clip(places_of(new, new.outer_nodes), *ends[[0, -1]])
+    assert outer == pytest.approx(expected, abs=1e-12)

@@ -5,91 +5,132 @@ Whatever comes behind asks a `Layout` for its mesh and for where the sealed pres
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from math import inf
-from typing import Protocol
 
 import numpy as np
 
+from softehl.cases.seal.gland.sections.files import finer
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.postprocess import run_around
+from softehl.runtime.mesh.outline import Shape
+from softehl.runtime.mesh.section_mesh import Sizes, section_mesh
 from softehl.runtime.mesh.sections import SectionMesh
 from softehl.runtime.mesh.spacing import Spacing
 
+_LEVEL, _LOOKED_AT = 1e-6, 4001  # of the height: what is level; places of a film that are compared
 
-class Layout(Protocol):
-    """A section in its reference configuration and how a mesh is laid into it; lengths in mm."""
+
+@dataclass(frozen=True)
+class Layout:
+    """A section in its reference configuration and how a mesh is laid into it; lengths in mm.
+
+    film: ends (s0, s1) of the lubricated part of the outline, the arc. dams: places on the outline
+    at which the sealed pressure ends on the rod and on the housing; None: where the shape has
+    them. base: the mesh of a file at density 1, every element of which the density divides.
+    """
+
+    shape: Shape
+    film: tuple[float, float]
+    sizes: Sizes
+    dams: tuple[float | None, float | None] = (None, None)
+    base: SectionMesh | None = None
 
     @property
     def long(self) -> int:
         """Segments of the arc at density 1."""
+        return self.sizes.long
 
     @property
     def spacing(self) -> Spacing | None:
         """That of the nodes along the arc, None where they are equally spaced."""
+        return self.sizes.spacing
 
     @property
     def flat(self) -> bool:
         """Whether a contact may have flats, at whose corners pressure peaks."""
+        return self.shape.outline.disc is None
 
     @property
     def contour(self) -> Array:
         """Points (n, 2) in (z, r) of its boundary, for pictures."""
+        outline = self.shape.outline
+        even = np.linspace(0.0, outline.length, 721)
+        return outline.at(np.unique(np.concatenate([even, outline.starts])))
 
     def mesh(self, density: int | Fraction) -> SectionMesh:
         """The mesh of a density."""
-
-    def lowest(self, mesh: SectionMesh) -> int:
-        """The arc node at which the sealed pressure of the contact ends: that nearest to the rod,
-        or where the section was seen to touch it.
-        """
+        if self.base is not None:
+            return finer(self.base, int(density))
+        return section_mesh(self.shape, self.film, self.sizes, density)
 
     def pressed(self, mesh: SectionMesh) -> int:
         """The first outer segment that the sealed pressure acts on, which it does up to the arc."""
+        begin, crown = mesh.places[0], self.dams[1]
+        crown = self.shape.pressure[0] if crown is None else crown
+        crown = begin + (crown - begin) % mesh.length
+        return int(np.argmin(np.abs(mesh.places[mesh.arc :] - crown)))
+
+    def lowest(self, mesh: SectionMesh) -> int:
+        """The arc node at which the sealed pressure of the contact ends.
+
+        That at the middle of a flat, at the last of two lobes: a film fills the groove. Of the
+        outline, not of the mesh: nodes stand elsewhere on each of two lobes, so that one mesh would
+        have the pressure in the groove and the next one not.
+        """
+        place = self._last_lobe if self.dams[0] is None else self.dams[0]
+        return int(np.argmin(np.abs(mesh.arc_places - (place - self.film[0]))))
+
+    @cached_property
+    def _last_lobe(self) -> float:
+        """Place of the last of the lowest points of the film, the middle of a flat."""
+        places, (_, low, _, high) = np.linspace(*self.film, _LOOKED_AT), self.shape.outline.box
+        r = self.shape.outline.at(places)[:, 1]
+        level = np.flatnonzero(r <= r.min() + _LEVEL * (high - low))
+        flat = np.split(level, np.flatnonzero(np.diff(level) > 1) + 1)[-1]
+        return float(places[flat[len(flat) // 2]])
 
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> Layout:
         """The same with the sealed pressure ending where contact holds it back.
 
         rod, housing: pressures in excess of it, (arc nodes,) and (outer nodes,) of this mesh, MPa.
         """
+        last = len(housing) - 1  # the pressure comes from there, round the sealed side
+        lip = dam(rod, self.lowest(mesh), p_s)
+        crown = dam(housing[::-1], last - self.pressed(mesh), p_s)
+        dams = (
+            self.dams[0] if lip is None else float(mesh.places[lip]),
+            self.dams[1] if crown is None else float(mesh.places[self._outer(mesh, last - crown)]),
+        )
+        return replace(self, dams=dams)
+
+    @staticmethod
+    def _outer(mesh: SectionMesh, index: int) -> int:
+        """Index in the boundary of an outer node."""
+        return (mesh.arc + index) % len(mesh.boundary)
 
     def bounds(self, old: Layout) -> tuple[float, float]:
-        """Places (mm) on the arc of another one between which parts of this one's lie."""
+        """Places (mm) on the arc of another one between which the arc may be laid.
+
+        The ends of this one on a circle; elsewhere those of the other one, as what lies beyond may
+        be a corner or a wall.
+        """
+        begin, end = old.film if self.flat else self.film
+        return begin - old.film[0], end - old.film[0]
 
     def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
-        """The same laid out on an arc whose ends are at these places of that of another one."""
-
-    def graded(
-        self, spacing: Spacing, long: int, depth: float = inf, first: float | None = None
-    ) -> Layout:
-        """With these segments on the arc.
-
-        depth: that elements on the arc are to have at most, mm, as far as their number allows.
-        first: size of the segment beyond the air end of the arc, mm.
+        """The same with the dams of another one, and, unless its mesh is that of a file, its arc
+        between these places on the arc of that one.
         """
+        begin, end = (old.film[0] + place for place in ends)
+        film = (begin, end) if self.base is None else self.film
+        return replace(self, film=film, dams=old.dams)
 
-
-def dam_nodes(
-    layout: Layout, mesh: SectionMesh, rod: Array, housing: Array, p_s: float
-) -> tuple[int | None, int | None]:
-    """Numbers along the boundary of the nodes that `Layout.held` moves the pressure's ends to.
-
-    Of that on the rod and that on the housing; None where it stays.
-    """
-    last = len(housing) - 1  # the pressure comes from there, round the sealed side
-    lip = dam(rod, layout.lowest(mesh), p_s)
-    crown = dam(housing[::-1], last - layout.pressed(mesh), p_s)
-    return lip, None if crown is None else (mesh.arc + last - crown) % len(mesh.boundary)
-
-
-def moved_dams(
-    dams: tuple[float | None, float | None], nodes: tuple[int | None, int | None], at: Array
-) -> tuple[float | None, float | None]:
-    """The dams at these nodes of the boundary, None: as before.  at: (boundary nodes,)."""
-    lip, crown = (
-        old if node is None else float(at[node]) for old, node in zip(dams, nodes, strict=True)
-    )
-    return lip, crown
+    def graded(self, spacing: Spacing, long: int, depth: float = inf, first: float = inf) -> Layout:
+        """With these segments on the arc; see `Sizes` for the others."""
+        return replace(self, sizes=Sizes(long, spacing, depth, first))
 
 
 def dam(excess: Array, index: int, p_s: float) -> int | None:

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import pi, radians
 
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.section.layout import Layout
-from softehl.cases.seal.section.outline_layout import FileLayout, OutlineLayout
-from softehl.cases.seal.section.round_layout import RoundLayout
 from softehl.runtime.mesh.outline import Shape, gentle
-from softehl.runtime.mesh.sections import Disc
+from softehl.runtime.mesh.section_mesh import Sizes
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded
-
-GUIDE_ARC, GUIDE_TOP = 75.0, 118.0
-"""Half the angle of the arc on which contact is first looked for, and where the top begins."""
 
 EDGE_ANGLES = range(27, 70, 3)
 """Where a section meets the edge of the gap under pressure, degrees from the bottom."""
@@ -31,20 +25,18 @@ BEYOND = 0.3
 
 def uniform_layout(p: ORing) -> Layout:
     """The section of a case with equal segments on its arc, the given one or a wide guide."""
+    shape = p.free_section
     if p.mesh == "file":
-        return FileLayout.of(p)
-    if not p.round:
-        shape = p.free_section
-        rolls = p.sealed_pressure > 0.0  # else both sides are to be alike
-        film = _reaching(shape, BEYOND * p.section_diameter if rolls else 0.0)
-        return OutlineLayout(shape, film, None, p.lobes * LONG_PLACED)
-    radius = 0.5 * p.section_diameter
-    centre = 0.0, 0.5 * p.inner_diameter + radius
+        return Layout(shape, shape.film, Sizes(p.file_mesh.arc), base=p.file_mesh)
     if p.given_arc:
-        return RoundLayout(Disc(*centre, radius, *p.given_arc))
-    long = LONG_OPEN if p.opens else LONG_PLACED
-    guide = Disc(*centre, radius, -GUIDE_ARC, GUIDE_ARC, top=GUIDE_TOP, long=long)
-    return RoundLayout(replace(guide, spacing=_fine_at_edge(guide)) if p.opens else guide)
+        start, end = (radians(angle) * 0.5 * p.section_diameter for angle in p.given_arc)
+        return Layout(shape, (start, end), Sizes())
+    if p.opens:
+        return Layout(shape, shape.film, Sizes(LONG_OPEN, _fine_at_edge(shape)))
+    # under pressure a section rolls; without, both its sides are to be alike
+    rolls = shape.outline.disc is None and p.sealed_pressure > 0.0
+    film = _reaching(shape, BEYOND * p.section_diameter if rolls else 0.0)
+    return Layout(shape, film, Sizes(p.lobes * LONG_PLACED))
 
 
 def _reaching(shape: Shape, most: float) -> tuple[float, float]:
@@ -60,9 +52,10 @@ def _reaching(shape: Shape, most: float) -> tuple[float, float]:
     return begin, begin + min(max(film, last), film + most)
 
 
-def _fine_at_edge(guide: Disc) -> Spacing:
-    """Of a guide: fine where the section may meet the edge of an open gap, wherever that is."""
-    degree = radians(1.0) * guide.radius
-    spots = [Spot((GUIDE_ARC + angle) * degree) for angle in EDGE_ANGLES]
-    length = 2.0 * GUIDE_ARC * degree
-    return graded(length, spots, 2 * guide.long, coarsest=0.05 * length, rate=0.3)
+def _fine_at_edge(shape: Shape) -> Spacing:
+    """Of the film of a disc: fine where it may meet the edge of an open gap, wherever that is."""
+    begin, end = shape.film
+    degree = radians(0.5) * (shape.outline.box[2] - shape.outline.box[0])
+    spots = [Spot(angle * degree - begin) for angle in EDGE_ANGLES]
+    length = end - begin
+    return graded(length, spots, 2 * LONG_OPEN, coarsest=0.05 * length, rate=0.3)

@@ -1,9 +1,7 @@
 """A case whose parameters vary while its mesh is frozen: the map from its measures to the nodes.
 
-A mesh is laid out by angles and shares (where the arc begins and ends, how its segments are
-spaced); these are frozen, so that every node is centre + radius times a constant, or, of a section
-with an outline, keeps its part of a line or an arc. A remeshed run differs from that by the error
-of its mesh.
+Where the arc begins and ends and how its segments are spaced is frozen: every node of the outline
+keeps its part of a line or an arc. A remeshed run differs from that by the error of its mesh.
 """
 
 from __future__ import annotations
@@ -18,9 +16,6 @@ from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.given import number, times
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.varied import LENGTHS, NUMBERS, PRESSURE_KEY
-from softehl.cases.seal.section.outline_layout import OutlineLayout
-from softehl.cases.seal.section.round_layout import RoundLayout
-from softehl.cases.seal.section.section import SealSection
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.runtime.fem.design import Inputs, rate_of
 from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
@@ -79,29 +74,11 @@ def _varies(value: Any) -> bool:
 
 
 def frozen(system: SealSystem, p: ORing) -> SealSystem:
-    """The system of other parameters on the same mesh, moved with the measures of its section."""
+    """The system of other parameters on the same mesh, moved with the measures of its section.
+
+    The sealed pressure ends at the nodes at which it ended.
+    """
     old, new = system.section.layout, uniform_layout(p)
-    if isinstance(old, OutlineLayout):
-        assert isinstance(new, OutlineLayout)
-        return _carried(system, p, old, new)
-    assert isinstance(old, RoundLayout)
-    assert isinstance(new, RoundLayout)
-    measures = ("centre_z", "centre_r", "radius")
-    moved = {name: getattr(new.disc, name) for name in measures}
-    if all(getattr(old.disc, name) == value for name, value in moved.items()):
-        return system.moved(p, system.section)
-    disc = replace(old.disc, **moved)
-    mesh = system.mesh
-    unit = (mesh.points - old.disc.centre) / old.disc.radius
-    points = disc.centre + disc.radius * unit
-    scale = disc.radius / old.disc.radius
-    places, length = scale * mesh.places, scale * mesh.length
-    placed = replace(mesh, points=points, places=places, length=length)
-    return system.moved(p, SealSection(RoundLayout(disc), placed, system.section.placed))
-
-
-def _carried(system: SealSystem, p: ORing, old: OutlineLayout, new: OutlineLayout) -> SealSystem:
-    """On an outline; the sealed pressure ends at the nodes at which it ended."""
     before, after = old.shape.outline, new.shape.outline
     section = system.section
     if before.pieces == after.pieces:
@@ -112,8 +89,7 @@ def _carried(system: SealSystem, p: ORing, old: OutlineLayout, new: OutlineLayou
     layout = replace(
         new,
         film=(float(film[0]), float(film[1])),
-        spacing=old.spacing,
-        long=old.long,
+        sizes=old.sizes,
         dams=(float(ends[0]), float(ends[1])),
     )
     return system.moved(p, replace(section, layout=layout, mesh=mesh))

@@ -19,7 +19,7 @@ from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.cases.seal.solve.inlet import film_thickness, inlet_length
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.sections import LONG
+from softehl.runtime.mesh.o_grid import LONG
 from softehl.runtime.mesh.spacing import Spot, graded
 
 PASSES = 3
@@ -122,7 +122,7 @@ def placed_layout(
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
         if length * spacing.smallest(long * _DENSITY) <= FINEST * inlet:
             break
-    first = 0.25 * p.corner_fillet if p.opens else None
+    first = 0.25 * p.corner_fillet if p.opens else np.inf
     return layout.graded(spacing, long, DEPTH * inlet, first)
 
 

@@ -16,11 +16,12 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.solve.contact_transfer import carried_elements, carried_unknowns
+from softehl.cases.seal.solve.contact_transfer import carried_unknowns
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.rules import lagrange, pressure_nodes
 from softehl.runtime.mesh.carried_mesh import potential
+from softehl.runtime.mesh.transfer import transfer_elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class FilmTransfer:
         """Mean stresses (Q',) of the elements."""
         change = _pressures(self.old, x) - _pressures(self.old, self.dry[0])
         there = _pressures(self.new, self.dry[1])
-        return np.asarray(there + carried_elements(self.old, self.new, change))
+        return there + transfer_elements(self.old.mesh, self.new.mesh, change)
 
     def _thickness(self, x: Array, places: Array) -> Array:
         """Film thickness (n,) at places (n,) on the old arc."""

@@ -219,6 +219,7 @@ def _shape(section: str, sizes: tuple[tuple[str, float], ...], inner_diameter: f
         raise ValueError(f'section = "{section}": {name} {words}'.replace("  ", " ")) from None
 
 
+@lru_cache(maxsize=32)
 def capped(shape: Shape, thickness: float) -> Shape:
     """The shape with a cut at this height above its lowest point.  ValueError where none can be."""
     outline, given = shape.outline, f"cap_thickness = {thickness:g} mm"
@@ -241,6 +242,7 @@ def capped(shape: Shape, thickness: float) -> Shape:
     return replace(shape, chord=(begin, end))
 
 
+@lru_cache(maxsize=32)
 def lobes(shape: Shape) -> int:
     """How many separate parts of its film a section rests on: minima of r with a groove between."""
     first, last = shape.film
