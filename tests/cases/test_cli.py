@@ -371,15 +371,23 @@ def test_a_run_writes_its_files(here: Path, invoke: Invoke) -> None:
 
 
 def test_a_pressure_that_is_not_known_to_run_is_warned_of_first(here: Path, invoke: Invoke) -> None:
-    keys = ("--set", "sealed_pressure=160 bar", "--set", "shore_A=70")
+    keys = ("--set", "sealed_pressure=105 bar", "--set", "shore_A=70")
     _, _, err = invoke("run", "oring", *FAST, *keys)
-    assert err[0].startswith("softehl: sealed pressure / shear modulus = 8.7: ")
+    assert err[0].startswith("softehl: sealed pressure / shear modulus = 5.7: ")
     assert "nothing was tried above 5.4" in err[0]
     assert "a harder rubber or a lower pressure helps" in err[0]
     assert run_json(here / "results" / "oring")["warnings"] == [err[0].removeprefix("softehl: ")]
     ring = ("--set", "section=x_ring", "--set", "groove_width=4.3")
     _, _, err = invoke("run", "oring", *FAST, *ring, "--set", "sealed_pressure=4")
     assert "modulus = 1.1: sections other than round were tried up to 2" in " ".join(err)
+
+
+def test_a_pressure_far_beyond_what_runs_is_refused(invoke: Invoke) -> None:
+    keys = ("--set", "material=NBR 70", "--set", "sealed_pressure=160 bar")
+    code, _, err = invoke("run", "oring", *FAST, *keys)
+    assert code == 2
+    assert "sealed_pressure = 16 MPa is 8.7 times the shear modulus of the rubber" in err[-1]
+    assert "up to 6 times" in err[-1]
 
 
 def test_a_run_says_what_it_assumed(here: Path, invoke: Invoke) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softehl.cases.seal.gland.reach import MOST, ratio
 from softehl.cases.seal.gland.sections.keys import is_mesh
 from softehl.cases.seal.gland.tolerances import read_tolerances
 
@@ -191,6 +192,16 @@ def _section_is_between_the_walls(p: ORing) -> None:
         )
 
 
+def _pressure_is_within_reach(p: ORing) -> None:
+    found = ratio(p, p.sealed_pressure)
+    if found > MOST:
+        raise ValueError(
+            f"sealed_pressure = {p.sealed_pressure:g} MPa is {found:.2g} times the shear modulus "
+            f"of the rubber; films are found up to {MOST:g} times (docs/limits.md); take a harder "
+            "rubber or a lower pressure"
+        )
+
+
 _CHECKS = (
     _mesh_is_there,
     _rubber_has_an_element,
@@ -204,4 +215,5 @@ _CHECKS = (
     _seal_is_squeezed,
     _ring_fits_the_rod,
     _section_is_between_the_walls,
+    _pressure_is_within_reach,
 )

@@ -6,7 +6,13 @@ of a random sample of 300 glands of O-rings and one of other sections.
 
 from __future__ import annotations
 
-from softehl.cases.seal.gland.parameters import ORing
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from softehl.cases.seal.gland.parameters import ORing
+
+MOST = 6.0
+"""The largest that is not refused: above it a run takes minutes to states that are `uncertain`."""
 
 _SURE, _TRIED = 3.0, 5.4
 """p_s / mu up to which every film of an O-ring was right, and the largest that was tried."""

@@ -27,9 +27,6 @@ from softehl.runtime.solve.solution import Point
 
 State: TypeAlias = tuple[SealSystem, Array]
 
-_ON_THE_WAY = 1e-3
-"""Residual of states on the way to the sealed pressure, which are no results."""
-
 
 @dataclass(frozen=True, eq=False)
 class ContactSolver:
@@ -83,11 +80,6 @@ class ContactSolver:
         return self._follow(system, replace(load_stage(system, begin, place), on_point=keep), x)
 
     def _follow(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
-        """To the end of a stage, roughly, and there as exactly as any state."""
-        newton = self.driver.newton
-        rough = path_corrector(system, replace(newton, tolerance=_ON_THE_WAY, stagnation=1.0))
-        end = self.driver.follow(replace(stage, corrector=rough), x)
-        if rough is None or isinstance(end, StageFailed):
-            return end
-        last = replace(stage, start=stage.stop, corrector=path_corrector(system, newton))
-        return self.driver.follow(last, end)
+        """To the end of a stage, by the corrector of paths."""
+        corrector = path_corrector(system, self.driver.newton)
+        return self.driver.follow(replace(stage, corrector=corrector), x)
