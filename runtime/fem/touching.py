@@ -23,6 +23,7 @@ from softehl.runtime.kernels import Kernel
 
 Sparse = csc_array
 FACING = -0.1  # cosine between normals; sides that meet more steeply do not press
+_STRIDE = 0.9  # of the depth to which sides notice each other
 SLANTED = 2.0  # a line along the normal is at most so many times as long as the distance
 
 
@@ -141,8 +142,23 @@ def _balls(ends: Array) -> tuple[Array, Array, Array]:
     return ends.mean(axis=1), 0.5 * length, along / np.maximum(length, 1e-300)[:, None]
 
 
+def stride(sides: Sequence[Side]) -> float:
+    """Motion of an iteration that most of the sides cannot overlook."""
+    return _STRIDE * float(np.median(np.concatenate([side.depth for side in sides])))
+
+
 class Sought(Protocol):
     """Elements that depend on the unknowns."""
+
+    @property
+    def displacements(self) -> Integers:
+        """Numbers of the unknowns that move the nodes, (points, dim), -1 where there are none."""
+        ...
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """Faces with multipliers."""
+        ...
 
     def blocks(self, x: Array, old: Array) -> list[ElementBlock]:
         """Blocks at unknowns x, always of the same names; old: unknowns of the step before."""
@@ -177,6 +193,15 @@ class TouchingProblem(Problem):
         given = {f.name: getattr(self, f.name) for f in fields(Problem)}
         self.latest[:] = [Problem(**{**given, "assembler": assembler})]
         return self.latest[0]
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """A body must not jump over the side that it should touch."""
+        limit = Problem.step_limit(self, x, dx)
+        for contact in self.contacts:
+            moved = np.where(contact.displacements >= 0, dx[contact.displacements], 0.0)
+            largest = float(np.linalg.norm(moved, axis=1).max())
+            limit = min(limit, stride(contact.sides) / max(largest, 1e-300))
+        return limit
 
     def where_not_finite(self, x: Array) -> str:
         """See `Problem`."""

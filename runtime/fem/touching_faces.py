@@ -97,13 +97,16 @@ class FaceContact:
     ) -> Partners:
         """Every face of one kind that a point looks at within its reach."""
         centre = corners.mean(axis=1)
-        size = float(np.linalg.norm(corners - centre[:, None], axis=2).max())
+        size = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
         tree = cKDTree(centre)
-        near = SLANTED * tree.query(point)[0]
-        radius = size + np.maximum(side.reach, np.minimum(side.depth, near))
+        nearest = SLANTED * tree.query(point)[0]
+        radius = size.max() + np.maximum(side.reach, np.minimum(side.depth, nearest))
         found = tree.query_ball_point(point, radius, return_sorted=True)
         one = np.repeat(np.arange(len(point)), [len(row) for row in found])
         other = np.concatenate([np.empty(0, dtype=np.int64), *found]).astype(np.int64)
+        across = np.cross(centre[other] - point[one], normal[one])
+        near = np.linalg.norm(across, axis=1) <= size[other]  # else the line misses the face
+        one, other = one[near], other[near]
         start, kept = _looked(cell, corners[other], point[one], normal[one])
         facing = np.einsum("nc,nc->n", _normals(cell, corners[other], start[:, :2]), normal[one])
         kept &= (facing < FACING) & (start[:, 2] < side.reach[one])

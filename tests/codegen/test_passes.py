@@ -104,6 +104,16 @@ def test_assume_keeps_branches_on_other_conditions() -> None:
     assert passes.assume(g, [g.mul(x, y)]) == [g.mul(x, y)]
 
 
+def test_assume_takes_time_in_proportion_to_branches_that_do_not_decide_each_other() -> None:
+    g = Graph()
+    x, y = unknowns(g, 2)
+    for _ in range(40):
+        x = g.branch(g.compare(Op.LT, x, y), g.call(Op.SIN, x), g.call(Op.COS, x))
+    before = g.call(Op.EXP, x).id
+    assert passes.assume(g, [x]) == [x]
+    assert g.call(Op.LOG, x).id == before + 1  # nothing was built on the way
+
+
 def test_powers_share_squares_and_one_reciprocal() -> None:
     g = Graph()
     (x,) = unknowns(g, 1)

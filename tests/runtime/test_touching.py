@@ -76,6 +76,20 @@ def test_bodies_that_stay_apart_do_not_notice_each_other() -> None:
     assert np.abs(result.values("u_y")[result.system.mesh.nodes("lower:top")]).max() < 1e-12
 
 
+def test_no_step_jumps_over_a_thin_body() -> None:
+    """A plate 0.1 thick, moved by 0.4 at once, is stopped by what it meets after 0.2."""
+    block = Mesh.rectangle(1, 1, cells=(3, 3))
+    plate = Mesh.rectangle(1, 0.1, cells=(4, 1)).map(lambda x: np.add(x, [0, 1.2]))
+    study = Study(Mesh.union(block=block, plate=plate))
+    study.add("body", elastic, **RUBBER)
+    study.contact("plate:bottom", "block:top")
+    study.fix("block:bottom", u_x=0, u_y=0)
+    study.fix("plate:top", u_x=0, u_y=-0.4)
+    result = study.solve()
+    assert force(result) > 0.1
+    assert result.at((0.5, 0.99))["u_y"] < -0.1
+
+
 @pytest.mark.parametrize("orders", [(1, 2), (2, 1)])
 @pytest.mark.parametrize("geometry", ["plane strain", "axisymmetric"])
 def test_the_tangent_is_the_derivative(orders: tuple[int, int], geometry: str) -> None:
