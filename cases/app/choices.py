@@ -35,11 +35,12 @@ _SIZES = (
     *("6x2", "8x2", "10x2", "12x2", "16x2", "20x2.65", "25x2.65", "28x3.55", "32x3.55"),
     *("36x3.55", "36x4", "40x4", "45x4", "50x5.3", "56x5.3", "63x5.3", "80x5.3", "100x7"),
 )
+_SMALL, _LARGE = 2.5, 500.0  # mm: those that have a gland and a fit
 _RINGS = (
     *(f"ISO 3601 {size}" for size in _SIZES),
     *("X-ring 36x4", "X-ring AS568-210", "X-ring AS568-226"),
-    *("U-cup 20x30x7", "U-cup 25x35x8", "U-cup 36x46x8", "U-cup 50x65x10"),
-    *(ring.name for ring in as568().values()),
+    *("U-cup 20x30x8", "U-cup 25x35x8", "U-cup 36x46x8", "U-cup 50x65x12"),
+    *(ring.name for ring in as568().values() if _SMALL < ring.inner_diameter < _LARGE),
 )
 _HARDNESSES = {"FKM": (75, 80, 90), "EPDM": (70, 80), "PU": (90, 95)}
 _RUBBERS = tuple(f"{p} {s}" for p in RANGES for s in _HARDNESSES.get(p, (70, 80, 90)))

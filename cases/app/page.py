@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
+from io import StringIO
 from typing import Any
 from urllib.parse import urlencode
 
@@ -30,11 +31,18 @@ class Page:
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.form = Form()
-        self.drawing = pn.pane.Matplotlib(format="svg", tight=False, width=460, height=420)
-        self.words = pn.pane.Alert(alert_type="light", width=520)
+        self.drawing = pn.pane.SVG(width=460, height=420, encode=False)
+        self.words = pn.pane.Alert(alert_type="light", min_width=300, **_WIDE)
         self.begin = pn.widgets.Button(name="Run", button_type="primary", **_WIDE)
         self.table = pn.widgets.Tabulator(
-            pd.DataFrame(), selectable="checkbox", show_index=False, disabled=True, **_WIDE
+            pd.DataFrame(),
+            selectable="checkbox",
+            show_index=False,
+            disabled=True,
+            theme="bootstrap5",
+            theme_classes=["table-sm"],
+            layout="fit_data_stretch",
+            **_WIDE,
         )
         self.stop = pn.widgets.Button(name="Stop", button_type="danger", disabled=True)
         self.go_on = pn.widgets.Button(name="Go on", disabled=True)
@@ -64,7 +72,7 @@ class Page:
             title="softehl: reciprocating seals",
             sidebar=[*self.form.widgets.values(), self.begin],
             main=[
-                pn.FlexBox(self.drawing, self.words),
+                pn.Row(self.drawing, self.words, **_WIDE),
                 pn.pane.Markdown("## Runs"),
                 self.table,
                 self.progress,
@@ -79,16 +87,13 @@ class Page:
 
     def _preview(self) -> None:
         """Draw the gland of the form, or say what is not understood."""
-        import matplotlib
-
         try:
             run, _ = self.form.run()
         except BadInput as error:
             self.words.param.update(object=html.escape(error.message), alert_type="danger")
             self.begin.disabled = True
             return
-        with matplotlib.rc_context(style.STYLE):
-            self.drawing.object = gland_figure(run.parameters)
+        self.drawing.object = _drawing(run)
         warned = bool(run.case.warnings(run.parameters))
         self.words.param.update(object=_told(run), alert_type="warning" if warned else "light")
         self.begin.disabled = False
@@ -155,7 +160,7 @@ class Page:
         self.answer.objects = [
             pn.pane.Alert(
                 f"**{html.escape(run.name)}**: " + "<br>".join(map(html.escape, lines)),
-                alert_type="danger" if any(isinstance(x, Alarm) for x in lines) else "success",
+                alert_type="danger" if any(isinstance(x, Alarm) for x in lines) else "light",
             )
             for run in found
             if (lines := run.case.answer(run.parameters, run.rows))
@@ -182,6 +187,17 @@ def _cells(state: RunState) -> dict[str, str]:
         "states": f"{state.done} of {state.asked}",
         "answer": answer[0] if answer else "",
     }
+
+
+def _drawing(run: Run) -> str:
+    """The gland of a run as SVG."""
+    import matplotlib
+
+    found = StringIO()
+    with matplotlib.rc_context(style.STYLE):
+        gland_figure(run.parameters).savefig(found, format="svg")
+    text = found.getvalue()
+    return text[text.index("<svg") :]  # without the head of a file
 
 
 def _told(run: Run) -> str:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from signal import SIGTERM
 from typing import Any
 
 from softehl.cases.harness.errors import BadInput
@@ -24,6 +25,7 @@ PATIENCE = 20.0
 """Seconds that a run has to save what it reached; after them it is killed."""
 
 _FILE, _LOG = ".desk.toml", ".desk.log"  # hidden: a run wants a folder without other files
+_STOPPED = (-SIGTERM, 128 + SIGTERM)  # before and after Python listens to the signal
 _ENDED = {"converged": "done", "not converged": "not all reached", "interrupted": "stopped"}
 
 
@@ -99,7 +101,9 @@ class Desk:
         run, line = self._finished(name), _last_line(self.folder / name / _LOG)
         running = self._running(name)
         if run is None:
-            return RunState(name, "running" if running else "failed", line=line)
+            ended = self.processes[name].poll() if name in self.processes else None
+            status = "running" if running else "stopped" if ended in _STOPPED else "failed"
+            return RunState(name, status, line=line)
         told = str(run.content.get("status"))
         status = "running" if running else _ENDED.get(told, "stopped")
         asked = len(run.case.requested(run.parameters))
