@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import secrets
+import signal
+import socket
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from hmac import compare_digest
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import click
@@ -16,10 +21,12 @@ import panel as pn
 from bokeh.server.auth_provider import AuthProvider
 from bokeh.server.views.auth_request_handler import AuthRequestHandler
 from tornado.web import HTTPError, RequestHandler, authenticated
+from tornado.websocket import WebSocketClosedError
 
 from softehl.cases.app.page import Page
 from softehl.cases.app.runs import Desk
 from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.process import Ended
 
 HOST = "127.0.0.1"
 _PAGE, _LOGIN = "/desk", "/refused"
@@ -99,8 +106,6 @@ class Files(AuthRequestHandler):
         )
         _, error = await process.communicate()
         if process.returncode:
-            self.set_status(409)
-            self.set_header("Content-Type", "text/plain; charset=utf-8")
             raise HTTPError(409, reason=" ".join(error.decode(errors="replace").split())[:200])
 
     def _send(self, name: str, content: bytes) -> None:
@@ -121,11 +126,43 @@ def serve(folder: Path, port: int, *, show: bool) -> None:
     click.echo(address)
     if show:
         server.io_loop.add_callback(click.launch, address)
+    _expect_pages_that_close(server.io_loop)
     try:
         server.start()
-        server.io_loop.start()
+        with _ended_by(server.io_loop) as numbers:
+            server.io_loop.start()
     finally:
         desk.close()
+    if numbers:
+        raise Ended(numbers[0])
+
+
+def _expect_pages_that_close(loop: Any) -> None:
+    """Say nothing of pages that are closed or reloaded while something is sent to them."""
+    logging.getLogger("bokeh.server.views.ws").setLevel(logging.ERROR)
+
+    def tell(running: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        if not isinstance(context.get("exception"), WebSocketClosedError):
+            running.default_exception_handler(context)
+
+    loop.asyncio_loop.set_exception_handler(tell)
+
+
+@contextmanager
+def _ended_by(loop: Any) -> Iterator[list[int]]:
+    """Let signals end a loop; they are listed. An exception would be lost in the loop."""
+    numbers: list[int] = []
+
+    def end(number: int, _: FrameType | None) -> None:
+        numbers.append(number)
+        loop.add_callback_from_signal(loop.stop)
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield numbers
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def make(desk: Desk, port: int) -> tuple[Any, str]:
@@ -145,8 +182,6 @@ def make(desk: Desk, port: int) -> tuple[Any, str]:
 
 
 def _free_port() -> int:
-    import socket
-
     with socket.socket() as found:
         found.bind((HOST, 0))
         return int(found.getsockname()[1])
