@@ -1,4 +1,4 @@
-"""What the desk offers for each key, in words of the trade; anything else may be typed."""
+"""Lists of the desk for each key, in words of the trade; other texts may be typed."""
 
 from __future__ import annotations
 

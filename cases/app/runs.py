@@ -42,7 +42,7 @@ class RunState:
 
     @property
     def running(self) -> bool:
-        """Whether it can be stopped."""
+        """True while its process runs."""
         return self.status == "running"
 
 
@@ -97,7 +97,7 @@ class Desk:
         return [s for s in states if s.run is not None or s.name in self.processes]
 
     def state(self, name: str) -> RunState:
-        """How far a run is."""
+        """The state of a run by its name."""
         run, line = self._finished(name), _last_line(self.folder / name / _LOG)
         running = self._running(name)
         if run is None:
@@ -132,7 +132,7 @@ class Desk:
         return name in self.processes and self.processes[name].poll() is None
 
     def _finished(self, name: str) -> FinishedRun | None:
-        """What is in the folder of a run, read again when it has changed."""
+        """The run in a folder, read again when it has changed; None where none can be read."""
         place = self.folder / name
         stamp = [_stamp(place / file) for file in ("run.json", "curve.csv")]
         if self._read.get(name, (None,))[0] != stamp:
@@ -144,7 +144,7 @@ class Desk:
         return self._read[name][1]
 
     def _free(self, values: Mapping[str, Any]) -> str:
-        """A new name of what is run."""
+        """A new name for a run with these keys."""
         words = [str(values[key]) for key in ("ring", "rod", "compound") if values.get(key)]
         first = re.sub(r"[^A-Za-z0-9.]+", "-", " ".join(words)).strip("-.") or CASE
         number, name = 1, first

@@ -34,7 +34,7 @@ _KINDS = {".html": "text/html; charset=utf-8", ".xlsx": "application/octet-strea
 
 
 class Refusal(RequestHandler):
-    """The answer to who has no token."""
+    """Answer to a request without the token."""
 
     def get(self) -> None:
         """Say what is missing."""
@@ -58,12 +58,12 @@ class Token(AuthProvider):
 
     @property
     def login_url(self) -> str:
-        """Where others are sent."""
+        """The address that requests without the token are sent to."""
         return _LOGIN
 
     @property
     def login_handler(self) -> type[RequestHandler]:
-        """What is there."""
+        """The handler of that address."""
         return Refusal
 
     def _user(self, handler: RequestHandler) -> str | None:

@@ -94,7 +94,9 @@ class Hand:
 
     def texts(self, css: str) -> list[str]:
         """Their texts, of one moment."""
-        script = ALL.replace("return found", "return found.map((e) => e.innerText ?? e.textContent)")
+        script = ALL.replace(
+            "return found", "return found.map((e) => e.innerText ?? e.textContent)"
+        )
         found: list[str] = self.driver.execute_script(script, css)
         return found
 
