@@ -49,7 +49,7 @@ ORDER = {
         ),
         *("follow load march periodic", "study"),
     ),
-    "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "cli document"),
+    "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "app", "cli document"),
     "cases/seal": (
         *("gland", "section", "equations", "states"),
         *("solve", "sensitivity", "cycle", "report"),

@@ -62,6 +62,7 @@ def _hint(error: "click.ClickException") -> str:
 def _commands() -> "click.Group":
     import click
 
+    from softehl.cases.app.command import app
     from softehl.cases.cli import design, keys, report_runs, reproduce, run, sweep
 
     @click.group(no_args_is_help=False)
@@ -146,6 +147,7 @@ def _commands() -> "click.Group":
     commands.add_command(sweep)
     commands.add_command(keys)
     commands.add_command(report_runs)
+    commands.add_command(app)
     commands.add_command(reproduce)
     return commands
 

@@ -1,0 +1,1 @@
+"""The desk of a seal engineer in a browser, on this machine only: `softehl app`."""

@@ -1,0 +1,242 @@
+"""The desk in headless Chromium, from choosing a ring to the report; who has no token gets nothing.
+
+Skipped where Panel (the extra `app`) or Chromium is missing.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError
+from urllib.parse import urlencode
+from urllib.request import Request, urlopen
+
+import pytest
+
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+PATIENCE = 120.0
+SPEEDS = [800, 500, 300, 200, 120, 80]
+ALL = """
+const found = [];
+const walk = (root) => { for (const e of root.querySelectorAll('*')) {
+  if (e.matches(arguments[0])) found.push(e);
+  if (e.shadowRoot) walk(e.shadowRoot); } };
+walk(document);
+return found;
+"""
+"""Elements of a selector, also those in the shadow of others."""
+
+POINTS = """
+let count = 0;
+const walk = (view) => {
+  const {type, glyph, data_source} = view.model;
+  if (type === 'GlyphRenderer' && glyph.type === 'Scatter' && data_source.data.verdict)
+    count += data_source.data.verdict.length;
+  for (const child of view.children()) walk(child); };
+for (const root of Bokeh.index.roots) walk(root);
+return count;
+"""
+"""Points of the curves of film thickness that are drawn."""
+
+Driver = Any
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Of a desk that is served by the command line."""
+    pytest.importorskip("panel")
+    pytest.importorskip("panel_material_ui")
+    folder = tmp_path_factory.mktemp("desk")
+    command = [sys.executable, "-m", "softehl", "app", "--no-browser", "--folder", str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            yield server.stdout.readline().strip()
+            server.terminate()
+            assert server.wait(60) == 143
+        finally:
+            server.kill()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Driver]:
+    pytest.importorskip("panel")
+    selenium = pytest.importorskip("selenium.webdriver")
+    if CHROMIUM is None or shutil.which("chromedriver") is None:
+        pytest.skip("no Chromium with its driver")
+    options = selenium.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1500"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = selenium.Chrome(options, selenium.ChromeService(shutil.which("chromedriver")))
+    yield driver
+    driver.quit()
+
+
+class Hand:
+    """What an engineer does on the page, and sees there."""
+
+    def __init__(self, driver: Driver) -> None:
+        self.driver = driver
+
+    def all(self, css: str) -> list[Any]:
+        """Elements that are on the page."""
+        found: list[Any] = self.driver.execute_script(ALL, css)
+        return found
+
+    def texts(self, css: str) -> list[str]:
+        """Their texts, of one moment."""
+        script = ALL.replace(
+            "return found", "return found.map((e) => e.innerText ?? e.textContent)"
+        )
+        found: list[str] = self.driver.execute_script(script, css)
+        return found
+
+    def fields(self) -> list[str]:
+        """What the form holds."""
+        script = ALL.replace("return found", "return found.map((e) => e.value)")
+        found: list[str] = self.driver.execute_script(script, "input[type=text]")
+        return found
+
+    def click(self, css: str, words: str) -> None:
+        """Click on what has these words."""
+        self.until(lambda: words in self.texts(css))
+        next(e for e in self.all(css) if e.text == words).click()
+
+    def choose(self, number: int, words: str) -> None:
+        """Choose from the list of a field."""
+        self.until(lambda: len(self.all("input[role=combobox]")) > number)
+        field = self.all("input[role=combobox]")[number]
+        field.click()
+        field.send_keys("\ue009a\ue000" + words)  # control-a
+        self.click("li[role=option]", words)
+
+    def states(self) -> dict[str, tuple[str, str]]:
+        """Run -> status and states, from the list of runs."""
+        kept = self.driver.execute_script(
+            ALL.replace(
+                "return found",
+                "return found.map((r) => [...r.querySelectorAll('[tabulator-field]')]"
+                ".map((c) => [c.getAttribute('tabulator-field'), c.innerText]))",
+            ),
+            ".tabulator-row",
+        )
+        rows = [dict(row) for row in kept]
+        return {r["run"]: (r["status"], r["states"]) for r in rows if r.get("run")}
+
+    def points(self) -> int:
+        """Points of the curves of film thickness."""
+        found: int = self.driver.execute_script(POINTS)
+        return found
+
+    def until(self, true: Callable[[], Any], seconds: float = PATIENCE) -> Any:
+        """Wait for something."""
+        end = time.monotonic() + seconds
+        while not (found := true()):
+            assert time.monotonic() < end, self.states()
+            time.sleep(0.1)
+        return found
+
+
+def drawn(hand: Hand, words: str) -> bool:
+    """Whether the drawing of the gland has these words."""
+    return any(words in text for text in hand.texts("svg text"))
+
+
+def reports(hand: Hand, runs: int) -> list[str]:
+    """Addresses on the page of the report of so many runs."""
+    script = ALL.replace("return found", "return found.map((e) => e.href)")
+    found: list[str] = hand.driver.execute_script(script, "a[href*='report.html']")
+    return [address for address in found if address.count("run=") == runs]
+
+
+def test_from_a_ring_to_the_report(browser: Driver, address: str, tmp_path: Path) -> None:
+    hand = Hand(browser)
+    browser.get(address)
+    hand.until(lambda: drawn(hand, "rod 35.9625 mm"))
+    hand.choose(0, "ISO 3601 20x2.65")
+    hand.until(lambda: "20 f7" in hand.fields())  # the rod follows, and so does the drawing
+    hand.until(lambda: drawn(hand, "rod 19.9695 mm"))
+    hand.until(lambda: any(words.startswith("squeeze 14.5") for words in hand.texts("li")))
+
+    hand.all("textarea")[0].send_keys(f"density = 1\nerror_estimate = false\nspeeds = {SPEEDS}\t")
+    hand.click("button", "Run")
+    first = "ISO-3601-20x2.65-20-f7-NBR-70"
+    hand.until(lambda: first in hand.states())
+    hand.choose(2, "FKM 80")
+    hand.until(lambda: any("FKM" in f for f in hand.fields()))
+    hand.click("button", "Run")
+    second = "ISO-3601-20x2.65-20-f7-FKM-80"
+    hand.until(lambda: second in hand.states())
+    assert [status for status, _ in hand.states().values()] == ["running", "running"]
+
+    hand.until(lambda: hand.states()[second][1] not in ("", "0 of 12"))
+    hand.click("button", "Stop")  # of the one that was begun last
+    hand.until(lambda: hand.states()[second][0] == "stopped")
+    browser.refresh()
+    hand.until(lambda: "FKM 80" in hand.fields() and len(hand.states()) == 2)
+    kept = hand.states()[second]
+    assert kept[0] == "stopped"
+    assert 1 <= int(kept[1].split()[0]) < 12
+    assert hand.points() == int(kept[1].split()[0])  # its curve has grown so far
+    hand.until(lambda: hand.states()[first] == ("done", "12 of 12"))
+    hand.click("button", "Go on")
+    hand.until(lambda: hand.states()[second] == ("done", "12 of 12"))
+    hand.until(lambda: hand.points() == 12)
+
+    boxes = hand.all(".tabulator-row input[type=checkbox]")
+    assert len(boxes) == 2
+    next(box for box in boxes if not box.is_selected()).click()
+    hand.until(lambda: hand.points() == 24)
+    link = hand.until(lambda: reports(hand, 2))[0]
+    browser.get_screenshot_as_file(str(tmp_path / "desk.png"))
+    outside = browser.execute_script(
+        "return performance.getEntriesByType('resource').map((e) => e.name)"
+    )
+    assert [name for name in outside if not name.startswith("http://127.0.0.1:")] == []
+    browser.get(link)
+    assert "20" in browser.title
+    assert "Side by side" in browser.find_element("tag name", "body").text
+    assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
+
+
+def fetch(url: str, **headers: str) -> bytes:
+    with urlopen(Request(url, headers=headers), timeout=120) as answer:
+        content: bytes = answer.read()
+    return content
+
+
+@pytest.mark.parametrize("page", ["/desk", "/file/report.html?run=a", "/desk/ws", "/"])
+@pytest.mark.parametrize("token", ["", "token=wrong"])
+def test_nothing_is_answered_without_the_token(address: str, page: str, token: str) -> None:
+    base = address.partition("/desk")[0]
+    with pytest.raises(HTTPError) as refused:
+        fetch(f"{base}{page}{'&' if '?' in page else '?'}{token}")
+    refused.value.close()
+    assert refused.value.code in (400, 403)
+
+
+def test_files_of_a_run(address: str) -> None:
+    """Needs the runs of the first test."""
+    base, _, token = address.partition("/desk?")
+    name = urlencode({"run": "ISO-3601-20x2.65-20-f7-NBR-70"})
+    case = fetch(f"{base}/file/case.toml?{name}&{token}").decode()
+    assert 'ring = "ISO 3601 20x2.65"' in case
+    openpyxl = pytest.importorskip("openpyxl")
+    sheet = fetch(f"{base}/file/report.xlsx?{name}&{token}")
+    assert len(openpyxl.load_workbook(BytesIO(sheet)).sheetnames) > 3
+    with pytest.raises(HTTPError, match="404") as refused:
+        fetch(f"{base}/file/case.toml?run=..%2F..&{token}")
+    refused.value.close()
+
+
+def test_the_desk_is_on_this_machine_only(address: str) -> None:
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/desk\?token=\S{32}", address)
