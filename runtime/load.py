@@ -18,6 +18,7 @@ from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.stability import warn_unstable
 from softehl.runtime.system import System
 
 _NAME = "load factor"
@@ -92,7 +93,11 @@ class LoadSteps:
         rule = StepRule(first, min(SMALLEST, first), first)
         path = Continuation(first_step.newton, rule, name=_NAME)
         at.require_end(path.follow(at.problem_at, begin, until, x0, on_point=keep))
-        return at.results[-1]
+        end = at.results[-1]
+        words = f"{_NAME} {end.t:.4g}"
+        near = first_step.last if end.iterations else None  # else they are of a step before
+        warn_unstable(end.problem, end.point.solution.x, near, words)
+        return end
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.begin import beginning
+from softehl.runtime.buckling import Buckling, linear_buckling
 from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
@@ -75,7 +76,7 @@ class Study:
         """Raises MeshError for a cell that is turned inside out, StudyError for a geometry."""
         self.mesh.check()
         geometry_of(self.mesh, self.geometry)
-        self._statement = Statement(self.mesh)
+        self._statement = Statement(self.mesh, self._ring)
 
     # the problem --------------------------------------------------------------------------------
 
@@ -328,6 +329,18 @@ class Study:
         with Watch(Telling(progress, True, "load factor", begin[0]).until(None), write) as watch:
             path = ArcSteps(step, Serial().newton(newton), most, watch)
             return path.run(system, begin, until)
+
+    def buckling(
+        self, count: int = 1, *, start: Result | None = None, newton: Newton | None = None
+    ) -> Buckling:
+        """The smallest load factors of linear buckling, and their modes.
+
+        The tangent at rest, or at the load of `start` (a result), changes as along the linear
+        response to loads and prescribed values that grow in proportion; where it becomes singular
+        is a factor. Closer to the truth from a start near by. Raises StudyError, NotConverged.
+        """
+        system = self.system()
+        return linear_buckling(system, beginning(system, start), count, Serial().newton(newton))
 
     def system(self) -> System:
         """Equations of the study.  Raises StudyError for what does not fit together."""
