@@ -10,7 +10,7 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.mass import PARAMETER, Mass, interpolation, lumped, mass_matrices
+from softehl.runtime.fem.mass import PARAMETER, Mass, interpolation, mass_matrices
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.names import listed, meant
 from softehl.runtime.statement.given import datum, known
@@ -123,13 +123,3 @@ def _of_page(problem: Problem, block: ElementBlock, x: Array, place: int) -> csc
         parameters[place] = value
         parts.append(alone.linearise(x, {block.name: parameters})[1])
     return csc_array(parts[0] - parts[1])
-
-
-def lumped_masses(blocks: Sequence[ElementBlock], size: int) -> Array:
-    """Masses (n,) of the unknowns, all of it at the nodes."""
-    found = np.zeros(size)
-    for block in blocks:
-        assert isinstance(block.kernel, Mass)
-        rows = np.tile(lumped(block.kernel.matrices), (1, block.kernel.components))
-        np.add.at(found, block.dofs, rows)
-    return found

@@ -12,22 +12,26 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.begin import beginning
 from softehl.runtime.buckling import Buckling, linear_buckling
+from softehl.runtime.dynamics.schemes import METHODS, require_method, require_none
+from softehl.runtime.dynamics.schemes import Method as Dynamic
+from softehl.runtime.dynamics.start import Motions, require_no_inertia
 from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.load import ArcSteps, LoadPath, LoadSteps
 from softehl.runtime.march import Clock, March, Method
+from softehl.runtime.mass import Masses
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.names import listed
@@ -258,7 +262,10 @@ class Study:
         *,
         dt: float,
         until: float,
-        method: Method = "euler",
+        method: Method | Dynamic = "euler",
+        mass: Masses | None = None,
+        velocity: Mapping[str, Datum] | None = None,
+        rho_inf: float | None = None,
         tolerance: float | None = None,
         start: Result | None = None,
         checkpoint: str | Path | None = None,
@@ -271,31 +278,44 @@ class Study:
         """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
 
         dt: length of the (first) step. start: a result, as in `solve`. method: "euler" (backward)
-        or "bdf2". tolerance: largest local error of a step, relative to the largest value of each
-        unknown (of those with a rate, where there are any); steps then adapt, else they are dt, but
-        for those that Newton's method needs shorter. History is committed and
-        values of steps before (data u_old, `Model.rates`) are renewed after every converged step.
+        or "bdf2"; with inertia "generalised-alpha", "newmark" (trapezoidal rule), "midpoint"
+        (conserves energy) or "explicit" (central differences, as many steps from result to result
+        as are stable): results are then `Motion`, with velocities, accelerations and energies.
+        mass: densities by block, as of `Result.modes`; velocity: unknown -> at the start, a number
+        or a function of places; rho_inf: see generalised-alpha, 0.8 if left out. tolerance: largest
+        local error of a step, relative to the largest value of each unknown (of those with a rate,
+        where there are any); steps then adapt, else they are dt, but for those that Newton's method
+        needs shorter. History is committed and values of steps before (data u_old, `Model.rates`)
+        are renewed after every converged step.
         checkpoint: file that is rewritten after each step; restart: such a file of the same mesh,
         pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
         `engine` "petsc" on any number of processes; another `dt` than then is the next step.
         write: a .pvd file that names the results of all steps (with start or restart, it
         goes on). progress: as in `solve`. Raises StudyError, and NotConverged as `solve` does.
         """
-        if method not in ("euler", "bdf2"):
-            raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
+        require_method(method, ("euler", "bdf2"))
         for name, value in (("dt", dt), ("until", until), ("tolerance", tolerance)):
             if value is not None and read.finite(name, value) <= 0.0:
                 raise StudyError(f"{name} = {value}: must be positive")
         if start is not None and restart is not None:
             raise StudyError("start and restart: give one of them, a result or a checkpoint")
         where = engine_of(engine)
+        if method in METHODS:
+            refused = {"tolerance": tolerance, "checkpoint": checkpoint, "restart": restart}
+            require_none(method, {**refused, "engine": None if engine == "serial" else engine})
+            motions = Motions(method, dt, where.newton(newton), mass, velocity, rho_inf)
+            told = Telling(progress, True, "t", 0.0 if start is None else start.t)
+            found = motions.run(self.system(), start, until)
+            return watched(found, Watch(told.until(until), write))
+        require_none(method, {"mass": mass, "velocity": velocity, "rho_inf": rho_inf})
         system = where.spread(self.system())
+        require_no_inertia(method, system)
         if restart is None:
             clock = Clock.begin(system, start, dt)
         else:
             clock = Clock.load(Path(restart), system, dt)
         clock.require_before(until)
-        settings = March(method, tolerance, dt, where.newton(newton))
+        settings = March(cast(Method, method), tolerance, dt, where.newton(newton))
         file = None if checkpoint is None else Path(checkpoint)
         series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
         told = Telling(progress, system.share.first, "t", clock.t)

@@ -47,7 +47,7 @@ ORDER = {
             "begin",
             "held watch engines",
         ),
-        *("follow load march buckling", "study"),
+        *("follow load march buckling", "dynamics", "study"),
     ),
     "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "cli document"),
     "cases/seal": (
