@@ -15,12 +15,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.begin import beginning
+from softehl.runtime.bifurcation import Bifurcation, require_detect
 from softehl.runtime.buckling import Buckling, linear_buckling
 from softehl.runtime.dynamics.schemes import METHODS, require_method, require_none
 from softehl.runtime.dynamics.schemes import Method as Dynamic
@@ -326,7 +327,8 @@ class Study:
         *,
         step: float,
         until: Callable[[Result], bool],
-        start: Result | None = None,
+        start: Result | Bifurcation | None = None,
+        detect: Literal["bifurcation"] | None = None,
         newton: Newton | None = None,
         most: int = 1000,
         write: str | Path | None = None,
@@ -334,20 +336,27 @@ class Study:
     ) -> LoadPath:
         """The path from load factor 0 on, by arc length: it passes limit points of the load.
 
-        start: a result to begin with, as in `solve`. step: length of the first and longest step. A
-        length counts the load factor, and the unknowns in units of what they change by per load
-        factor in the beginning. until: is given each result; the path ends where it says True.
-        most: points at most. History is committed after each point. write, progress: as in `solve`.
+        start: a result to begin with, as in `solve`, or a bifurcation, whose other branch is
+        followed; `start.reversed` is the other side of it. detect="bifurcation": look for them, at
+        the cost of a factorisation a point; the path has `bifurcations`. step: length of the first
+        and longest step. A length counts the load factor, and the unknowns in units of what they
+        change by per load factor in the beginning; from a bifurcation the load factor relative to
+        that, and displacements relative to the size of the mesh. until: is given each result; the
+        path ends where it says True. most: points at most. History is committed after each point.
+        write, progress: as in `solve`.
         Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
         or None.
         """
         if read.finite("step", step) <= 0.0:
             raise StudyError(f"step = {step}: must be positive")
         read.function("until", until, "result")
-        system = self.system()
-        begin = beginning(system, start)
+        require_detect(detect)
+        system, other = self.system(), start if isinstance(start, Bifurcation) else None
+        begin = beginning(system, start.state if isinstance(start, Bifurcation) else start)
         with Watch(Telling(progress, True, "load factor", begin[0]).until(None), write) as watch:
-            path = ArcSteps(step, Serial().newton(newton), most, watch)
+            path = ArcSteps(step, Serial().newton(newton), most, watch, detect is not None)
+            if other is not None:
+                return path.leave(system, begin, other, until)
             return path.run(system, begin, until)
 
     def buckling(

@@ -44,7 +44,7 @@ ORDER = {
             "equations output mass",
             "modes stability",
             "result",
-            "begin",
+            "begin bifurcation",
             "held watch engines",
         ),
         *("follow load march buckling", "dynamics", "study"),

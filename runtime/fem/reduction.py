@@ -52,14 +52,20 @@ class Reduction:
 
 
 def concave(layout: DofLayout, K: csc_array, fixed: Integers) -> Flags:
-    """Unknowns (n,) of the fields no diagonal entry of which is positive, without fixed ones."""
+    """Unknowns (n,) of the fields no diagonal entry of which is positive, without fixed ones.
+
+    Only of fields that are coupled to others: one by itself is no multiplier, it is unstable.
+    """
     found: Flags = np.zeros(layout.total, dtype=bool)
     diagonal = K.diagonal()
     diagonal[fixed] = 0.0
-    for name in layout.names:
-        part = layout.part(name)
+    for part in layout.fields:
         found[part] = bool((diagonal[part] <= 0.0).all())
     found[fixed] = False
+    others = abs(K) @ (~found).astype(np.float64)
+    for part in layout.fields:
+        if not others[part].any():
+            found[part] = False
     return found
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, eye_array
 from scipy.sparse import linalg as sparse_linalg
 
 from softehl.runtime.arrays import Array
@@ -19,6 +19,8 @@ from softehl.runtime.solve.ordering import without_zeros
 _SMALL_SHIFT = 1e-7
 """Of the largest ratio of the diagonals: the first shift below zero, above rounding."""
 _SHIFTS = 6
+_BESIDE = 1e-12  # of the largest entry: a shift that rounding may have made
+_DENSE = 20  # unknowns: fewer need no sparse eigenvalues, or cannot have them
 _RESIDUAL = 1e-6
 """Of a solution by pivots on the diagonal: beyond, their signs are not those of the matrix."""
 
@@ -147,12 +149,25 @@ def smallest_factors(K: csc_array, G: csc_array, count: int) -> tuple[Array, Arr
     return 1.0 / inverse.real[order], shapes / np.abs(shapes).max(axis=1, keepdims=True)
 
 
-def nearest_zero(K: csc_array, pivots: Pivots) -> tuple[float, Array]:
-    """The eigenvalue of K, symmetric (n, n), nearest to zero, and its vector of length 1."""
+def nearest_zero(K: csc_array) -> tuple[float, Array]:
+    """The eigenvalue of K, symmetric (n, n), nearest to zero, and its vector of length 1.
+
+    Raises SingularMatrix.
+    """
     n = K.shape[0]
+    if n < _DENSE:
+        every, columns = np.linalg.eigh(K.toarray())
+        chosen = int(np.abs(every).argmin())
+        return float(every[chosen]), signed(columns[:, [chosen]].T)[0]
+    shift = 0.0
+    try:
+        pivots = Pivots.of(K)
+    except SingularMatrix:  # a little beside it is not
+        shift = _BESIDE * float(np.abs(K.data).max())
+        pivots = Pivots.of(csc_array(K - shift * eye_array(n, format="csc")))
     inverse = sparse_linalg.LinearOperator((n, n), matvec=pivots.solve, dtype=np.float64)
     begin = np.random.default_rng(0).uniform(-1.0, 1.0, n)
-    values, vectors = sparse_linalg.eigsh(K, 1, sigma=0.0, OPinv=inverse, v0=begin)
+    values, vectors = sparse_linalg.eigsh(K, 1, sigma=shift, OPinv=inverse, v0=begin)
     return float(values[0]), signed(vectors.T)[0]
 
 
