@@ -130,6 +130,30 @@ def test_the_midpoint_conserves_the_energy_of_a_swinging_beam() -> None:
     assert drift("generalised-alpha", 1) > 1e-4
 
 
+@softehl.page
+def mixed(m: Any) -> None:
+    """Hardly compressible, with a pressure of its own that has no mass."""
+    u, p = m.vector("u"), m.scalar("p", order=1)
+    mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J))
+    m.minimise(W + p * (J - 1) - p**2 / (2 * K))
+
+
+def test_pressures_need_no_mass() -> None:
+    study = Study(Mesh.rectangle(LENGTH, 1.0, cells=(6, 1), order=2))
+    study.add("body", mixed, mu=50.0, K=1e6)
+    study.fix("left", u_x=0, u_y=0)
+    given = {"dt": 1.0, "until": 20.0, "mass": MASS, "velocity": SWING}
+    for method, most in (("midpoint", 1e-9), ("generalised-alpha", 0.02)):
+        states = steps(study, method=method, **given)
+        assert abs(states[-1].energy["balance"]) < most * states[0].energy["kinetic"]
+        assert np.nanmax(np.abs(states[-1].values("p"))) > 0.1
+    with pytest.raises(StudyError, match="p has no mass everywhere"):
+        steps(study, method="explicit", **given)
+
+
 def test_mass_of_a_page_is_that_of_a_density() -> None:
     given: dict[str, Any] = {"dt": PERIOD / 20, "until": PERIOD / 4, "velocity": SWING}
     for method in ("midpoint", "generalised-alpha"):

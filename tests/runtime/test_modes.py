@@ -204,6 +204,16 @@ def test_euler_loads() -> None:
     np.testing.assert_allclose(exact, EULER, rtol=2e-4)
 
 
+def test_a_support_that_moves_buckles_too() -> None:
+    """At the strain of Euler's load, but for its second order."""
+    study = Study(Mesh.rectangle(LENGTH, HEIGHT, cells=(30, 1), order=2))
+    study.add("body", rubber, mu=YOUNG / 2, lame=0.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.fix("right", u_x=-1, u_y=0)
+    strain = 4 * np.pi**2 * HEIGHT**2 / 12 / LENGTH**2  # both ends are clamped
+    assert study.buckling(1).factors[0] == pytest.approx(strain * LENGTH, rel=4e-3)
+
+
 def test_buckling_with_a_pressure_of_its_own() -> None:
     given = {"mu": YOUNG / 2, "K": 2 * YOUNG}
     found = column(mixed, **given).buckling(1).factors[0]
