@@ -9,6 +9,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, Beginning
+from softehl.runtime.bifurcation import Bifurcation, Detector
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
@@ -18,6 +19,7 @@ from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.stability import warn_unstable
 from softehl.runtime.system import System
 
 _NAME = "load factor"
@@ -28,10 +30,12 @@ class LoadPath:
     """Converged results in order, and where the load factor turned.
 
     limits: each with `parameter` (the load factor), `kind` ("maximum" or "minimum") and `x`.
+    bifurcations: those that were asked for, in order.
     """
 
     results: tuple[Result, ...]
     limits: tuple[LimitPoint, ...]
+    bifurcations: tuple[Bifurcation, ...] = ()
 
 
 @dataclass(eq=False)
@@ -92,19 +96,33 @@ class LoadSteps:
         rule = StepRule(first, min(SMALLEST, first), first)
         path = Continuation(first_step.newton, rule, name=_NAME)
         at.require_end(path.follow(at.problem_at, begin, until, x0, on_point=keep))
-        return at.results[-1]
+        end = at.results[-1]
+        words = f"{_NAME} {end.t:.4g}"
+        near = first_step.last if end.iterations else None  # else they are of a step before
+        warn_unstable(end.problem, end.point.solution.x, near, words)
+        return end
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """Beginning of a path by arc length: load factor, unknowns (n,), and how it leaves (n + 1,)."""
+
+    begin: float
+    x: Array
+    leave: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class ArcSteps:
     """Settings of a path by arc length: longest step, points at most; each result is handed to
-    `on_step`.
+    `on_step`. detect: look for bifurcations.
     """
 
     step: float
     newton: Newton
     most: int
     on_step: Callable[[Result], object]
+    detect: bool = False
 
     def run(self, system: System, start: Beginning, until: Callable[[Result], bool]) -> LoadPath:
         """Path of `Study.follow`.  Raises NotConverged."""
@@ -118,10 +136,37 @@ class ArcSteps:
             raise NotConverged(first)
         first_step.check(problem, first)
         scale = float(np.sqrt(np.mean((first.x - x0) ** 2))) / self.step
+        return self._followed(at, self._path(scale or 1.0), Arc(begin, x0), until)
+
+    def leave(
+        self, system: System, start: Beginning, other: Bifurcation, until: Callable[[Result], bool]
+    ) -> LoadPath:
+        """The branch that leaves a bifurcation.  Raises NotConverged."""
+        begin, x0, histories = start
+        at = _Reached(system, x0, histories, self.on_step, True)
+        size = float(np.ptp(system.mesh.points, axis=0).max())
+        mode = other.mode.x
+        path = self._path(size * float(np.sqrt(np.mean(mode**2))), abs(begin) or 1.0)
+        return self._followed(at, path, Arc(begin, x0, np.append(mode, 0.0)), until)
+
+    def _path(self, x_scale: float, parameter_scale: float = 1.0) -> Arclength:
         rule = StepRule(self.step, 1e-6 * self.step, self.step)
-        path = Arclength(self.newton, rule, x_scale=scale or 1.0, max_points=self.most, name=_NAME)
+        return Arclength(
+            *(self.newton, rule, x_scale, parameter_scale), max_points=self.most, name=_NAME
+        )
+
+    def _followed(
+        self, at: _Reached, path: Arclength, arc: Arc, until: Callable[[Result], bool]
+    ) -> LoadPath:
+        detector = Detector(at.system, self.newton, skip=arc.leave is not None)
+
+        def ends(branch: Branch) -> bool:
+            if self.detect:
+                detector.look(at.results, branch)
+            return until(at.results[-1])
+
         branch = path.follow(
-            at.problem_at, begin, x0, until=lambda _: until(at.results[-1]), on_point=at.keep
+            at.problem_at, arc.begin, arc.x, until=ends, leave=arc.leave, on_point=at.keep
         )
         at.require_end(branch)
-        return LoadPath((*at.results,), branch.limit_points)
+        return LoadPath((*at.results,), branch.limit_points, (*detector.found,))

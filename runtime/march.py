@@ -32,7 +32,7 @@ Method: TypeAlias = Literal["euler", "bdf2"]
 
 _ORDER = {"euler": 1, "bdf2": 2}
 _GROWTH, _CUT, _SAFETY = 2.0, 0.2, 0.9
-_ROUNDING = 1e-12  # of the whole time: a step is not cut to less than that before the end
+ROUNDING = 1e-12  # of the whole time: a step is not cut to less than that before the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Clock:
 
     def require_before(self, until: float) -> None:
         """Raise StudyError where the end is not after the start."""
-        if until - self.t <= _ROUNDING * abs(until):
+        if until - self.t <= ROUNDING * abs(until):
             raise StudyError(f"until = {until:g}: must be after the start, which is t = {self.t:g}")
 
     def save(self, path: Path, share: Share, asked: float, marks: Mapping[str, Array]) -> None:
@@ -142,7 +142,7 @@ class March:
         with np.errstate(all="ignore"):
             posed = system.problem(self.posed(system, clock, shortest))
             require_held(system, posed, clock.states[0])
-        way = _ByTime(self, FirstStep(self.newton), system, clock, until, _ROUNDING * length)
+        way = _ByTime(self, FirstStep(self.newton), system, clock, until, ROUNDING * length)
         log = Record("t")
         marks = {} if checkpoint is None else marks_of(system.everywhere)
         for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):
@@ -213,7 +213,7 @@ class _ByTime(Way):
     def attempt(self, step: float) -> Trial:
         """A step in time; refused where its error is too large."""
         left = self.until - self.clock.t
-        dt = step if self.again else _towards(left, step)
+        dt = step if self.again else towards(left, step)
         posed = self.march.posed(self.system, self.clock, dt)
         problem = self.system.problem(posed)
         with np.errstate(all="ignore"):
@@ -261,7 +261,7 @@ def _largest(system: System, values: Array) -> float:
     return system.share.largest(float(np.abs(values).max(initial=0.0)))
 
 
-def _towards(left: float, dt: float) -> float:
+def towards(left: float, dt: float) -> float:
     """A step of about dt that does not leave a sliver before the end."""
     if left <= dt * (1.0 + 1e-9):
         return left

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +13,12 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.mass import Masses
+from softehl.runtime.modes import natural
 from softehl.runtime.names import meant
 from softehl.runtime.output import Picture, piece_names
-from softehl.runtime.solve.solution import Point
+from softehl.runtime.solve.solution import Point, Solution, Status
+from softehl.runtime.stability import negative_directions
 
 if TYPE_CHECKING:
     from softehl.runtime.mesh.mesh import Predicate
@@ -156,6 +159,26 @@ class Result:
             found[name] = float(self._forces[there[there >= 0]].sum())
         return found
 
+    @cached_property
+    def unstable(self) -> int | None:
+        """Number of independent motions along which the energy about this state falls; 0: stable.
+
+        None where there is no such number: a tangent that is not symmetric, or is singular.
+        """
+        return negative_directions(self.problem, self.point.solution.x)
+
+    def modes(self, count: int = 6, *, mass: Masses | None = None) -> Modes:
+        """Natural modes about this state, prestress and all, the lowest first.
+
+        mass: densities by block, {"body": {"rho": 1e-9}}: mass per reference volume (in 2-D per
+        area), a number or a function of places, of u_x, u_y, u_z or of the unknowns that "of"
+        names. Pages with accelerations (`Model.rates(order=2)`) bring their own. Supports hold,
+        tied sides move as one, unknowns without mass follow. Raises StudyError.
+        """
+        x = self.point.solution.x
+        squares, found = natural(self.system, self.problem, x, count, mass)
+        return Modes(squares, tuple(Shape.of(self, mode) for mode in found))
+
     def deformed(self, names: tuple[str, ...]) -> Array:
         """Places of the nodes moved by the unknowns of these names, (points, dim)."""
         moved = np.stack([np.nan_to_num(self.values(name)) for name in names], axis=1)
@@ -203,3 +226,49 @@ class Result:
                 own.append(cells[[tuple(row) not in there for row in cells.tolist()]])
             found[kind] = np.unique(np.concatenate([cells[:0], *own]), axis=0)
         return found
+
+
+class Shape(Result):
+    """A mode about a state: its unknowns are the mode. Fields in cells belong to states, it has
+    none.
+    """
+
+    @classmethod
+    def of(cls, state: Result, mode: Array) -> Shape:
+        """A mode (n,) about a state."""
+        solution = Solution(mode, Status.CONVERGED, "", (), 0, 0)
+        return cls(state.system, state.problem, replace(state.point, solution=solution))
+
+    def fields(self, block: str) -> dict[str, Array]:
+        """None."""
+        return {}
+
+    def _own_fields(self, block: str) -> dict[str, Array]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Natural modes about a state, the lowest first.
+
+    squares: (k,) squares of the angular frequencies; negative where the state is unstable. shapes:
+    a result for each, whose unknowns are the mode, of unit modal mass.
+    """
+
+    squares: Array
+    shapes: tuple[Shape, ...]
+
+    @property
+    def frequencies(self) -> Array:
+        """Cycles per unit of time, (k,); nan where the state is unstable."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.sqrt(self.squares) / (2.0 * np.pi))
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+    def __getitem__(self, number: int) -> Result:
+        return self.shapes[number]
+
+    def __iter__(self) -> Iterator[Result]:
+        return iter(self.shapes)

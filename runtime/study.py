@@ -12,15 +12,20 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.begin import beginning
+from softehl.runtime.bifurcation import Bifurcation, require_detect
+from softehl.runtime.buckling import Buckling, linear_buckling
+from softehl.runtime.dynamics.schemes import METHODS, require_method, require_none
+from softehl.runtime.dynamics.schemes import Method as Dynamic
+from softehl.runtime.dynamics.start import Motions, require_no_inertia
 from softehl.runtime.engines.engine import AnyEngine, engine_of, note_of
 from softehl.runtime.engines.sizes import Linear
 from softehl.runtime.equations import equations
@@ -28,6 +33,7 @@ from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Sp
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.load import ArcSteps, LoadPath, LoadSteps
 from softehl.runtime.march import Clock, March, Method
+from softehl.runtime.mass import Masses
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.names import listed
@@ -78,7 +84,7 @@ class Study:
         """Raises MeshError for a cell that is turned inside out, StudyError for a geometry."""
         self.mesh.check()
         geometry_of(self.mesh, self.geometry)
-        self._statement = Statement(self.mesh)
+        self._statement = Statement(self.mesh, self._ring)
 
     # the problem --------------------------------------------------------------------------------
 
@@ -292,7 +298,10 @@ class Study:
         *,
         dt: float,
         until: float,
-        method: Method = "euler",
+        method: Method | Dynamic = "euler",
+        mass: Masses | None = None,
+        velocity: Mapping[str, Datum] | None = None,
+        rho_inf: float | None = None,
         tolerance: float | None = None,
         start: Result | None = None,
         checkpoint: str | Path | None = None,
@@ -306,10 +315,15 @@ class Study:
         """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
 
         dt: length of the (first) step. start: a result, as in `solve`. method: "euler" (backward)
-        or "bdf2". tolerance: largest local error of a step, relative to the largest value of each
-        unknown (of those with a rate, where there are any); steps then adapt, else they are dt, but
-        for those that Newton's method needs shorter. History is committed and
-        values of steps before (data u_old, `Model.rates`) are renewed after every converged step.
+        or "bdf2"; with inertia "generalised-alpha", "newmark" (trapezoidal rule), "midpoint"
+        (conserves energy) or "explicit" (central differences, as many steps from result to result
+        as are stable): results are then `Motion`, with velocities, accelerations and energies.
+        mass: densities by block, as of `Result.modes`; velocity: unknown -> at the start, a number
+        or a function of places; rho_inf: see generalised-alpha, 0.8 if left out. tolerance: largest
+        local error of a step, relative to the largest value of each unknown (of those with a rate,
+        where there are any); steps then adapt, else they are dt, but for those that Newton's method
+        needs shorter. History is committed and values of steps before (data u_old, `Model.rates`)
+        are renewed after every converged step.
         checkpoint: file that is rewritten after each step; restart: such a file of the same mesh,
         pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
         `engine` "petsc" on any number of processes; another `dt` than then is the next step.
@@ -317,21 +331,30 @@ class Study:
         goes on). linear, progress: as in `solve`. Raises StudyError, and NotConverged as `solve`
         does.
         """
-        if method not in ("euler", "bdf2"):
-            raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
+        require_method(method, ("euler", "bdf2"))
         for name, value in (("dt", dt), ("until", until), ("tolerance", tolerance)):
             if value is not None and read.finite(name, value) <= 0.0:
                 raise StudyError(f"{name} = {value}: must be positive")
         if start is not None and restart is not None:
             raise StudyError("start and restart: give one of them, a result or a checkpoint")
         where = engine_of(engine, linear)
+        if method in METHODS:
+            refused = {"tolerance": tolerance, "checkpoint": checkpoint, "restart": restart}
+            require_none(method, {**refused, "engine": None if engine == "serial" else engine})
+            system = where.spread(self.system())
+            motions = Motions(method, dt, where.newton(newton), mass, velocity, rho_inf)
+            told = Telling(progress, True, "t", 0.0 if start is None else start.t, note_of(where))
+            found = motions.run(system, start, until)
+            return watched(found, Watch(told.until(until), write))
+        require_none(method, {"mass": mass, "velocity": velocity, "rho_inf": rho_inf})
         system = where.spread(self.system())
+        require_no_inertia(method, system)
         if restart is None:
             clock = Clock.begin(system, start, dt)
         else:
             clock = Clock.load(Path(restart), system, dt)
         clock.require_before(until)
-        settings = March(method, tolerance, dt, where.newton(newton))
+        settings = March(cast(Method, method), tolerance, dt, where.newton(newton))
         file = None if checkpoint is None else Path(checkpoint)
         series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
         told = Telling(progress, system.share.first, "t", clock.t, note_of(where))
@@ -342,7 +365,8 @@ class Study:
         *,
         step: float,
         until: Callable[[Result], bool],
-        start: Result | None = None,
+        start: Result | Bifurcation | None = None,
+        detect: Literal["bifurcation"] | None = None,
         newton: Newton | None = None,
         most: int = 1000,
         linear: Linear = "auto",
@@ -351,22 +375,30 @@ class Study:
     ) -> LoadPath:
         """The path from load factor 0 on, by arc length: it passes limit points of the load.
 
-        start: a result to begin with, as in `solve`. step: length of the first and longest step. A
-        length counts the load factor, and the unknowns in units of what they change by per load
-        factor in the beginning. until: is given each result; the path ends where it says True.
-        most: points at most. History is committed after each point. linear, write, progress: as in
-        `solve`. Raises StudyError; NotConverged if the end is not reached: its `reached` is the
-        last Result, or None.
+        start: a result to begin with, as in `solve`, or a bifurcation, whose other branch is
+        followed; `start.reversed` is the other side of it. detect="bifurcation": look for them, at
+        the cost of a factorisation a point; the path has `bifurcations`. step: length of the first
+        and longest step. A length counts the load factor, and the unknowns in units of what they
+        change by per load factor in the beginning; from a bifurcation the load factor relative to
+        that, and displacements relative to the size of the mesh. until: is given each result; the
+        path ends where it says True. most: points at most. History is committed after each point.
+        linear, write, progress: as in `solve`. Raises StudyError; NotConverged if the end is not
+        reached: its `reached` is the last Result, or None.
         """
         if read.finite("step", step) <= 0.0:
             raise StudyError(f"step = {step}: must be positive")
         read.function("until", until, "result")
-        where = engine_of(None, linear)
+        require_detect(detect)
+        where, other = engine_of(None, linear), start if isinstance(start, Bifurcation) else None
         system = where.spread(self.system())
-        begin, newton = beginning(system, start), where.newton(newton)
+        begin = beginning(system, start.state if isinstance(start, Bifurcation) else start)
+        newton = where.newton(newton)
         told = Telling(progress, True, "load factor", begin[0], note_of(where))
         with Watch(told.until(None), write) as watch:
-            return ArcSteps(step, newton, most, watch).run(system, begin, until)
+            path = ArcSteps(step, newton, most, watch, detect is not None)
+            if other is not None:
+                return path.leave(system, begin, other, until)
+            return path.run(system, begin, until)
 
     def periodic(self, *pairs: tuple[Where, Where], tolerance: float = 1e-6) -> Cell:
         """The study as a cell of a periodic material: opposite sides, a pair for each direction.
@@ -375,6 +407,19 @@ class Study:
         same nodes but for a shift; `tolerance` is relative to their size. Raises StudyError.
         """
         return periodic(self._statement, self.system(), pairs, tolerance)
+
+    def buckling(
+        self, count: int = 1, *, start: Result | None = None, newton: Newton | None = None
+    ) -> Buckling:
+        """The smallest load factors of linear buckling, and their modes.
+
+        The tangent at rest, or at the load of `start` (a result), changes as along the linear
+        response to loads and prescribed values that grow in proportion; where it becomes singular
+        is a factor. Closer to the truth from a start near by. Raises StudyError, NotConverged.
+        """
+        where = engine_of(None)
+        system = where.spread(self.system())
+        return linear_buckling(system, beginning(system, start), count, where.newton(newton))
 
     def system(self) -> System:
         """Equations of the study.  Raises StudyError for what does not fit together."""

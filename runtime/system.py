@@ -32,7 +32,8 @@ class Step:
 
     factor: of all numbers in loads and supports. old: (n,) unknowns of the step
     before. rate, rest: du/dt = rate u + rest, rest (n,). dt: length of the step. histories: block
-    -> (cells, points, k) point data.
+    -> (cells, points, k) point data. acceleration, remainder: likewise d2u/dt2 = acceleration u +
+    remainder; None is zero.
     """
 
     t: float
@@ -42,6 +43,8 @@ class Step:
     rest: Array
     dt: float
     histories: Mapping[str, Array]
+    acceleration: float = 0.0
+    remainder: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,10 +136,16 @@ class System:
         for block in self.assembler.blocks:
             page = self.blocks.get(block.name)
             if page is None:
-                given: Mapping[str, Number] = {"t": step.t, "factor": step.factor}
+                given: Mapping[str, Number] = {
+                    **{"t": step.t, "factor": step.factor},
+                    "acceleration": step.acceleration,
+                }
             else:
-                given = {"rate": step.rate, "dt": step.dt, **page.parameters}
-                if page.previous or page.rates or page.initial is not None:
+                given = {
+                    **{"rate": step.rate, "dt": step.dt, "acceleration": step.acceleration},
+                    **page.parameters,
+                }
+                if page.filled or page.initial is not None:
                     state = {"data": self._data(page, step)}
                     history = step.histories.get(page.name)
                     assembler = assembler.with_data(page.name, **state, point_data=history)
@@ -158,8 +167,11 @@ class System:
             if name in page.data:
                 columns.append(page.data[name])
                 continue
-            slot = page.previous.get(name) or page.rates[name]
-            source = step.old if name in page.previous else step.rest
+            slot, source = page.filled[name], step.old
+            if name in page.rates:
+                source = step.rest
+            elif name in page.accelerations:
+                source = np.zeros(self.size) if step.remainder is None else step.remainder
             columns.append(source[self.numbering.nodal[slot.name][page.nodes[:, slot.node or 0]]])
         return np.stack(columns, axis=1) if columns else None
 

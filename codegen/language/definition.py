@@ -32,8 +32,9 @@ class Condition:
 class Component:
     """A scalar that varies in the cell.
 
-    name: as of its unknowns; of what was at the step before name_old, of a rate name_rate. order:
-    of its shape functions. given: whether it is data, not an unknown.
+    name: as of its unknowns; of what was at the step before name_old, of a rate name_rate, of an
+    acceleration name_acceleration. order: of its shape functions. given: whether it is data, not an
+    unknown.
     """
 
     name: str

@@ -92,13 +92,12 @@ class Fields(Model):
         """A field at the beginning of the step; it has gradients, too."""
         return self._of_step(field, "old")
 
-    def rate(self, field: Any) -> Any:
-        """Time derivative of a field, by what `Study.march` gives: see `Model.rates`."""
-        known = {a.name: sp.Symbol(a.name, real=True) for a in self._arguments["parameters"]}
-        coefficient = known.get("rate")
-        if coefficient is None:
-            (coefficient,) = self.parameters(rate="coefficient of the time derivative [1/s]")
-        rest = Entries.of(self._of_step(field, "rate")).values
+    def rate(self, field: Any, order: int = 1) -> Any:
+        """Time derivative of a field, or its second one, by what `Study.march` gives: see
+        `Model.rates`.
+        """
+        coefficient, suffix = self._of_time(order)
+        rest = Entries.of(self._of_step(field, suffix)).values
         now = Entries.of(field)
         return now.arrange([coefficient * a + b for a, b in zip(now.values, rest, strict=True)])
 

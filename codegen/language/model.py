@@ -214,26 +214,35 @@ class Model:
             columns.append(self._declare("data", given))
         return _columns("the data", names, columns)
 
-    def rates(self, *names: str) -> list[list[sp.Expr]]:
+    def rates(self, *names: str, order: int = 1) -> list[list[sp.Expr]]:
         """Time derivatives of nodal unknowns, in the order of `nodal_unknowns`.
 
-        du/dt = rate u + u_rate, with the parameter `rate` and the data `u_rate` at the nodes:
-        `Study.march` gives both, by backward Euler or BDF2.
+        du/dt = rate u + u_rate, with the parameter `rate` and the data `u_rate` at the nodes;
+        order=2: d2u/dt2 = acceleration u + u_acceleration. `Study.march` gives them.
         """
-        known = {a.name: sp.Symbol(a.name, real=True) for a in self._arguments["parameters"]}
-        rate = known.get("rate")
-        if rate is None:
-            (rate,) = self.parameters(rate="coefficient of the time derivative [1/s]")
+        coefficient, suffix = self._of_time(order)
         found = []
         for name in names:
             count = sum(n == name and a is not None for n, a in self._places)
             if not count:
                 raise ModelError(f"rates: {name} is no unknown at the nodes")
             values = [sp.Symbol(f"{name}{a + 1}", real=True) for a in range(count)]
-            label, words = f"{name}_rate", "of the steps before"
+            label, words = f"{name}_{suffix}", "of the steps before"
             (rest,) = self.nodal_data(label, meaning=words, nodes=count)
-            found.append([rate * u + v for u, v in zip(values, rest, strict=True)])
+            found.append([coefficient * u + v for u, v in zip(values, rest, strict=True)])
         return found
+
+    def _of_time(self, order: int) -> tuple[sp.Symbol, str]:
+        """Coefficient of a time derivative, and what the names of its data end in."""
+        if order not in (1, 2):
+            raise ModelError(f"rates of order {order!r}: allowed are 1 and 2")
+        name, words = (("rate", "time derivative [1/s]"), ("acceleration", "second one [1/s^2]"))[
+            order - 1
+        ]
+        known = {a.name: sp.Symbol(a.name, real=True) for a in self._arguments["parameters"]}
+        if name not in known:
+            (known[name],) = self.parameters(**{name: f"coefficient of the {words}"})
+        return known[name], name
 
     def history(self, **new: Any) -> None:
         """Declare new values of `point_data` after a converged step: m.history(v_old=v).

@@ -377,6 +377,52 @@ def contact(figure: Figure, space: dict[str, Any]) -> None:
     figure.colorbar(drawn, ax=right, label="pressure [MPa]", shrink=0.8)
 
 
+def column(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.2])
+    study, mass, first = space["study"], space["mass"], space["euler"][0]
+    shares = np.linspace(0.0, 0.99, 8)
+    states = [study.solve(until=s * first).modes(1, mass=mass).squares[0] for s in shares]
+    left.plot(shares, 1 - shares, color=GREY, label="linear")
+    left.plot(shares, np.array(states) / space["free"].squares[0], "o", color=BLUE, label="modes")
+    left.set_xlabel("load over Euler's")
+    left.set_ylabel("frequency squared")
+    left.legend()
+    for state in space["path"].results[::3]:
+        points = state.deformed(("u_x", "u_y"))
+        edge = points[study.mesh.nodes("bottom")]
+        edge = edge[np.argsort(study.mesh.points[study.mesh.nodes("bottom"), 0])]
+        side = np.sign(edge[-1, 1]) or 1.0
+        right.plot(edge[:, 0], side * edge[:, 1], color=BLUE, lw=1)
+    loads = np.linspace(1.001, space["path"].results[-1].t / first, 200)
+    x, y = np.array([space["curve"](load) for load in loads]).T
+    right.plot(x, y, "--", color=ORANGE, label="end of an elastica")
+    right.set_aspect("equal")
+    right.set_xlabel("mm")
+    right.legend(loc="lower left")
+
+
+def swing(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.5])
+    mesh = space["study"].mesh
+    (cells,) = mesh.cells.values()
+    for state, colour in zip(
+        space["paths"]["midpoint"][9:31:7], ("#c6dbef", "#6baed6", BLUE, "k"), strict=True
+    ):
+        places = state.deformed(("u_x", "u_y"))
+        drawn = PolyCollection(places[cells[:, :4]], facecolors="none", edgecolors=colour)
+        left.add_collection(drawn)
+    left.autoscale_view()
+    left.set_aspect("equal")
+    left.set_axis_off()
+    for (name, states), colour in zip(space["paths"].items(), (BLUE, ORANGE, GREY), strict=True):
+        total = np.array([s.energy["kinetic"] + s.energy["internal"] for s in states])
+        time = np.array([s.t for s in states]) / space["period"]
+        right.plot(time, 100 * (total / total[0] - 1), color=colour, label=name, lw=1)
+    right.set_xlabel("periods")
+    right.set_ylabel("change of the energy [%]")
+    right.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=7)
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
@@ -391,6 +437,8 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "stick-slip": stick_slip,
     "fracture": fracture,
     "contact": contact,
+    "column": column,
+    "swing": swing,
 }
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMat
 from softehl.runtime.solve.newton import MeasuredProblem, Newton, NonlinearProblem
 from softehl.runtime.solve.predictor import admissible_fraction
 from softehl.runtime.solve.record import End, OnPoint, Record
-from softehl.runtime.solve.solution import Branch, LimitPoint, Status
+from softehl.runtime.solve.solution import Branch, LimitPoint, Solution, Status
 from softehl.runtime.solve.steps import StepRule
 
 Derivative: TypeAlias = Callable[[float, Array], Array]
@@ -156,12 +156,15 @@ class Arclength:
         within: tuple[float, float] = (-math.inf, math.inf),
         until: Callable[[Branch], bool] | None = None,
         derivative: Derivative | None = None,
+        leave: Array | None = None,
         on_point: OnPoint | None = None,
     ) -> Branch:
         """Follow the path through the solution at `start`, x0 of shape (n,) being the guess.
 
-        direction: sign of the first change of the parameter. derivative(parameter, x): dR/dp,
-        shape (n,). on_point: called after each converged point. Start must not be a limit point.
+        direction: sign of the first change of the parameter. leave: (n + 1,) instead, how x0, a
+        solution, and the parameter change in the beginning: off a bifurcation.
+        derivative(parameter, x): dR/dp, shape (n,). on_point: called after each converged point.
+        Start must not be a limit point.
         The path ends CONVERGED where the parameter leaves `within` (the last point lies exactly
         on the bound) or when `until` is true of the branch so far; MAX_ITERATIONS at max_points,
         unless no other end was asked for. Raises ValueError if start is not within.
@@ -171,7 +174,9 @@ class Arclength:
         path = _Path(problem_at, derivative, self.x_scale, self.parameter_scale, self.difference)
         log = Record(self.name, self.keep_all, on_point)
         return followed(
-            _ByLength(self, path, log, start, x0, direction, within, until), self.steps, log
+            _ByLength(self, path, log, start, x0, direction, within, until, leave),
+            self.steps,
+            log,
         )
 
 
@@ -187,11 +192,16 @@ class _ByLength(Way):
     direction: float
     within: tuple[float, float]
     until: Callable[[Branch], bool] | None
+    leave: Array | None = None
     here: _Trial | None = None
 
     def start(self) -> _Trial:
         """Solve at the start and find the tangent on which the parameter changes as asked."""
         newton = self.settings.newton
+        if self.leave is not None:
+            size = math.sqrt(float(self.path.weigh(self.leave) @ self.leave))
+            known = Solution(self.x0, Status.CONVERGED, "", (), 0, 0)
+            return _Trial(self.begin, known, t=self.leave / size)
         trial = _Trial(self.begin, newton.solve(self.path.problem_at(self.begin), self.x0))
         along = np.zeros(trial.y.size)
         along[-1] = math.copysign(1.0 / self.settings.parameter_scale, self.direction)

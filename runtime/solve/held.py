@@ -31,10 +31,9 @@ class Judging(Protocol):
 
 @dataclass
 class Remembering:
-    """A linear solver that keeps the last matrix and its factors until it is asked to forget."""
+    """A linear solver that keeps the last matrix and its factors."""
 
     solver: LinearSolver
-    keeps: bool = True
     last: tuple[SparseMatrix, Factors] | None = field(default=None, init=False)
 
     @property
@@ -46,7 +45,7 @@ class Remembering:
         """See `LinearSolver`."""
         self.last = None  # never two at a time: they are what memory goes into
         factors = self.solver.factorise(K)
-        self.last = (K, factors) if self.keeps else None
+        self.last = K, factors
         return factors
 
 
@@ -56,18 +55,24 @@ class FirstStep:
 
     newton: Newton
     _memory: Remembering = field(init=False)
+    _looked: bool = False
 
     def __post_init__(self) -> None:
         """Let the linear solver remember."""
         self._memory = Remembering(self.newton.linear)
         self.newton = replace(self.newton, linear=self._memory)
 
+    @property
+    def last(self) -> tuple[SparseMatrix, Factors] | None:
+        """The last matrix that was factorised, and its factors."""
+        return self._memory.last
+
     def check(self, problem: NamedProblem, solution: Solution) -> None:
         """Raise NotConverged if nothing held what was solved; ask after each converged step."""
-        memory, self._memory.last = self._memory.last, None
-        if memory is None or not self._memory.keeps:
+        memory = self._memory.last
+        if memory is None or self._looked:
             return
-        self._memory.keeps = False
+        self._looked = True
         K, factors = memory
         number = factors.loosest() if isinstance(factors, Judging) else loosest(K, factors)
         if number is not None:

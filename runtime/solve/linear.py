@@ -122,6 +122,11 @@ class Factorisation:
             )
         return x
 
+    def pivots(self) -> Array | None:
+        """Pivots (n,) where they are all on the diagonal, as in L D L'; None where not known."""
+        known = getattr(self.factors, "pivots", None)
+        return None if known is None else known()
+
     def _backward_error(self, x: Array, b: Array) -> float:
         """Largest |b - A x|_i / (|A|_i |x|_max + |b|_i); each row has its own units."""
         size = float(np.abs(x).max(initial=0.0))

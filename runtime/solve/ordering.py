@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
+from scipy.sparse.linalg import SuperLU
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.solve.linear import Factors, SparseMatrix
@@ -15,6 +16,9 @@ Small = NDArray[np.int32]
 
 MOST_ENTRIES = 1 << 23
 """Of a pattern that is remembered: beyond, finding an order is a small part of the work."""
+
+MOST_COPIED = 30_000_000
+"""Entries of factors that are copied to look at a few of them."""
 
 NOTHING: Integers = np.empty(0, dtype=np.int64)
 """No boundary."""
@@ -96,6 +100,14 @@ class Arranged:
         x = np.empty(len(b))
         x[self.order.unknowns] = self.factors.solve(b[self.order.unknowns])
         return x
+
+    def pivots(self) -> Array | None:
+        """Pivots of SuperLU, (n,), if they are all on the diagonal, else None."""
+        made = self.factors
+        if not isinstance(made, SuperLU) or made.nnz > MOST_COPIED:
+            return None
+        on_diagonal = np.array_equal(made.perm_r, made.perm_c)
+        return np.asarray(made.U.diagonal()) if on_diagonal else None
 
 
 def without_zeros(K: SparseMatrix) -> SparseMatrix:

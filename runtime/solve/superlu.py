@@ -18,10 +18,16 @@ from softehl.runtime.solve.linear import (
     SparseMatrix,
     checked_row_sums,
 )
-from softehl.runtime.solve.ordering import MOST_ENTRIES, Arranged, Order, Orders, without_zeros
+from softehl.runtime.solve.ordering import (
+    MOST_COPIED,
+    MOST_ENTRIES,
+    Arranged,
+    Order,
+    Orders,
+    without_zeros,
+)
 
 Ordering: TypeAlias = Literal["NATURAL", "MMD_ATA", "MMD_AT_PLUS_A", "COLAMD"]
-_LARGE = 30_000_000  # entries of factors that are not copied to look at a few of them
 
 
 @dataclass(frozen=True)
@@ -53,7 +59,7 @@ class SuperLU:
         checked_row_sums(K)
         try:
             order = self.orders.find(K, boundary) or self.orders.add(self._last(K, boundary))
-            return SchurByFactors.of(K, order, self._as_it_is, _LARGE)
+            return SchurByFactors.of(K, order, self._as_it_is, MOST_COPIED)
         except SingularMatrix:
             return SchurBySolves.of(K, boundary, self.factors)
 

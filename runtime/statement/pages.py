@@ -71,13 +71,18 @@ def page_on(
     _require_fit(mesh, kernel)
     found = slots(kernel)
     known("unknown", shared, [s.name for s in found if s.node is None], kernel.name)
-    previous, rates = _automatic(kernel, found)
+    previous, rates, accelerations = _automatic(kernel, found)
     known("argument", given, _arguments(kernel), kernel.name)
-    automatic = ("dt", "rate") if rates else ("dt",)
-    if rates and "rate" in given:
-        raise StudyError(f"{name!r}: rate comes from the steps in time, it cannot be given")
+    timed = {"rate": rates, "acceleration": accelerations}
+    automatic = ("dt", *(p for p, slots_of in timed.items() if slots_of))
+    for parameter_of_time in automatic[1:]:
+        if parameter_of_time in given:
+            raise StudyError(
+                f"{name!r}: {parameter_of_time} comes from the steps in time, it cannot be given"
+            )
+    filled = {**previous, **rates, **accelerations}
     needed = [p for p in kernel.parameters if p not in automatic]
-    needed += [d for d in kernel.data if d not in previous and d not in rates]
+    needed += [d for d in kernel.data if d not in filled]
     missing = [a for a in needed if a not in given]
     if missing:
         hint = "; where t is the time or load factor, give t=lambda t: t" if "t" in missing else ""
@@ -94,6 +99,7 @@ def page_on(
         data=data,
         previous={d: s for d, s in previous.items() if d not in data},
         rates={d: s for d, s in rates.items() if d not in data},
+        accelerations={d: s for d, s in accelerations.items() if d not in data},
         initial=_initial(name, kernel, given, centres),
         parameters={p: parameter(name, p, given[p]) for p in kernel.parameters if p in given},
     )
@@ -116,14 +122,14 @@ def _arguments(kernel: Kernel) -> list[str]:
     return [*kernel.parameters, *kernel.data, *kernel.point_data]
 
 
-def _automatic(kernel: Kernel, found: Sequence[Slot]) -> tuple[dict[str, Slot], dict[str, Slot]]:
-    """Data u_old1, ... and u_rate1, ... of nodal unknowns u: what a study fills itself."""
+def _automatic(kernel: Kernel, found: Sequence[Slot]) -> list[dict[str, Slot]]:
+    """Data u_old1, u_rate1, u_acceleration1, ... of nodal unknowns u: what a study fills itself."""
     nodal = {f"{s.name}{{}}{s.node + 1}": s for s in found if s.node is not None}
-    previous = {label.format("_old"): slot for label, slot in nodal.items()}
-    rates = {label.format("_rate"): slot for label, slot in nodal.items()}
-    return tuple(  # type: ignore[return-value]
-        {d: table[d] for d in kernel.data if d in table} for table in (previous, rates)
-    )
+    tables = [
+        {label.format(suffix): slot for label, slot in nodal.items()}
+        for suffix in ("_old", "_rate", "_acceleration")
+    ]
+    return [{d: table[d] for d in kernel.data if d in table} for table in tables]
 
 
 def _initial(block: str, kernel: Kernel, given: Mapping[str, Any], centres: Array) -> Array | None:

@@ -32,8 +32,8 @@ class Block:
 
     nodes: (n, k). kind: of the cells or faces. data: name -> (n,) of those that the user gave.
     previous: column of the kernel's data -> name and node of the unknown whose value at the step
-    before it is; rates: likewise of what `rates` adds. initial: (n, points, k) point data at the
-    start, or None.
+    before it is; rates, accelerations: likewise of what `rates` adds. initial: (n, points, k) point
+    data at the start, or None.
     """
 
     name: str
@@ -45,8 +45,14 @@ class Block:
     data: Mapping[str, Array]
     previous: Mapping[str, Slot]
     rates: Mapping[str, Slot]
+    accelerations: Mapping[str, Slot]
     initial: Array | None
     parameters: Mapping[str, Number]
+
+    @property
+    def filled(self) -> dict[str, Slot]:
+        """All data that a step fills."""
+        return {**self.previous, **self.rates, **self.accelerations}
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +91,13 @@ class Start:
 
 @dataclass(eq=False)
 class Statement:
-    """A boundary-value problem that is being written down, in the order of the script."""
+    """A boundary-value problem that is being written down, in the order of the script.
+
+    ring: whether cells and sides are those of rings around the x axis.
+    """
 
     mesh: Mesh
+    ring: bool = False
     blocks: dict[str, Block] = field(default_factory=dict)
     conditions: list[Condition] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)

@@ -111,5 +111,5 @@ def test_another_pattern_has_another_order(rng: np.random.Generator) -> None:
 def test_what_is_too_large_goes_by_solves(
     monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator
 ) -> None:
-    monkeypatch.setattr(superlu, "_LARGE", 10)
+    monkeypatch.setattr(superlu, "MOST_COPIED", 10)
     assert isinstance(SuperLU().condense(body(rng), BOUNDARY), SchurBySolves)

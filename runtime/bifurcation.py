@@ -1,0 +1,139 @@
+"""Bifurcations of a path: its tangent becomes singular without a turn of the load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.reduction import Reduction, symmetric
+from softehl.runtime.result import Result, Shape
+from softehl.runtime.solve.eigen import nearest_zero
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import Branch, Point
+from softehl.runtime.statement.records import StudyError
+from softehl.runtime.system import System
+
+_SEARCHES = 20
+_LOCATED = 1e-9
+"""Of the load factor: a bifurcation is located where the next step is shorter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bifurcation:
+    """A state from which another branch leaves, given to `Study.follow(start=...)` to go there.
+
+    state: the result there. mode: the way in which the other branch leaves, 1 at its largest
+    displacement. directions: how many motions lost or found stability in that step. located: False
+    if the search failed, so that the state is only the nearer end of the step.
+    """
+
+    state: Result
+    mode: Shape
+    directions: int
+    located: bool
+
+    @property
+    def t(self) -> float:
+        """The load factor."""
+        return self.state.t
+
+    @property
+    def reversed(self) -> Bifurcation:
+        """Towards the other side of the branch, with the mode in the other direction."""
+        return replace(self, mode=Shape.of(self.state, -self.mode.x))
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A point near a bifurcation: the eigenvalue next to zero, and its vector (n,)."""
+
+    t: float
+    x: Array
+    value: float
+    mode: Array
+
+
+@dataclass(eq=False)
+class Detector:
+    """Looks at a path after each of its points.
+
+    skip: the first point is on a bifurcation itself. folds: limit points that were met.
+    """
+
+    system: System
+    newton: Newton
+    skip: bool = False
+    found: list[Bifurcation] = field(default_factory=list)
+    folds: int = 0
+
+    def look(self, results: Sequence[Result], branch: Branch) -> None:
+        """Look for a bifurcation between the last two results."""
+        folds, self.folds = len(branch.limit_points) - self.folds, len(branch.limit_points)
+        before, after = results[-2:]
+        if self.skip and len(results) == 2:
+            return
+        if before.unstable is None or after.unstable is None:
+            return
+        change = after.unstable - before.unstable
+        if change and not (folds == 1 and abs(change) == 1):
+            self.found.append(self._locate(before, after, abs(change)))
+
+    def _locate(self, before: Result, after: Result, directions: int) -> Bifurcation:
+        """By the secant of the eigenvalue next to zero, over the load factor (Illinois)."""
+        a, b = (self._place(r.problem, r.t, r.point.solution.x) for r in (before, after))
+        near, located = min(a, b, key=lambda place: abs(place.value)), False
+        low, high = a.value, b.value
+        for _ in range(_SEARCHES):
+            if low * high >= 0.0 or a.t == b.t:
+                break
+            share = low / (low - high)
+            t = a.t + share * (b.t - a.t)
+            old, histories = before.point.solution.x, before.histories
+            problem = self.system.problem(self.system.still(t, old, histories))
+            with np.errstate(all="ignore"):
+                solution = self.newton.solve(problem, a.x + share * (b.x - a.x))
+            if not solution.converged:
+                break
+            moved = abs(t - near.t)
+            near = self._place(problem, t, solution.x)
+            located = moved <= _LOCATED * max(abs(t), abs(after.t - before.t))
+            if located or near.value == 0.0:
+                located = True
+                break
+            if near.value * high < 0.0:
+                a, low = b, high
+            else:
+                low *= 0.5
+            b, high = near, near.value
+        return self._told(before, near, directions, located=located)
+
+    def _told(self, before: Result, near: _Place, directions: int, *, located: bool) -> Bifurcation:
+        old, histories = before.point.solution.x, before.histories
+        problem = self.system.problem(self.system.still(near.t, old, histories))
+        solution = replace(before.point.solution, x=near.x)
+        state = Result(self.system, problem, Point(near.t, solution), before.histories)
+        mode = near.mode / np.abs(displacements(self.system, near.mode)).max()
+        return Bifurcation(state, Shape.of(state, mode), directions, located)
+
+    def _place(self, problem: Problem, t: float, x: Array) -> _Place:
+        K = problem.assembler.linearise(x, problem.parameters)[1]
+        free = Reduction.of(problem, K)
+        value, mode = nearest_zero(symmetric(free.matrix(K)))
+        return _Place(t, x, value, free.map @ mode)
+
+
+def displacements(system: System, x: Array) -> Array:
+    """Of unknowns (n,) the displacements u_x, u_y, u_z at the nodes; all at nodes without them."""
+    nodal = system.numbering.nodal
+    names = [name for name in ("u_x", "u_y", "u_z") if name in nodal] or list(nodal)
+    return np.concatenate([x[nodal[name][nodal[name] >= 0]] for name in names])
+
+
+def require_detect(detect: object) -> None:
+    """Raise StudyError for what cannot be looked for."""
+    if detect not in (None, "bifurcation"):
+        raise StudyError(f'detect = {detect!r}: allowed are "bifurcation" and None')

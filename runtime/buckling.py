@@ -1,0 +1,47 @@
+"""Linear buckling of a study."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.begin import Beginning
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.held import require_held
+from softehl.runtime.modes import buckled
+from softehl.runtime.result import Result, Shape
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import NotConverged, Point
+from softehl.runtime.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class Buckling:
+    """Linear buckling.
+
+    factors: (k,) load factors, rising. shapes: a result for each, whose unknowns are the mode, 1 at
+    its largest.
+    """
+
+    factors: Array
+    shapes: tuple[Shape, ...]
+
+
+def linear_buckling(system: System, start: Beginning, count: int, newton: Newton) -> Buckling:
+    """Factors and modes of `Study.buckling`.  Raises StudyError, NotConverged."""
+    t, x0, histories = start
+
+    def problem_at(factor: float) -> Problem:
+        return system.problem(system.still(factor, x0, histories))
+
+    with np.errstate(all="ignore"):
+        problem = problem_at(t)
+        require_held(system, problem, x0)
+        solution = newton.solve(problem, x0)
+    if not solution.converged:
+        raise NotConverged(solution)
+    state = Result(system, problem, Point(t, solution), histories)
+    factors, modes = buckled(system, problem_at, t, solution.x, count)
+    return Buckling(factors, tuple(Shape.of(state, mode) for mode in modes))

@@ -1,0 +1,1 @@
+"""Second-order time: schemes of structural dynamics for a study, and their energies."""

@@ -1,0 +1,166 @@
+"""The equations of a body in motion: those of a study with its inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array, diags_array
+
+from softehl.runtime.arrays import Array, Flags
+from softehl.runtime.dynamics.motion import Forces
+from softehl.runtime.dynamics.schemes import Affine, Scheme
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.fem.averaged import Averaged, time_derivatives, with_old
+from softehl.runtime.fem.loads import Tie
+from softehl.runtime.fem.mass import Mass, lumped
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.reduction import Reduction
+from softehl.runtime.mass import Masses, mass_blocks, mass_matrix
+from softehl.runtime.solve.superlu import SuperLU
+from softehl.runtime.statement.records import Block, StudyError
+from softehl.runtime.system import Step, System
+
+_BEFORE = "forces of the step before"
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """Forces as a kernel, (n, 1): its data."""
+
+    name = _BEFORE
+    signature = "built in"
+    parameters: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        return np.asarray(given["data"])
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        return np.asarray(given["data"]), np.zeros((len(dofs), 1, 1))
+
+    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        return np.empty((len(dofs), 0, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A study with inertia.
+
+    plain: its equations without. moving: with elements of mass, and forces of the step before or
+    averaged. M: consistent masses (n, n) at the start. lumps: (n,), of the explicit
+    scheme. heavy: unknowns with mass.
+    """
+
+    plain: System
+    moving: System
+    M: csc_array
+    lumps: Array
+    heavy: Flags
+
+    @classmethod
+    def of(cls, system: System, mass: Masses | None, scheme: Scheme | None, at: Step) -> Body:
+        """Raises StudyError where there is no mass, or where a rate belongs to none."""
+        problem, blocks = system.problem(at), mass_blocks(system, mass)
+        M = mass_matrix(system, problem, at.old, mass)
+        heavy = M.diagonal() > 0.0
+        for block in system.blocks.values():
+            for slot in block.rates.values():
+                numbers = system.numbering.nodal[slot.name]
+                if not heavy[numbers[numbers >= 0]].all():
+                    raise StudyError(
+                        f"{block.name!r} has a rate of {slot.name}, which has no mass everywhere: "
+                        'give it one, or march by "euler" or "bdf2"'
+                    )
+        own = list(system.assembler.blocks)
+        if scheme is not None and scheme.averaged:
+            own = [_averaged(b, system.blocks.get(b.name)) for b in own]
+        rows = np.flatnonzero(heavy)[:, None]
+        before = ElementBlock(_BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False)
+        assembler = Assembler.build(system.size, [*own, *blocks, before])
+        lumps = _lumped(system, M, blocks) if scheme is None else M.diagonal()
+        return cls(system, replace(system, assembler=assembler), M, lumps, heavy)
+
+    def problem(self, step: Step, place: float, before: Array) -> Problem:
+        """Equations of a step that ends at step.t: loads of a place in it, supports of its end.
+
+        before: (n,) forces that are added where there is mass.
+        """
+        problem = self.moving.problem(replace(step, t=step.t - (1.0 - place) * step.dt))
+        end = problem if place == 1.0 else self.plain.problem(step)
+        remainder = np.zeros(len(before)) if step.remainder is None else step.remainder
+        blocks, parameters = [], dict(problem.parameters)
+        for block in problem.assembler.blocks:
+            known = block
+            if isinstance(block.kernel, Averaged):
+                known = with_old(block, step.old)
+            elif isinstance(block.kernel, Mass):
+                known = replace(block, data=np.ascontiguousarray(remainder[block.dofs]))
+            elif isinstance(block.kernel, _Known):
+                known = replace(block, data=before[block.dofs])
+            elif isinstance(block.kernel, Tie):
+                parameters[block.name] = end.parameters[block.name]
+            blocks.append(known)
+        assembler = replace(problem.assembler, blocks=tuple(blocks))
+        return replace(
+            problem,
+            assembler=assembler,
+            parameters=parameters,
+            fixed=end.fixed,
+            values=end.values,
+        )
+
+    def at_end(self, step: Step, v: Array) -> Problem:
+        """The plain equations at the end of a step, with velocities v, (n,)."""
+        return self.plain.problem(replace(step, rate=0.0, rest=v, acceleration=0.0, remainder=None))
+
+    def started(self, problem: Problem, x: Array) -> Array:
+        """Accelerations (n,) at the start x: M a = -f on what is free."""
+        free = Reduction.of(problem, problem.assembler.linearise(x, problem.parameters)[1])
+        M = free.matrix(self.M)
+        light = M.diagonal() <= 0.0
+        M = csc_array(M + diags_array(light.astype(np.float64)))
+        f = free.map.T @ Forces.of(problem, x).total
+        f[light] = 0.0
+        return np.asarray(free.map @ -SuperLU().factorise(M).solve(f))
+
+    def masked(self, values: Affine) -> Affine:
+        """Zero in unknowns without mass, for their velocities and accelerations."""
+        return Affine(values.c, np.where(self.heavy, values.rest, 0.0))
+
+
+def _averaged(block: ElementBlock, page: Block | None) -> ElementBlock:
+    """A block that is averaged along a step; ties are not, they hold at its end."""
+    if isinstance(block.kernel, Tie):
+        return block
+    timed: tuple[object, ...] = ()
+    if page is not None:
+        number = {slot: k for k, slot in enumerate(page.slots)}
+        tables = {"rate": page.rates, "acceleration": page.accelerations}
+        timed = time_derivatives(
+            block.kernel,
+            [(p, {d: number[s] for d, s in table.items()}) for p, table in tables.items()],
+        )
+    return replace(block, kernel=Averaged(block.kernel, timed), constant=False)  # type: ignore[arg-type]
+
+
+def _lumped(system: System, M: csc_array, blocks: list[ElementBlock]) -> Array:
+    """Masses (n,) at the nodes: of densities cell by cell, of pages unknown by unknown."""
+    found, consistent = np.zeros(system.size), np.zeros(system.size)
+    for block in blocks:
+        assert isinstance(block.kernel, Mass)
+        m, components = block.kernel.matrices, block.kernel.components
+        np.add.at(found, block.dofs, np.tile(lumped(m), (1, components)))
+        np.add.at(consistent, block.dofs, np.tile(np.einsum("naa->na", m), (1, components)))
+    rest = M.diagonal() - consistent
+    if np.abs(rest).max(initial=0.0) <= 1e-12 * np.abs(M.diagonal()).max():
+        return found
+    total = np.asarray(M.sum(axis=1)).ravel()
+    if blocks:
+        raise StudyError("explicit: give all masses as mass=..., or all in pages, not both")
+    for name in system.numbering.layout.names:
+        part = system.numbering.layout.part(name)
+        if rest[part].any():
+            found[part] = rest[part] * total[part].sum() / rest[part].sum()
+    return found

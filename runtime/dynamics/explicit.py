@@ -1,0 +1,148 @@
+"""Central differences with lumped masses: steps without equations to solve, short ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import eigsh
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.dynamics.body import Body
+from softehl.runtime.dynamics.implicit import Phase
+from softehl.runtime.dynamics.motion import Forces, Ledger, Motion, stored_energy
+from softehl.runtime.fem.loads import Tie
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.reduction import Reduction, symmetric
+from softehl.runtime.march import ROUNDING
+from softehl.runtime.solve.solution import Branch, NotConverged, Point, Solution, Status
+from softehl.runtime.statement.records import StudyError
+
+SAFE = 0.9
+"""Of the stable step, which is that of small motions about a state; strain stiffens."""
+_ACCURATE = 1e-3  # relative error of the highest frequency, far below what SAFE leaves
+_APART = 1e-9  # of the size of the mesh: a tie that opens by more does not hold
+
+
+@dataclass(eq=False)
+class Explicit:
+    """Steps of at most SAFE times the stable one, which is looked at in each result.
+
+    dt: from result to result.
+    """
+
+    dt: float
+    body: Body
+    here: Phase
+
+    def run(self, until: float) -> Iterator[Motion]:
+        """Results every dt until the end.  Raises StudyError, NotConverged."""
+        body, ledger = self.body, Ledger()
+        begin = body.at_end(self.here.step(self.here.t), self.here.v)
+        self._told(begin, ledger)
+        end, stable = begin, self._stable(begin)
+        count = max(int(np.ceil((until - self.here.t) / self.dt * (1.0 - ROUNDING))), 1)
+        first = self.here.t
+        for k in range(1, count + 1):
+            t = min(first + k * self.dt, until)
+            steps = int(np.ceil((t - self.here.t) / (SAFE * stable)))
+            for goal in np.linspace(self.here.t, t, steps + 1)[1:]:
+                end = self._step(end, float(goal), ledger)
+            stable = self._stable(end)
+            yield self._motion(end, ledger, steps, stable)
+
+    def started(self, problem: Problem, until: float) -> Iterator[Motion]:
+        """From rest or a state of which the accelerations are not known yet."""
+        self._require_masses()
+        here = self.here
+        a = self._free(problem, Forces.of(problem, here.x).total)
+        self.here = Phase(here.t, here.x, here.v, a, here.histories)
+        return self.run(until)
+
+    def _step(self, before: Problem, t: float, ledger: Ledger) -> Problem:
+        """Velocity Verlet: the equations at the end of a step."""
+        here, body = self.here, self.body
+        dt = t - here.t
+        half = here.v + 0.5 * dt * here.a
+        x = here.x + dt * half
+        end = body.at_end(here.step(t), half)
+        x[end.fixed] = end.values
+        half[end.fixed] = (x - here.x)[end.fixed] / dt
+        forces = Forces.of(end, x)
+        if not np.isfinite(forces.total).all():
+            words = f"t = {t:.6g}: the forces are not finite{end.where_not_finite(x)}"
+            state = Solution(here.x, Status.NOT_FINITE, words, (), 0, 0)
+            raise NotConverged(Branch((Point(here.t, state),), Status.NOT_FINITE, words))
+        a = self._free(end, forces.total)
+        moved = x - here.x
+        old = Forces.of(before, here.x)
+        parts = zip(vars(old).values(), vars(forces).values(), strict=True)
+        supports = np.zeros(len(x))
+        total = 0.5 * (old.total + forces.total)
+        inertia = self.body.lumps * (half - here.v) / dt
+        supports[end.fixed] = (total + inertia)[end.fixed]
+        ledger.add(Forces(*(0.5 * (one + other) for one, other in parts)), supports, moved)
+        v = half + 0.5 * dt * a
+        histories = body.plain.committed(end, x, here.histories)
+        self.here = Phase(t, x, v, a, histories)
+        return end
+
+    def _free(self, problem: Problem, forces: Array) -> Array:
+        """Accelerations (n,) of free unknowns; tied ones move as one."""
+        free = self._reduction(problem)
+        masses = free.map.T @ self.body.lumps
+        return np.asarray(free.map @ (-(free.map.T @ forces) / masses))
+
+    def _reduction(self, problem: Problem) -> Reduction:
+        return Reduction.of(problem, diags_array(np.ones(len(self.body.lumps))).tocsc())
+
+    def _stable(self, problem: Problem) -> float:
+        """2 over the highest frequency about the present state."""
+        K = problem.assembler.linearise(self.here.x, problem.parameters)[1]
+        free = self._reduction(problem)
+        root = diags_array(1.0 / np.sqrt(free.map.T @ self.body.lumps))
+        scaled = symmetric((root @ free.matrix(K) @ root).tocsc())
+        if scaled.shape[0] < 3:
+            highest = float(np.linalg.eigvalsh(scaled.toarray())[-1])
+        else:
+            begin = np.random.default_rng(0).uniform(-1.0, 1.0, scaled.shape[0])
+            found = eigsh(scaled, 1, which="LA", tol=_ACCURATE, v0=begin, return_eigenvectors=False)
+            highest = float(found[0])
+        return 2.0 / np.sqrt(highest) if highest > 0.0 else self.dt / SAFE
+
+    def _require_masses(self) -> None:
+        """Raise StudyError where an unknown has no mass that needs one."""
+        system, ties = self.body.plain, np.zeros(len(self.body.lumps), dtype=bool)
+        for block in system.assembler.blocks:
+            if isinstance(block.kernel, Tie):
+                ties[block.dofs[:, 2]] = True
+        layout = system.numbering.layout
+        for name in layout.names:
+            part = layout.part(name)
+            if not (ties[part] | (self.body.lumps[part] > 0.0)).all():
+                raise StudyError(
+                    f'method = "explicit": {name} has no mass everywhere, and explicit steps are '
+                    "force over mass; an implicit method can do without"
+                )
+
+    def _told(self, end: Problem, ledger: Ledger) -> dict[str, float]:
+        kinetic = 0.5 * float(self.body.lumps @ self.here.v**2)
+        return ledger.told(kinetic, stored_energy(end, self.here.x))
+
+    def _motion(self, end: Problem, ledger: Ledger, steps: int, stable: float) -> Motion:
+        here, size = self.here, float(np.ptp(self.body.plain.mesh.points, axis=0).max())
+        for block in end.assembler.blocks:
+            if isinstance(block.kernel, Tie):
+                r = block.residual(here.x, end.parameters[block.name])[:, 2]
+                if np.abs(r).max(initial=0.0) > _APART * size:
+                    raise StudyError(
+                        f'{block.name}: opens by {np.abs(r).max():.3g}; method = "explicit" holds '
+                        "ties of a constant offset, on no side of which a support moves"
+                    )
+        solution = Solution(here.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
+        return Motion(
+            *(self.body.plain, end, Point(here.t, solution), here.histories),
+            v=here.v, a=here.a, energy=self._told(end, ledger), stable_step=stable,
+        )  # fmt: skip

@@ -1,0 +1,87 @@
+"""Mass of cells by their shape functions: consistent, or lumped at the nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.mesh.cells import CELLS, Cell, measures
+
+PARAMETER = "acceleration"
+"""Coefficient c of an acceleration c u + rest, by which pages and masses are told of it."""
+
+
+def mass_matrices(cell: Cell, places: Array, density: Array, *, ring: bool) -> Array:
+    """Integrals (n, k, k) of density N_a N_b over cells with nodes at `places` (n, k, dim).
+
+    density: (n,) per reference measure of the cell. ring: over rings around the x axis.
+    """
+    points, weights = cell.rule(2 * max(map(max, cell.exponents), default=0) + 2)
+    shape = cell.shape(points)
+    volume = measures(cell, places, points) if cell.dimension else np.ones((len(places), 1))
+    if ring:
+        volume = volume * 2.0 * np.pi * (places[:, :, 1] @ shape.T)
+    pairs = np.einsum("q,qa,qb->qab", weights, shape, shape).reshape(len(weights), -1)
+    found = (density[:, None] * volume) @ pairs
+    return np.asarray(found.reshape(len(places), shape.shape[1], shape.shape[1]))
+
+
+def lumped(matrices: Array) -> Array:
+    """Positive masses (n, k) of the nodes with the mass of each element: the diagonal, scaled
+    (Hinton, Rock and Zienkiewicz); of simplices and bilinear cells alike it is the sum of rows.
+    """
+    diagonal = np.einsum("naa->na", matrices)
+    total = matrices.sum(axis=(1, 2)) / diagonal.sum(axis=1)
+    return np.asarray(diagonal * total[:, None])
+
+
+def interpolation(kind: str, nodes: int) -> Cell:
+    """The cell of a field on so many (first) nodes of a kind: all, or the corners."""
+    cell = CELLS[kind]
+    if nodes == len(cell.nodes):
+        return cell
+    return next(
+        c
+        for c in CELLS.values()
+        if len(c.nodes) == nodes == cell.corners == c.corners and c.dimension == cell.dimension
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """Inertia of elements as a kernel: m (c u + rest), c being its parameter.
+
+    Unknowns (n, components k), component by component. matrices: (n, k, k). Its data are rest, of
+    the shape of the unknowns; none means zeros.
+    """
+
+    matrices: Array
+    components: int
+    name = "mass"
+    signature = "built in"
+    parameters = (PARAMETER,)
+    fields: tuple[str, ...] = ()
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Virtual work of inertia, (n, components k)."""
+        a = float(given["parameters"][0]) * dofs
+        if given.get("data") is not None:
+            a = a + given["data"]
+        n, k = self.matrices.shape[:2]
+        rows = np.einsum("nab,ncb->nca", self.matrices, a.reshape(n, self.components, k))
+        return np.asarray(rows.reshape(dofs.shape))
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        """Residual, and c m."""
+        n, k = self.matrices.shape[:2]
+        K = np.zeros((n, self.components, k, self.components, k))
+        for c in range(self.components):
+            K[:, c, :, c, :] = float(given["parameters"][0]) * self.matrices
+        return self.residual(coordinates, dofs, **given), K.reshape(*dofs.shape, dofs.shape[1])
+
+    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """None, (n, 0, 0)."""
+        return np.empty((len(dofs), 0, 0))

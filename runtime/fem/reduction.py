@@ -1,0 +1,83 @@
+"""Free unknowns of a problem: without prescribed ones, tied ones as one, no multipliers of ties."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.csgraph import connected_components
+
+from softehl.runtime.arrays import Flags, Integers
+from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.fem.loads import Tie
+from softehl.runtime.fem.problem import Problem
+
+SYMMETRIC = 1e-8
+"""Of the largest entry: a tangent that differs by less from its transpose is symmetric."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """Changes of all unknowns (n,) that supports and ties admit, T z with z (m,).
+
+    map: T, (n, m), of zeros and ones. saddle: (m,) unknowns in which the energy is not convex but
+    concave, by nature: pressures and other multipliers.
+    """
+
+    map: csr_array
+    saddle: Flags
+
+    @classmethod
+    def of(cls, problem: Problem, K: csc_array) -> Reduction:
+        """Of a problem and its tangent (n, n) before supports are eliminated."""
+        n, ties = problem.assembler.size, [np.empty((0, 3), dtype=np.int64)]
+        ties += [b.dofs for b in problem.assembler.blocks if isinstance(b.kernel, Tie)]
+        a, b, multipliers = np.concatenate(ties).T
+        graph = csr_array((np.ones(len(a)), (a, b)), shape=(n, n))
+        count, group = connected_components(graph, directed=False)
+        held: Flags = np.zeros(count, dtype=bool)
+        held[group[problem.fixed]] = held[group[multipliers]] = True
+        number = np.cumsum(~held) - 1
+        rows = np.flatnonzero(~held[group])
+        columns = number[group[rows]]
+        found = csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, int((~held).sum())))
+        saddle = np.zeros(found.shape[1], dtype=bool)
+        saddle[columns] = concave(problem.layout, K, problem.fixed)[rows]
+        return cls(found, saddle)
+
+    def matrix(self, K: csc_array) -> csc_array:
+        """T' K T, (m, m)."""
+        return csc_array(self.map.T @ K @ self.map)
+
+
+def concave(layout: DofLayout, K: csc_array, fixed: Integers) -> Flags:
+    """Unknowns (n,) of the fields no diagonal entry of which is positive, without fixed ones.
+
+    Only of fields that are coupled to others: one by itself is no multiplier, it is unstable.
+    """
+    found: Flags = np.zeros(layout.total, dtype=bool)
+    diagonal = K.diagonal()
+    diagonal[fixed] = 0.0
+    for part in layout.fields:
+        found[part] = bool((diagonal[part] <= 0.0).all())
+    found[fixed] = False
+    others = abs(K) @ (~found).astype(np.float64)
+    for part in layout.fields:
+        if not others[part].any():
+            found[part] = False
+    return found
+
+
+def is_symmetric(K: csc_array) -> bool:
+    """True if K is its transpose but for rounding."""
+    return _largest(K - K.T) <= SYMMETRIC * _largest(K)
+
+
+def symmetric(K: csc_array) -> csc_array:
+    """Its symmetric part."""
+    return csc_array(0.5 * (K + K.T))
+
+
+def _largest(K: csc_array) -> float:
+    return float(np.abs(K.data).max(initial=0.0))

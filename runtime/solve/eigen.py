@@ -1,0 +1,178 @@
+"""Eigenvalues of large sparse matrices about a state: vibration, buckling, signs of pivots.
+
+ARPACK (through SciPy) finds them by shift and inverse; SuperLU has the factors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array, eye_array
+from scipy.sparse import linalg as sparse_linalg
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.linear import SingularMatrix
+from softehl.runtime.solve.ordering import without_zeros
+
+_SMALL_SHIFT = 1e-7
+"""Of the largest ratio of the diagonals: the first shift below zero, above rounding."""
+_SHIFTS = 6
+_BESIDE = 1e-12  # of the largest entry: a shift that rounding may have made
+_DENSE = 20  # unknowns: fewer need no sparse eigenvalues, or cannot have them
+_RESIDUAL = 1e-6
+"""Of a solution by pivots on the diagonal: beyond, their signs are not those of the matrix."""
+
+
+class NoModes(ArithmeticError):  # noqa: N818 (named after what it is)
+    """There are no such eigenvalues; the message says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pivots:
+    """Factors of a symmetric matrix with pivots on the diagonal only, as in L D L'.
+
+    negative: number of negative pivots, which is that of negative eigenvalues (Sylvester).
+    """
+
+    factors: Any
+    negative: int
+
+    @classmethod
+    def of(cls, K: csc_array) -> Pivots:
+        """Of K, symmetric, (n, n); raises SingularMatrix where pivots on the diagonal fail."""
+        try:
+            factors = sparse_linalg.splu(
+                without_zeros(K),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise SingularMatrix(f"no LU factors: {error}") from error
+        if not np.array_equal(factors.perm_r, factors.perm_c):
+            raise SingularMatrix("a pivot on the diagonal is zero")
+        b = np.random.default_rng(0).uniform(-1.0, 1.0, K.shape[0])
+        x = factors.solve(b)
+        scale = np.asarray(abs(K).sum(axis=1)) * np.abs(x).max(initial=0.0) + np.abs(b)
+        if not np.abs(K @ x - b).max(initial=0.0) <= _RESIDUAL * scale.max(initial=0.0):
+            raise SingularMatrix("the pivots on the diagonal are too weak")
+        return cls(factors, int((factors.U.diagonal() < 0.0).sum()))
+
+    def solve(self, b: Array) -> Array:
+        """x of K x = b, shapes (n,)."""
+        return np.asarray(self.factors.solve(b))
+
+
+def lowest(K: csc_array, M: csc_array, count: int, saddle: int = 0) -> tuple[Array, Array]:
+    """The algebraically smallest eigenvalues (count,) of K x = w M x, and vectors (count, n).
+
+    K, M: symmetric, (n, n); M positive but for unknowns without mass. saddle: number of negative
+    eigenvalues that K has by nature, in multipliers without mass. Vectors have x' M x = 1. Raises
+    NoModes, SingularMatrix.
+    """
+    heavy = int((M.diagonal() > 0.0).sum())
+    if not 0 < count < heavy:
+        raise NoModes(f"{count} modes: from 1 to {heavy - 1} are possible here")
+    shift, pivots = _below(K, M, saddle)
+    n = K.shape[0]
+    inverse = sparse_linalg.LinearOperator((n, n), matvec=pivots.solve, dtype=np.float64)
+    begin = pivots.solve(M @ np.random.default_rng(0).uniform(-1.0, 1.0, n))
+    try:
+        values, vectors = sparse_linalg.eigsh(
+            K, count, M, sigma=shift, OPinv=inverse, v0=begin, ncv=min(n, heavy, 2 * count + 20)
+        )
+    except sparse_linalg.ArpackError as error:
+        raise NoModes(f"{count} modes: {error}") from error
+    order = np.argsort(values)
+    # once more by the inverse: unknowns without mass follow from the others
+    shapes = np.stack([pivots.solve(M @ vectors[:, k]) for k in order])
+    sizes = np.sqrt(np.einsum("kn,kn->k", shapes, (M @ shapes.T).T))
+    return values[order], signed(shapes / sizes[:, None])
+
+
+def _below(K: csc_array, M: csc_array, saddle: int) -> tuple[float, Pivots]:
+    """A shift w below all eigenvalues, zero if it can be, and factors of K - w M."""
+    ratio = K.diagonal()[M.diagonal() > 0.0] / M.diagonal()[M.diagonal() > 0.0]
+    shift, reason = 0.0, ""
+    for k in range(_SHIFTS + 1):
+        try:
+            pivots = Pivots.of(csc_array(K - shift * M))
+            singular = k == 0 and _nearly_singular(pivots, K)
+            if pivots.negative == saddle and not singular:
+                return shift, pivots
+            reason = f"{pivots.negative - saddle} eigenvalues below {shift:.3g}"
+        except SingularMatrix as error:
+            reason = str(error)
+        shift = -_SMALL_SHIFT * 100.0**k * float(np.abs(ratio).max())
+    raise NoModes(f"no shift below all eigenvalues was found: {reason}")
+
+
+def _nearly_singular(pivots: Pivots, K: csc_array) -> bool:
+    """True if a motion costs no more than rounding: a body that is free."""
+    b = np.random.default_rng(1).uniform(-1.0, 1.0, K.shape[0])
+    x = pivots.solve(b)
+    size = np.asarray(abs(K) @ np.abs(x))
+    return bool(np.abs(b).max() <= 1e-11 * size.max())
+
+
+def smallest_factors(K: csc_array, G: csc_array, count: int) -> tuple[Array, Array]:
+    """The smallest positive f of (K + f G) x = 0, rising, at most `count`, and vectors (., n).
+
+    K, G: symmetric, (n, n), K regular; it may have multipliers. Vectors have 1 as their largest
+    entry. Raises NoModes where there are none, SingularMatrix.
+    """
+    n = K.shape[0]
+    if not 0 < count < n - 1:
+        raise NoModes(f"{count} buckling factors: from 1 to {n - 2} are possible here")
+    try:
+        factors = sparse_linalg.splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01)
+    except RuntimeError as error:
+        raise SingularMatrix(f"no LU factors: {error}") from error
+    action = sparse_linalg.LinearOperator(
+        (n, n), matvec=lambda x: -factors.solve(G @ x), dtype=np.float64
+    )
+    begin = np.random.default_rng(0).uniform(-1.0, 1.0, n)
+    wanted = min(n - 2, count)
+    try:
+        inverse, vectors = sparse_linalg.eigs(
+            action, wanted, which="LR", v0=begin, ncv=min(n, 3 * wanted + 20)
+        )
+    except sparse_linalg.ArpackError as error:
+        raise NoModes(f"{count} buckling factors: {error}") from error
+    real = np.flatnonzero((inverse.real > 0.0) & (np.abs(inverse.imag) <= 1e-6 * inverse.real))
+    if not len(real):
+        raise NoModes("no factor of these loads buckles it: they pull, or nothing is slender")
+    order = real[np.argsort(-inverse.real[real])]
+    shapes = signed(vectors[:, order].real.T)
+    return 1.0 / inverse.real[order], shapes / np.abs(shapes).max(axis=1, keepdims=True)
+
+
+def nearest_zero(K: csc_array) -> tuple[float, Array]:
+    """The eigenvalue of K, symmetric (n, n), nearest to zero, and its vector of length 1.
+
+    Raises SingularMatrix.
+    """
+    n = K.shape[0]
+    if n < _DENSE:
+        every, columns = np.linalg.eigh(K.toarray())
+        chosen = int(np.abs(every).argmin())
+        return float(every[chosen]), signed(columns[:, [chosen]].T)[0]
+    shift = 0.0
+    try:
+        pivots = Pivots.of(K)
+    except SingularMatrix:  # a little beside it is not
+        shift = _BESIDE * float(np.abs(K.data).max())
+        pivots = Pivots.of(csc_array(K - shift * eye_array(n, format="csc")))
+    inverse = sparse_linalg.LinearOperator((n, n), matvec=pivots.solve, dtype=np.float64)
+    begin = np.random.default_rng(0).uniform(-1.0, 1.0, n)
+    values, vectors = sparse_linalg.eigsh(K, 1, sigma=shift, OPinv=inverse, v0=begin)
+    return float(values[0]), signed(vectors.T)[0]
+
+
+def signed(vectors: Array) -> Array:
+    """Vectors (k, n) with their largest entry positive."""
+    rows = np.arange(len(vectors))
+    largest = vectors[rows, np.abs(vectors).argmax(axis=1)]
+    return vectors * np.where(largest < 0.0, -1.0, 1.0)[:, None]

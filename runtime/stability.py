@@ -1,0 +1,77 @@
+"""Stability of a solved state: negative directions of its tangent, supports and ties respected."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.loads import Tie
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.reduction import Reduction, concave, is_symmetric, symmetric
+from softehl.runtime.solve.eigen import Pivots
+from softehl.runtime.solve.linear import SingularMatrix
+
+
+class Unstable(RuntimeWarning):
+    """A state was found that solves the equations and is not stable."""
+
+
+def negative_directions(problem: Any, x: Array) -> int | None:
+    """Number of independent motions along which the energy about a state x, (n,), falls.
+
+    By the signs of the pivots of the tangent, less those of multipliers, which are negative by
+    nature. None where there is no such number: no symmetric tangent, one that is singular, or a
+    problem that is spread over processes.
+    """
+    if not isinstance(problem, Problem):
+        return None
+    with np.errstate(all="ignore"):
+        K = problem.assembler.linearise(x, problem.parameters)[1]
+    if not np.isfinite(K.data).all() or not is_symmetric(K):
+        return None
+    free = Reduction.of(problem, K)
+    try:
+        pivots = Pivots.of(symmetric(free.matrix(K)))
+    except SingularMatrix:
+        return None
+    return max(pivots.negative - int(free.saddle.sum()), 0)
+
+
+def negative_by_factors(problem: Any, K: Any, factors: Any) -> int | None:
+    """As `negative_directions`, by the factors of a tangent K near by, supports eliminated.
+
+    None where they do not tell: pivots beside the diagonal, ties, an unsymmetric tangent.
+    """
+    pivots = getattr(factors, "pivots", None)
+    ties = isinstance(problem, Problem) and any(
+        isinstance(b.kernel, Tie) and len(b.dofs) for b in problem.assembler.blocks
+    )
+    if pivots is None or ties or not isinstance(K, csc_array) or not is_symmetric(K):
+        return None
+    found = pivots()
+    if found is None:
+        return None
+    natural = concave(problem.layout, K, problem.fixed)
+    return max(int((found < 0.0).sum()) - int(natural.sum()), 0)
+
+
+def warn_unstable(problem: Any, x: Array, factors: tuple[Any, Any] | None, words: str) -> None:
+    """Warn where a state x, (n,), is unstable.
+
+    factors: a tangent near by and its factors, if they are at hand. words: of the state.
+    """
+    found = None if factors is None else negative_by_factors(problem, *factors)
+    if found is None and isinstance(problem, Problem):
+        found = negative_directions(problem, x)
+    if found:
+        many = f"{found} independent directions" if found > 1 else "one direction"
+        warnings.warn(
+            f"the state at {words} is unstable: its energy falls along {many} "
+            '(result.modes shows them); study.follow(detect="bifurcation") finds other branches',
+            Unstable,
+            stacklevel=4,
+        )

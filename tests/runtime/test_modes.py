@@ -1,0 +1,282 @@
+"""Natural modes about loaded states, linear buckling, and whether a state is stable."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.linalg import eigh
+
+import softehl
+from softehl.runtime.fem.mass import lumped, mass_matrices
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.result import Result
+from softehl.runtime.stability import Unstable
+from softehl.runtime.study import Study, StudyError
+
+LENGTH, HEIGHT, YOUNG, RHO = 100.0, 1.0, 2000.0, 1e-9
+EULER = np.pi**2 * YOUNG * HEIGHT**3 / 12 / (4 * LENGTH**2)
+
+
+@softehl.page
+def rubber(m: Any) -> None:
+    """Compressible neo-Hooke."""
+    u = m.vector("u")
+    mu, lame = m.parameters(mu="shear modulus", lame="Lame's first")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + lame / 2 * sp.log(J) ** 2)
+
+
+@softehl.page
+def mixed(m: Any) -> None:
+    """The same with a pressure of its own, of lower order."""
+    u, p = m.vector("u"), m.scalar("p", order=1)
+    mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J))
+    m.minimise(W + p * (J - 1) - p**2 / (2 * K))
+
+
+@softehl.page
+def string(m: Any) -> None:
+    """A string along x that moves by w across."""
+    u, w = m.scalar("u"), m.scalar("w")
+    (EA,) = m.parameters(EA="stiffness")
+    m.minimise(EA / 2 * (m.grad(u)[0] + m.grad(w)[0] ** 2 / 2) ** 2)
+
+
+def column(page: Any = rubber, **given: Any) -> Study:
+    """A cantilever, pressed at its end by one unit of force per load factor."""
+    study = Study(Mesh.rectangle(LENGTH, HEIGHT, cells=(30, 1), order=2))
+    study.add("body", page, **(given or {"mu": YOUNG / 2, "lame": 0.0}))
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_x=-1.0 / HEIGHT)
+    return study
+
+
+def at_rest(study: Study) -> Result:
+    return study.solve(until=1e-9)
+
+
+MASS = {"body": {"rho": RHO}}
+
+
+def test_modes_of_a_beam() -> None:
+    """Bernoulli's cantilever: roots of 1 + cos k cosh k."""
+    modes = at_rest(column()).modes(3, mass=MASS)
+    k = np.array([1.875104068711961, 4.694091132974174, 7.854757438237613])
+    theory = k**2 / (2 * np.pi * LENGTH**2) * np.sqrt(YOUNG * HEIGHT**2 / 12 / RHO)
+    np.testing.assert_allclose(modes.frequencies, theory, rtol=1e-3)
+    assert np.abs(modes.frequencies / theory - 1).max() > 1e-6, "it is no beam but a body"
+    end = np.array([mode.at((LENGTH, HEIGHT / 2))["u_y"] for mode in modes])
+    np.testing.assert_allclose(np.abs(end), 2 / np.sqrt(RHO * LENGTH * HEIGHT), rtol=2e-3)
+
+
+def test_modes_of_a_string_are_those_of_its_prestress() -> None:
+    n = np.arange(1, 5)
+    for strain in (0.01, 0.04):
+        study = stretched(strain)
+        study.fix("left", w=0)
+        study.fix("right", w=0)
+        modes = study.solve().modes(4, mass=STRING)
+        np.testing.assert_allclose(
+            modes.frequencies, n / 4 * np.sqrt(1e3 * strain / 0.5), rtol=2e-4
+        )
+
+
+def test_a_load_lowers_the_frequency_until_it_buckles() -> None:
+    """f^2 falls almost linearly with the load, to zero at Euler's."""
+    study = column()
+    free = at_rest(study).modes(1, mass=MASS).squares[0]
+    half = study.solve(until=0.5 * EULER).modes(1, mass=MASS).squares[0]
+    assert half / free == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_free_body_has_modes_of_no_frequency() -> None:
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(4, 2)))
+    study.add("body", rubber, mu=1.0, lame=1.0)
+    study.tie("left", "right", "u_x", "u_y")
+    study.fix((0.0, 0.0), u_x=0, u_y=0)
+    held = study.solve()
+    free = Study(study.mesh)
+    free.add("body", rubber, mu=1.0, lame=1.0)
+    free.tie("left", "right", "u_x", "u_y")
+    # a state is needed about which it is free: that of the held one
+    loose = Result(free.system(), free.system().problem(still(free)), held.point)
+    squares = loose.modes(4, mass={"body": {"rho": 1.0}}).squares
+    np.testing.assert_allclose(squares[:2], 0.0, atol=1e-9)
+    assert squares[2] > 0.1
+    assert held.unstable == 0
+
+
+def still(study: Study) -> Any:
+    system = study.system()
+    return system.still(1.0, system.at_rest(), system.histories())
+
+
+def test_tied_sides_move_as_one() -> None:
+    """A periodic string has waves of the whole length, in pairs."""
+    study = stretched(0.01)
+    study.tie("left", "right", "w")
+    study.spring("left", w=1e-6)
+    modes = study.solve().modes(5, mass=STRING)
+    wave = np.sqrt(1e3 * 0.01 / 0.5)
+    np.testing.assert_allclose(modes.frequencies[1:], np.array([1, 1, 2, 2]) / 2 * wave, rtol=1e-3)
+    for mode in modes:
+        assert mode.at((0.0,))["w"] == pytest.approx(mode.at((2.0,))["w"], abs=1e-12)
+
+
+def stretched(strain: float) -> Study:
+    study = Study(Mesh.line(2.0, cells=20, order=2))
+    study.add("string", string, EA=1e3)
+    study.fix("left", u=0)
+    study.fix("right", u=lambda x, t: 2.0 * strain)
+    study.start(u=lambda x: strain * x[:, 0])
+    return study
+
+
+STRING = {"string": {"rho": 0.5, "of": ["u", "w"]}}
+
+
+def test_unknowns_without_mass_follow() -> None:
+    modes = at_rest(column(mixed, mu=YOUNG / 2, K=2 * YOUNG)).modes(2, mass=MASS)
+    plain = at_rest(column(rubber, mu=YOUNG / 2, lame=2 * YOUNG)).modes(2, mass=MASS)
+    np.testing.assert_allclose(modes.frequencies, plain.frequencies, rtol=5e-3)
+    assert np.abs(modes[0].values("p")[~np.isnan(modes[0].values("p"))]).max() > 0.0
+
+
+def test_modes_against_dense_matrices() -> None:
+    study = Study(Mesh.rectangle(2.0, 1.0, cells=(3, 2)))
+    study.add("body", rubber, mu=1.0, lame=1.0)
+    study.fix("left", u_x=0, u_y=0)
+    result = study.solve(until=0.0)
+    modes = result.modes(5, mass={"body": {"rho": lambda x: 1 + x[:, 0]}})
+    K = result.problem.linearise(result.x)[1].toarray()
+    M = dense_mass(result, lambda x: 1 + x[:, 0])
+    held = result.problem.fixed
+    free = np.setdiff1d(np.arange(len(K)), held)
+    exact = eigh(K[np.ix_(free, free)], M[np.ix_(free, free)], eigvals_only=True)[:5]
+    np.testing.assert_allclose(modes.squares, exact, rtol=1e-9)
+
+
+def dense_mass(result: Result, rho: Any) -> np.ndarray:
+    """Of rectangles of four nodes: the area / 36 [4 2 1 2, ...]."""
+    mesh, nodal = result.system.mesh, result.system.numbering.nodal
+    ring = np.array([[4, 2, 1, 2], [2, 4, 2, 1], [1, 2, 4, 2], [2, 1, 2, 4]]) / 36
+    M = np.zeros((len(result.x), len(result.x)))
+    for cell in mesh.cells["quad4"]:
+        x = mesh.points[cell]
+        part = rho(x.mean(axis=0)[None])[0] * np.prod(np.ptp(x, axis=0)) * ring
+        for name in ("u_x", "u_y"):
+            M[np.ix_(nodal[name][cell], nodal[name][cell])] += part
+    return M
+
+
+def test_masses_of_cells_add_up() -> None:
+    for kind in ("line3", "tri3", "tri6", "quad4", "quad8", "quad9", "tet10", "hex8", "hex20"):
+        cell = CELLS[kind]
+        places = cell.nodes[None] @ np.diag(np.arange(1.0, cell.dimension + 1))
+        found = mass_matrices(cell, places, np.array([3.0]), ring=False)
+        volume = cell.rule(1)[1].sum() * np.prod(np.arange(1.0, cell.dimension + 1))
+        assert found.sum() == pytest.approx(3.0 * volume, rel=1e-12)
+        assert (lumped(found) > 0.0).all()
+        assert lumped(found).sum() == pytest.approx(3.0 * volume, rel=1e-12)
+
+
+def test_mass_of_rings() -> None:
+    cell, places = CELLS["quad4"], np.array([[[0.0, 1.0], [2.0, 1.0], [2.0, 3.0], [0.0, 3.0]]])
+    found = mass_matrices(cell, places, np.ones(1), ring=True)
+    assert found.sum() == pytest.approx(np.pi * (9 - 1) * 2)
+
+
+def test_euler_loads() -> None:
+    buckling = column().buckling(2)
+    np.testing.assert_allclose(buckling.factors, EULER * np.array([1, 9]), rtol=2e-3)
+    assert buckling.factors[0] == pytest.approx(EULER, rel=1e-3)
+    assert abs(buckling.shapes[0].at((LENGTH, HEIGHT / 2))["u_y"]) == pytest.approx(1, abs=1e-3)
+    near = column().solve(until=0.9 * EULER)
+    exact = column().buckling(1, start=near).factors
+    np.testing.assert_allclose(exact, EULER, rtol=2e-4)
+
+
+def test_a_support_that_moves_buckles_too() -> None:
+    """At the strain of Euler's load, but for its second order."""
+    study = Study(Mesh.rectangle(LENGTH, HEIGHT, cells=(30, 1), order=2))
+    study.add("body", rubber, mu=YOUNG / 2, lame=0.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.fix("right", u_x=-1, u_y=0)
+    strain = 4 * np.pi**2 * HEIGHT**2 / 12 / LENGTH**2  # both ends are clamped
+    assert study.buckling(1).factors[0] == pytest.approx(strain * LENGTH, rel=4e-3)
+
+
+def test_buckling_with_a_pressure_of_its_own() -> None:
+    given = {"mu": YOUNG / 2, "K": 2 * YOUNG}
+    found = column(mixed, **given).buckling(1).factors[0]
+    nu = 2 * YOUNG / (2 * (2 * YOUNG + YOUNG / 2))  # lame = 2 YOUNG, mu = YOUNG / 2
+    plane = 2 * (YOUNG / 2) * (1 + nu) / (1 - nu**2) / YOUNG
+    assert found == pytest.approx(plane * EULER, rel=5e-3)
+
+
+def test_a_column_beyond_its_load_is_not_silent() -> None:
+    study = column()
+    below = study.solve(until=0.98 * EULER)
+    assert below.unstable == 0
+    with pytest.warns(Unstable, match="load factor .* is unstable: .* one direction"):
+        beyond = study.solve(until=1.02 * EULER)
+    assert beyond.unstable == 1
+    with pytest.warns(Unstable, match="2 independent directions"):
+        assert study.solve(until=9.1 * EULER).unstable == 2
+    modes = beyond.modes(2, mass=MASS)
+    assert modes.squares[0] < 0.0 < modes.squares[1]
+    assert np.isnan(modes.frequencies[0])
+
+
+def test_ties_and_pressures_are_not_taken_for_instabilities() -> None:
+    study = column(mixed, mu=YOUNG / 2, K=2 * YOUNG)
+    assert at_rest(study).unstable == 0
+    study.tie("top", "bottom", "u_x")
+    assert at_rest(study).unstable == 0
+
+
+@pytest.mark.parametrize(
+    ("mass", "words"),
+    [
+        ({"bod": {"rho": 1.0}}, r"no block 'bod' \(did you mean 'body'\?\); there are body$"),
+        ({"body": {"rh": 1.0}}, r"no key 'rh' \(did you mean 'rho'\?\); it has rho, of$"),
+        ({"body": {"rho": 1.0, "of": ["w"]}}, "no unknown 'w'; it has u_x, u_y$"),
+        ({"body": {"rho": -1.0}}, "rho = -1, it cannot be negative$"),
+        ({"body": 1.0}, "give its density, as in"),
+        (None, "there is no mass: give densities"),
+    ],
+)
+def test_what_is_refused(mass: Any, words: str) -> None:
+    with pytest.raises(StudyError, match=words) as error:
+        at_rest(column()).modes(2, mass=mass)
+    assert "\n" not in str(error.value)
+
+
+def test_numbers_that_are_refused() -> None:
+    result = at_rest(column())
+    with pytest.raises(StudyError, match="at least 1"):
+        result.modes(0, mass=MASS)
+    with pytest.raises(StudyError, match="from 1 to"):
+        result.modes(10_000, mass=MASS)
+    study = Study(Mesh.rectangle(1.0, 1.0, cells=(1, 1)))
+    study.add("body", rubber, mu=1.0, lame=1.0)
+    study.fix("left", u_x=0, u_y=0)
+    with pytest.raises(StudyError, match="nothing changes with the load factor"):
+        study.buckling()
+
+
+def test_an_unsymmetric_tangent_has_no_modes() -> None:
+    study = column()
+    study.pressure("top", lambda x, t: np.where(x[:, 0] > 50, t, 0.0))
+    result = study.solve(until=1e-3)
+    assert result.unstable is None
+    with pytest.raises(StudyError, match="not symmetric"):
+        result.modes(1, mass=MASS)
