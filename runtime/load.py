@@ -9,6 +9,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, Beginning
+from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
@@ -18,7 +19,7 @@ from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
-from softehl.runtime.system import System
+from softehl.runtime.system import Step, System
 
 _NAME = "load factor"
 
@@ -38,7 +39,8 @@ class LoadPath:
 class _Reached:
     """A study on its path: after each point history is committed, and `on_step` is told.
 
-    x, histories: after the last point. results: all of them, or the last one.
+    x, histories: after the last point. results: all of them, or the last one. record: whether
+    results keep the steps before them.
     """
 
     system: System
@@ -46,22 +48,29 @@ class _Reached:
     histories: dict[str, Array]
     on_step: Callable[[Result], object]
     keep_all: bool = False
+    record: bool = False
     results: list[Result] = field(default_factory=list)
 
     def problem_at(self, t: float) -> Problem:
         """The problem at a load factor."""
-        return self.system.problem(self.system.still(t, self.x, self.histories))
+        return self.system.problem(self._step(t))
 
     def keep(self, point: Point) -> None:
         """Go on from a converged point."""
-        problem = self.problem_at(point.parameter)
+        step = self._step(point.parameter)
+        problem = self.system.problem(step)
+        before = self.results[-1].trail if self.record and self.results else None
         self.x = point.solution.x
         self.histories = self.system.committed(problem, self.x, self.histories)
-        result = Result(self.system, problem, point, self.histories)
+        trail = Trail(self.system, step, problem, self.x, before)
+        result = Result(self.system, problem, point, self.histories, trail)
         if not self.keep_all:
             self.results.clear()
         self.results.append(result)
         self.on_step(result)
+
+    def _step(self, t: float) -> Step:
+        return self.system.still(t, self.x, self.histories)
 
     def require_end(self, branch: Branch) -> None:
         """Raise NotConverged where the path did not reach its end."""
@@ -71,16 +80,21 @@ class _Reached:
 
 @dataclass(frozen=True, eq=False)
 class LoadSteps:
-    """Settings of load steps: their number; each result is handed to `on_step`."""
+    """Settings of load steps: their number; each result is handed to `on_step`.
+
+    record: whether results keep the steps before them.
+    """
 
     steps: int
     newton: Newton
     on_step: Callable[[Result], object]
+    record: bool = False
 
     def run(self, system: System, start: Beginning, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
         begin, x0, histories = start
-        at, first_step = _Reached(system, x0, histories, self.on_step), FirstStep(self.newton)
+        at = _Reached(system, x0, histories, self.on_step, record=self.record)
+        first_step = FirstStep(self.newton)
 
         def keep(point: Point) -> None:
             first_step.check(at.problem_at(point.parameter), point.solution)

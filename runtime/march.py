@@ -14,6 +14,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, beginning
+from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.held import require_held
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
@@ -123,13 +124,14 @@ class March:
 
     method: "euler" (backward, order 1) or "bdf2" (order 2, of variable steps). tolerance: largest
     local error of a step relative to the largest value of each unknown; None for equal steps.
-    dt: length of step that is asked for.
+    dt: length of step that is asked for. record: whether results keep the steps before them.
     """
 
     method: Method
     tolerance: float | None
     dt: float
     newton: Newton
+    record: bool = False
 
     def run(
         self, system: System, clock: Clock, until: float, checkpoint: Path | None
@@ -161,10 +163,11 @@ class March:
         if self.method == "bdf2" and len(clock.times) > 1:
             r = dt / (clock.times[0] - clock.times[1])
             rate = (1.0 + 2.0 * r) / (1.0 + r) / dt
+            weights: tuple[float, ...] = -(1.0 + r) / dt, r * r / (1.0 + r) / dt
             rest = (r * r / (1.0 + r) * clock.states[1] - (1.0 + r) * old) / dt
         else:
-            rate, rest = 1.0 / dt, -old / dt
-        return Step(clock.t + dt, 1.0, old, rate, rest, dt, clock.histories)
+            rate, weights, rest = 1.0 / dt, (-1.0 / dt,), -old / dt
+        return Step(clock.t + dt, 1.0, old, rate, rest, dt, clock.histories, weights)
 
     def factor(self, system: System, clock: Clock, step: Step, x: Array) -> float:
         """By how much the next step may be longer; below 1 where the error is too large."""
@@ -241,7 +244,9 @@ class _ByTime(Way):
         times = (posed.t, *self.clock.times)[:3]
         assert trial.following is not None
         self.clock = Clock(times, states, after, trial.following)
-        self.result = Result(system, problem, Point(posed.t, solution), after)
+        before = self.result.trail if self.result and self.march.record else None
+        trail = Trail(system, posed, problem, solution.x, before)
+        self.result = Result(system, problem, Point(posed.t, solution), after, trail)
 
     def end(self) -> End | None:
         """See `Way`."""

@@ -13,7 +13,8 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -36,6 +37,7 @@ from softehl.runtime.statement import given as read
 from softehl.runtime.statement.pages import (
     elements_of,
     geometry_of,
+    is_page,
     kinds_of,
     page_on,
     require_page,
@@ -118,7 +120,8 @@ class Study:
         for kernel in kernels:
             label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
             elements = elements_of(self.mesh, label, kernel, on, cells)
-            blocks[label] = page_on(self.mesh, label, kernel, elements, shared, given)
+            block = page_on(self.mesh, label, kernel, elements, shared, given)
+            blocks[label] = replace(block, differentiated=self._later(page, model, kernel, law))
 
     def load(self, where: Where, **components: Amount) -> None:
         """Dead loads per reference length or area of a side, or forces at a place or nodes.
@@ -228,6 +231,7 @@ class Study:
         engine: AnyEngine = None,
         write: str | Path | Series | None = None,
         progress: bool | None = None,
+        record: bool = False,
     ) -> Result:
         """The solution at load factor `until`, from 0 (or from `start`) in `steps` steps.
 
@@ -237,7 +241,8 @@ class Study:
         fails and grow again; history is committed after each. on_step is given the result of every
         converged step, write: a .pvd file that names them all. progress: tell of each step on
         stderr; None: in one line, on a terminal only. engine: "serial", "petsc" (on all processes
-        that mpirun started) or an engine with settings. Raises StudyError; NotConverged if the end
+        that mpirun started) or an engine with settings. record: results keep the steps before them,
+        which derivatives need where pages have history. Raises StudyError; NotConverged if the end
         is not reached: its `reached` is the last Result, or None.
         """
         if not (isinstance(steps, int) and steps > 0):
@@ -250,7 +255,7 @@ class Study:
         begin = beginning(system, start)
         told = Telling(progress, system.share.first, "load factor", begin[0])
         with Watch(told.until(until), write, on_step) as watch:
-            return LoadSteps(steps, where.newton(newton), watch).run(system, begin, until)
+            return LoadSteps(steps, where.newton(newton), watch, record).run(system, begin, until)
 
     def march(
         self,
@@ -266,6 +271,7 @@ class Study:
         engine: AnyEngine = None,
         write: str | Path | None = None,
         progress: bool | None = None,
+        record: bool = False,
     ) -> Iterator[Result]:
         """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
 
@@ -278,7 +284,7 @@ class Study:
         pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
         `engine` "petsc" on any number of processes; another `dt` than then is the next step.
         write: a .pvd file that names the results of all steps (with start or restart, it
-        goes on). progress: as in `solve`. Raises StudyError, and NotConverged as `solve` does.
+        goes on). progress, record: as in `solve`. Raises StudyError, and NotConverged as `solve` does.
         """
         if method not in ("euler", "bdf2"):
             raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
@@ -294,7 +300,7 @@ class Study:
         else:
             clock = Clock.load(Path(restart), system, dt)
         clock.require_before(until)
-        settings = March(method, tolerance, dt, where.newton(newton))
+        settings = March(method, tolerance, dt, where.newton(newton), record)
         file = None if checkpoint is None else Path(checkpoint)
         series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
         told = Telling(progress, system.share.first, "t", clock.t)
@@ -353,6 +359,25 @@ class Study:
             materials=law,
         )
 
+    def _later(
+        self, source: Source, model: str | None, kernel: Kernel, law: bool
+    ) -> Callable[[], Kernel] | None:
+        """Maker of the kernel of derivatives of a page, which is derived when it is asked for."""
+        if isinstance(source, Kernel) or not is_page(source):
+            return None
+        import softehl
+
+        return cache(
+            lambda: softehl.load_kernel(
+                source,  # type: ignore[arg-type]
+                model or (None if kernel.cell else kernel.name),
+                cell=kernel.cell or None,
+                geometry=geometry_of(self.mesh, self.geometry),
+                materials=law,
+                derivatives=True,
+            )
+        )
+
     def _add_force(
         self,
         what: str,
@@ -363,7 +388,8 @@ class Study:
     ) -> None:
         forces = self._statement.forces
         label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {', '.join(names)})"
-        forces.append(Force(label, kernel, nodes, names))
+        place = where if isinstance(where, str) else shown(where)
+        forces.append(Force(label, kernel, nodes, names, what, place))
 
 
 __all__ = ["MeshError", "Study", "StudyError"]

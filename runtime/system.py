@@ -40,6 +40,7 @@ class Step:
     rest: Array
     dt: float
     histories: Mapping[str, Array]
+    weights: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,6 +42,7 @@ ORDER = {
             "statement",
             "system",
             "equations output",
+            "derivatives",
             "result",
             "begin",
             "held watch engines",

@@ -146,6 +146,13 @@ def geometry_of(mesh: Mesh, geometry: str | None) -> str:
     return geometry or allowed[0]
 
 
+def is_page(source: object) -> bool:
+    """Whether a source is mathematics, from which more may be derived, and not C."""
+    if isinstance(source, str) and not source.endswith(".py"):
+        return False
+    return not (isinstance(source, str | Path) and Path(source).is_dir())
+
+
 def require_page(source: object) -> None:
     """Raise StudyError for what cannot be loaded."""
     if isinstance(source, str | Path) or hasattr(source, "at_point"):
