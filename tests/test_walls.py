@@ -44,7 +44,7 @@ ORDER = {
             "equations output",
             "derivatives",
             "result",
-            "begin",
+            "begin fit",
             "held watch engines",
         ),
         *("follow load march", "study"),

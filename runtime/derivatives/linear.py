@@ -64,12 +64,19 @@ class Linear:
             if not isinstance(elements.block.kernel, Spring | Tie)
         }
 
+    def forces(self) -> Array:
+        """Forces (n,) that make reactions."""
+        found = self.trail.problem.assembler.residual(self.trail.x, self._others())
+        return np.asarray(found)
+
     def by_unknowns(self, weights: Array) -> Array:
         """Derivative (n,) of weights (n,) times the forces that make reactions."""
-        problem = self.trail.problem
-        others = {n: v for n, v in problem.parameters.items() if n in self.reacting()}
-        K = problem.assembler.linearise(self.trail.x, others)[1]
+        K = self.trail.problem.assembler.linearise(self.trail.x, self._others())[1]
         return np.asarray(K.T @ weights)
+
+    def _others(self) -> dict[str, Array]:
+        acting = self.reacting()
+        return {n: v for n, v in self.trail.problem.parameters.items() if n in acting}
 
     def summed(self, parts: Mapping[str, Array]) -> Array:
         """(n,): the sums of residuals (elements, ndof) of blocks."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.derivatives.linear import Linear
+from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.names import listed, meant
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
@@ -17,6 +18,10 @@ from softehl.runtime.system import System
 
 class Quantity(Protocol):
     """A number that a converged step has."""
+
+    def value(self, trail: Trail) -> float:
+        """The number."""
+        ...
 
     def slope(self, linear: Linear) -> Array:
         """Its derivative by all unknowns, (n,)."""
@@ -34,9 +39,16 @@ class AtPlace:
     name: str
     place: tuple[float, ...]
 
+    def value(self, trail: Trail) -> float:
+        """See `Quantity`."""
+        return float(self._shares(trail.system) @ trail.x)
+
     def slope(self, linear: Linear) -> Array:
         """See `Quantity`."""
-        system = linear.trail.system
+        return self._shares(linear.trail.system)
+
+    def _shares(self, system: System) -> Array:
+        """Weights (n,) of all unknowns."""
         _require(self.name, system)
         nodes, shares = system.mesh.locate(np.asarray(self.place, dtype=np.float64))
         numbers, found = system.numbering.nodal[self.name][nodes], np.zeros(system.size)
@@ -55,6 +67,11 @@ class Reaction:
 
     name: str
     side: str
+
+    def value(self, trail: Trail) -> float:
+        """See `Quantity`."""
+        linear = Linear(trail)
+        return float(self.weights(linear) @ linear.forces())
 
     def slope(self, linear: Linear) -> Array:
         """See `Quantity`."""
@@ -75,6 +92,10 @@ class Function:
     """A function of all unknowns (n,) that returns its value and its gradient (n,)."""
 
     function: Callable[[Array], tuple[float, Array]]
+
+    def value(self, trail: Trail) -> float:
+        """See `Quantity`."""
+        return float(self.function(trail.x)[0])
 
     def slope(self, linear: Linear) -> Array:
         """See `Quantity`."""
