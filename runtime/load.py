@@ -40,7 +40,7 @@ class _Reached:
     """A study on its path: after each point history is committed, and `on_step` is told.
 
     x, histories: after the last point. results: all of them, or the last one. record: whether
-    results keep the steps before them.
+    results keep the steps before them. before: what the first step goes on from.
     """
 
     system: System
@@ -49,6 +49,7 @@ class _Reached:
     on_step: Callable[[Result], object]
     keep_all: bool = False
     record: bool = False
+    before: Trail | None = None
     results: list[Result] = field(default_factory=list)
 
     def problem_at(self, t: float) -> Problem:
@@ -59,10 +60,10 @@ class _Reached:
         """Go on from a converged point."""
         step = self._step(point.parameter)
         problem = self.system.problem(step)
-        before = self.results[-1].trail if self.record and self.results else None
+        before = self.results[-1].trail if self.results else self.before
         self.x = point.solution.x
         self.histories = self.system.committed(problem, self.x, self.histories)
-        trail = Trail(self.system, step, problem, self.x, before)
+        trail = Trail(self.system, step, problem, self.x, before if self.record else None)
         result = Result(self.system, problem, point, self.histories, trail)
         if not self.keep_all:
             self.results.clear()
@@ -82,18 +83,19 @@ class _Reached:
 class LoadSteps:
     """Settings of load steps: their number; each result is handed to `on_step`.
 
-    record: whether results keep the steps before them.
+    record: whether results keep the steps before them. before: what the first goes on from.
     """
 
     steps: int
     newton: Newton
     on_step: Callable[[Result], object]
     record: bool = False
+    before: Trail | None = None
 
     def run(self, system: System, start: Beginning, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
         begin, x0, histories = start
-        at = _Reached(system, x0, histories, self.on_step, record=self.record)
+        at = _Reached(system, x0, histories, self.on_step, False, self.record, self.before)
         first_step = FirstStep(self.newton)
 
         def keep(point: Point) -> None:

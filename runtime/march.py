@@ -125,6 +125,7 @@ class March:
     method: "euler" (backward, order 1) or "bdf2" (order 2, of variable steps). tolerance: largest
     local error of a step relative to the largest value of each unknown; None for equal steps.
     dt: length of step that is asked for. record: whether results keep the steps before them.
+    before: what the first goes on from.
     """
 
     method: Method
@@ -132,6 +133,7 @@ class March:
     dt: float
     newton: Newton
     record: bool = False
+    before: Trail | None = None
 
     def run(
         self, system: System, clock: Clock, until: float, checkpoint: Path | None
@@ -244,8 +246,8 @@ class _ByTime(Way):
         times = (posed.t, *self.clock.times)[:3]
         assert trial.following is not None
         self.clock = Clock(times, states, after, trial.following)
-        before = self.result.trail if self.result and self.march.record else None
-        trail = Trail(system, posed, problem, solution.x, before)
+        before = self.result.trail if self.result else self.march.before
+        trail = Trail(system, posed, problem, solution.x, before if self.march.record else None)
         self.result = Result(system, problem, Point(posed.t, solution), after, trail)
 
     def end(self) -> End | None:

@@ -12,7 +12,7 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -20,16 +20,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Integers
 from softehl.runtime.begin import beginning
-from softehl.runtime.derivatives import asked
-from softehl.runtime.derivatives.asked import By
-from softehl.runtime.derivatives.inputs import Input, Key, varied
-from softehl.runtime.derivatives.quantities import quantity
+from softehl.runtime.derivatives.trail import continued
 from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
-from softehl.runtime.fit import Bounds, Data, Fit, LeastSquares, Measured, Objective, Run, Trials
+from softehl.runtime.fit.fitted import Fitted
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.load import ArcSteps, LoadPath, LoadSteps
 from softehl.runtime.march import Clock, March, Method
@@ -42,7 +39,7 @@ from softehl.runtime.statement import given as read
 from softehl.runtime.statement.pages import (
     elements_of,
     geometry_of,
-    is_page,
+    is_folder,
     kinds_of,
     page_on,
     require_page,
@@ -66,7 +63,7 @@ function decorated by `softehl.page`."""
 
 
 @dataclass(eq=False)
-class Study:
+class Study(Fitted):
     """A boundary-value problem that is being written down; `solve` solves what is there.
 
     mesh: on which it lives; a cell that is turned inside out is a MeshError. geometry: what a page
@@ -257,10 +254,12 @@ class Study:
             read.function("on_step", on_step, "result")
         where = engine_of(engine)
         system = where.spread(self.system())
-        begin = beginning(system, start)
+        begin, before = beginning(system, start), continued(system, start.trail if start else None)
         told = Telling(progress, system.share.first, "load factor", begin[0])
         with Watch(told.until(until), write, on_step) as watch:
-            return LoadSteps(steps, where.newton(newton), watch, record).run(system, begin, until)
+            return LoadSteps(steps, where.newton(newton), watch, record, before).run(
+                system, begin, until
+            )
 
     def march(
         self,
@@ -289,7 +288,7 @@ class Study:
         pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
         `engine` "petsc" on any number of processes; another `dt` than then is the next step.
         write: a .pvd file that names the results of all steps (with start or restart, it
-        goes on). progress, record: as in `solve`. Raises StudyError, and NotConverged as `solve` does.
+        goes on). progress, record: as in `solve`. Raises StudyError, NotConverged as `solve` does.
         """
         if method not in ("euler", "bdf2"):
             raise StudyError(f'method = {method!r}: allowed are "euler" and "bdf2"')
@@ -305,7 +304,8 @@ class Study:
         else:
             clock = Clock.load(Path(restart), system, dt)
         clock.require_before(until)
-        settings = March(method, tolerance, dt, where.newton(newton), record)
+        before = continued(system, start.trail if start else None)
+        settings = March(method, tolerance, dt, where.newton(newton), record, before)
         file = None if checkpoint is None else Path(checkpoint)
         series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
         told = Telling(progress, system.share.first, "t", clock.t)
@@ -340,82 +340,6 @@ class Study:
             path = ArcSteps(step, Serial().newton(newton), most, watch)
             return path.run(system, begin, until)
 
-    # derivatives, see `Result.sensitivity` ------------------------------------------------------
-
-    def varied(self, values: Mapping[Key, float | Array]) -> Study:
-        """A copy of the study with other values of inputs, {("rubber", "mu"): 0.5}.
-
-        A function is multiplied by the value. Raises StudyError for a name that is not there.
-        """
-        items = asked.of_keys(self._statement, list(values))
-        return self._changed([*zip(items, map(np.atleast_1d, values.values()), strict=True)])
-
-    def objective(
-        self,
-        what: str | Callable[[Array], tuple[float, Array]],
-        *,
-        by: By,
-        at: tuple[float, ...] | None = None,
-        reaction: str | None = None,
-        **path: Any,
-    ) -> Objective:
-        """A quantity as a function of inputs (k,), with its gradient, for SciPy's optimisers.
-
-        what, by, at, reaction: as in `Result.sensitivity`. path: arguments of `solve`, or of
-        `march` where there is a `dt`.
-        """
-        items = asked.inputs(self._statement, by)
-        return Objective(Trials(items, self._runner(path)), quantity(what, at, reaction))
-
-    def fit(
-        self,
-        measured: Measured,
-        *,
-        by: By,
-        bounds: Bounds | None = None,
-        sigma: float | Array | None = None,
-        most: int = 100,
-        **path: Any,
-    ) -> Fit:
-        """Inputs with which results are what was measured, by least squares from those given here.
-
-        measured: {(48, 60): {"u_y": 12.4}, "left": {"u_x": 0.3}}: unknowns at places, reactions at
-        sides; a list has one number for each step. by: as in `Result.sensitivity`. bounds:
-        {("rubber", "mu"): (0, 1)}; parameters and data of pages that are positive stay so, unless
-        their bounds allow other values. sigma: standard deviation of the numbers, one or one for each;
-        without it all count alike, and the covariance comes from their scatter. most: evaluations.
-        path: arguments of `solve`, or of `march` where there is a `dt`. Raises StudyError, and
-        NotConverged where the study as it is given has no solution.
-        """
-        until = read.finite("until", path.get("until", 1.0))
-        count = path.get("steps", 1)
-        times = until * np.arange(1, count + 1) / count
-        if "dt" in path:
-            times = path["dt"] * np.arange(1, round(until / path["dt"]) + 1)
-        data = Data.read(measured, len(times))
-        scales = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
-        trials = Trials(asked.inputs(self._statement, by), self._runner(path))
-        return LeastSquares(trials, data, times, scales).fit(bounds, most)
-
-    def _changed(self, changes: Sequence[tuple[Input, Array]]) -> Study:
-        statement = varied(self._statement, changes)
-        other = Study(statement.mesh, self.geometry)
-        other._statement = statement
-        return other
-
-    def _runner(self, path: Mapping[str, Any]) -> Run:
-        """Results of all steps with other values of inputs."""
-
-        def run(changes: Sequence[tuple[Input, Array]]) -> list[Result]:
-            other, found = self._changed(changes), list[Result]()
-            given = {"progress": False, "record": True, **path}
-            if "dt" in path:
-                return list(other.march(**given))
-            other.solve(on_step=found.append, **given)
-            return found
-
-        return run
-
     def system(self) -> System:
         """Equations of the study.  Raises StudyError for what does not fit together."""
         return equations(self._statement)
@@ -444,8 +368,10 @@ class Study:
         self, source: Source, model: str | None, kernel: Kernel, law: bool
     ) -> Callable[[], Kernel] | None:
         """Maker of the kernel of derivatives of a page, which is derived when it is asked for."""
-        if isinstance(source, Kernel) or not is_page(source):
+        if isinstance(source, Kernel) or is_folder(source):
             return None
+        if "pseudo_load" in kernel.tasks and not kernel.point_data:
+            return None  # it comes with what is needed
         import softehl
 
         return cache(

@@ -135,9 +135,10 @@ class _Pull:
         """By the point data before the step, (n, points, k)."""
         block = self.elements.block
         assert block.point_data is not None
-        found, still = np.zeros(block.point_data.shape), self.elements.still()
-        for k in range(found.shape[2]):
-            for q in range(found.shape[1]):
+        found: Array = np.zeros_like(block.point_data)
+        still, (_, points, count) = self.elements.still(), block.point_data.shape
+        for k in range(count):
+            for q in range(points):
                 moved = np.zeros(found.shape)
                 moved[:, q, k] = 1.0
                 found[:, q, k] = (self.left * self.elements.residual(still, moved)).sum(axis=1)

@@ -134,7 +134,9 @@ def _of_nodes(statement: Statement, place: str, name: str, side: str, mode: Any)
 def _known(place: str, name: str, found: Sequence[object], known: Sequence[str]) -> None:
     if not found:
         names = list(dict.fromkeys(known))
-        raise StudyError(f"by: {place!r} has no {name!r}{meant(name, names)}; it has {listed(names)}")
+        raise StudyError(
+            f"by: {place!r} has no {name!r}{meant(name, names)}; it has {listed(names)}"
+        )
 
 
 def _alike(place: str, name: str, values: Sequence[object]) -> None:

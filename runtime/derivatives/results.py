@@ -57,7 +57,7 @@ def derivative(trail: Trail, inputs: Sequence[Input]) -> Array:
 def _directly(entries: Sequence[Entry], inputs: Sequence[Input], k: int) -> Array:
     """One solution a step for each component; entries of one path share them."""
     found = np.empty((len(entries), k))
-    waiting = {n: entry for n, entry in enumerate(entries)}
+    waiting = dict(enumerate(entries))
     while waiting:
         # the longest path has the others in it
         chain = max((entry[0].chain() for entry in waiting.values()), key=len)

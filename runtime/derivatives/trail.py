@@ -49,7 +49,7 @@ class Trail:
         if not _at_rest(steps[-1]):
             raise StudyError(
                 "the result depends on the steps before it, which were not recorded: give "
-                "record=True to solve or march, and begin at rest, not with a result or restart"
+                "record=True to solve or march, and to what it began with"
             )
         return steps[::-1]
 
@@ -58,6 +58,13 @@ def remembers(system: System) -> bool:
     """Whether a step depends on the steps before it."""
     blocks = system.blocks.values()
     return any(b.previous or b.rates or b.initial is not None for b in blocks)
+
+
+def continued(system: System, start: Trail | None) -> Trail | None:
+    """The path that goes on from a start: None where that is of another study."""
+    if start is None or start.system.statement is not system.statement:
+        return None
+    return start if start.system.written == system.written else None
 
 
 def _at_rest(first: Trail) -> bool:

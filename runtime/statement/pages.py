@@ -146,11 +146,9 @@ def geometry_of(mesh: Mesh, geometry: str | None) -> str:
     return geometry or allowed[0]
 
 
-def is_page(source: object) -> bool:
-    """Whether a source is mathematics, from which more may be derived, and not C."""
-    if isinstance(source, str) and not source.endswith(".py"):
-        return False
-    return not (isinstance(source, str | Path) and Path(source).is_dir())
+def is_folder(source: object) -> bool:
+    """Whether a source is a folder of C, from which nothing can be derived."""
+    return isinstance(source, str | Path) and Path(source).is_dir()
 
 
 def require_page(source: object) -> None:

@@ -184,7 +184,13 @@ def load_kernel(
     # os.path: a name that is too long for a file is none
     folder_given = isinstance(source, (str, Path)) and os.path.isdir(source)
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
-        return kernels.load_kernel(source)
+        shipped = kernels.load_kernel(source)
+        if not derivatives:
+            return shipped
+        with with_sympy():
+            from softehl.codegen.models import ALL
+
+            return load_kernel(ALL[source](), derivatives=True)
     if isinstance(source, (str, Path)) and folder_given:
         return kernels.kernel_in(Path(source).resolve(), name, cell)
     from softehl.codegen.tools import library
