@@ -29,11 +29,13 @@ class Solvable(Protocol):
     mesh: Mesh
     _statement: Statement
 
-    def solve(self, **path: Any) -> Result:
+    @property
+    def solve(self) -> Callable[..., Result]:
         """See `Study`."""
         ...
 
-    def march(self, **path: Any) -> Iterator[Result]:
+    @property
+    def march(self) -> Callable[..., Iterator[Result]]:
         """See `Study`."""
         ...
 
