@@ -1,4 +1,4 @@
-"""What a step takes over from the steps before it: unknowns, rates of them, history of points."""
+"""Values that a step takes over from the steps before it: unknowns and rates of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Carried:
 
 
 def carried(trail: Trail) -> Iterator[Carried]:
-    """All of them in a step."""
+    """Values from steps before in the data of a step."""
     nodal = trail.system.numbering.nodal
     for block in trail.system.blocks.values():
         first = block.kernel.nodes * len(block.kernel.coordinates)

@@ -1,4 +1,4 @@
-"""How inputs of derivatives reach the elements: which of their arguments move, and how much."""
+"""Arguments of elements that move with an input, and by how much."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class Moves:
-    """What moves with an input in one step."""
+    """All that moves with an input in one step."""
 
     columns: Sequence[Column] = field(default=())
     held: Sequence[Held] = field(default=())

@@ -80,7 +80,7 @@ def _step(linear: Linear, moves: Moves, seed: Array, front: _Front) -> tuple[Arr
 
 
 def _keep_still(linear: Linear, name: str, after: Array, before: Array | None) -> None:
-    """Point data that are no history stay what they are."""
+    """Leave point data that are no history as they are."""
     kernel = linear.trail.system.blocks[name].kernel
     for column, datum in enumerate(kernel.point_data):
         if datum not in kernel.history and before is not None:

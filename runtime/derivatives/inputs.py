@@ -1,4 +1,4 @@
-"""Inputs by which results are differentiated: each says what of a step moves with it.
+"""Inputs by which results are differentiated: each knows the arguments that move with it.
 
 The value of an input may be read, and put into a statement. A function is differentiated by a
 factor of it, which is 1.
@@ -30,7 +30,7 @@ class Input(Protocol):
 
     @property
     def key(self) -> Key:
-        """How it was asked for."""
+        """The names by which it was asked for."""
         ...
 
     @property
@@ -40,11 +40,11 @@ class Input(Protocol):
 
     @property
     def scalar(self) -> bool:
-        """Whether it is one number."""
+        """True if it is one number."""
         ...
 
     def moves(self, trail: Trail) -> Moves:
-        """What moves with it in a step."""
+        """Arguments of elements and prescribed values that move with it in a step."""
         ...
 
     def put(self, statement: Statement, value: Array) -> None:

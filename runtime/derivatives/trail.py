@@ -1,4 +1,4 @@
-"""A converged step of a path with what led to it: what derivatives are taken of."""
+"""A converged step of a path with the steps that led to it; derivatives are taken of it."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Trail:
 
 
 def remembers(system: System) -> bool:
-    """Whether a step depends on the steps before it."""
+    """True if a step depends on the steps before it."""
     blocks = system.blocks.values()
     return any(b.previous or b.rates or b.initial is not None for b in blocks)
 
@@ -68,7 +68,7 @@ def continued(system: System, start: Trail | None) -> Trail | None:
 
 
 def _at_rest(first: Trail) -> bool:
-    """Whether a step begins with what the study says of the start."""
+    """True if a step begins with the values that the study says of the start."""
     rest = first.system.histories()
     same = [np.array_equal(first.step.histories[name], values) for name, values in rest.items()]
     return all(same) and np.array_equal(first.step.old, first.system.at_rest())

@@ -1,4 +1,4 @@
-"""What a study does with its derivatives: other values of its inputs, objectives, fits."""
+"""Methods of a study that use derivatives: other values of inputs, objectives, fits."""
 
 from __future__ import annotations
 

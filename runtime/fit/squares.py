@@ -21,7 +21,7 @@ from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.statement.records import StudyError
 
 _FAILED = (NotConverged, ArgumentError, ProblemError)
-"""What a trial may end with: the next one is nearer to the last that was solved."""
+"""Ends of a trial after which the next one is nearer to the last that was solved."""
 _SPAN = 1e-9  # of the whole path: two steps that near are one
 _RANK = 1e-12  # of the largest singular value: below, inputs are not determined
 

@@ -147,7 +147,7 @@ def geometry_of(mesh: Mesh, geometry: str | None) -> str:
 
 
 def is_folder(source: object) -> bool:
-    """Whether a source is a folder of C, from which nothing can be derived."""
+    """True for a folder of C, from which nothing can be derived."""
     return isinstance(source, str | Path) and Path(source).is_dir()
 
 
