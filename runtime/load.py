@@ -14,7 +14,7 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
 from softehl.runtime.solve.arclength import Arclength
-from softehl.runtime.solve.held import FirstStep
+from softehl.runtime.solve.held import FirstStep, Remembering, recorded
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
@@ -39,8 +39,8 @@ class LoadPath:
 class _Reached:
     """A study on its path: after each point history is committed, and `on_step` is told.
 
-    x, histories: after the last point. results: all of them, or the last one. record: whether
-    results keep the steps before them. before: what the first step goes on from.
+    x, histories: after the last point. results: all of them, or the last one. kept: the
+    linear solver of a path that is recorded. before: what the first step goes on from.
     """
 
     system: System
@@ -48,7 +48,7 @@ class _Reached:
     histories: dict[str, Array]
     on_step: Callable[[Result], object]
     keep_all: bool = False
-    record: bool = False
+    kept: Remembering | None = None
     before: Trail | None = None
     results: list[Result] = field(default_factory=list)
 
@@ -63,7 +63,8 @@ class _Reached:
         before = self.results[-1].trail if self.results else self.before
         self.x = point.solution.x
         self.histories = self.system.committed(problem, self.x, self.histories)
-        trail = Trail(self.system, step, problem, self.x, before if self.record else None)
+        known = (before, self.kept) if self.kept else ()
+        trail = Trail(self.system, step, problem, self.x, *known)
         result = Result(self.system, problem, point, self.histories, trail)
         if not self.keep_all:
             self.results.clear()
@@ -95,8 +96,9 @@ class LoadSteps:
     def run(self, system: System, start: Beginning, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
         begin, x0, histories = start
-        at = _Reached(system, x0, histories, self.on_step, False, self.record, self.before)
-        first_step = FirstStep(self.newton)
+        newton, kept = recorded(self.newton) if self.record else (self.newton, None)
+        at = _Reached(system, x0, histories, self.on_step, False, kept, self.before)
+        first_step = FirstStep(newton)
 
         def keep(point: Point) -> None:
             first_step.check(at.problem_at(point.parameter), point.solution)

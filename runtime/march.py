@@ -19,7 +19,7 @@ from softehl.runtime.held import require_held
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.share import Share
-from softehl.runtime.solve.held import FirstStep
+from softehl.runtime.solve.held import FirstStep, Remembering, recorded
 from softehl.runtime.solve.homotopy import Trial, Way, walk
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.predictor import through
@@ -146,7 +146,9 @@ class March:
         with np.errstate(all="ignore"):
             posed = system.problem(self.posed(system, clock, shortest))
             require_held(system, posed, clock.states[0])
-        way = _ByTime(self, FirstStep(self.newton), system, clock, until, _ROUNDING * length)
+        newton, kept = recorded(self.newton) if self.record else (self.newton, None)
+        over = _ROUNDING * length
+        way = _ByTime(self, FirstStep(newton), system, clock, until, over, kept)
         log = Record("t")
         marks = {} if checkpoint is None else marks_of(system.everywhere)
         for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):
@@ -196,9 +198,9 @@ class March:
 
 @dataclass(eq=False)
 class _ByTime(Way):
-    """clock: where it stands; over: time left before the end that is none; result: of
-    the last step, None at the start; again: the last attempt failed, so that the next one is as
-    long as it is told.
+    """clock: where it stands; over: time left before the end that is none; kept: the linear solver
+    of a march that is recorded; result: of the last step, None at the start; again: the last
+    attempt failed, so that the next one is as long as it is told.
     """
 
     march: March
@@ -207,6 +209,7 @@ class _ByTime(Way):
     clock: Clock
     until: float
     over: float
+    kept: Remembering | None = None
     result: Result | None = None
     again: bool = False
     _tried: tuple[Step, Any] | None = None
@@ -247,7 +250,8 @@ class _ByTime(Way):
         assert trial.following is not None
         self.clock = Clock(times, states, after, trial.following)
         before = self.result.trail if self.result else self.march.before
-        trail = Trail(system, posed, problem, solution.x, before if self.march.record else None)
+        known = (before, self.kept) if self.kept else ()
+        trail = Trail(system, posed, problem, solution.x, *known)
         self.result = Result(system, problem, Point(posed.t, solution), after, trail)
 
     def end(self) -> End | None:

@@ -244,8 +244,9 @@ class Study(Fitted):
         converged step, write: a .pvd file that names them all. progress: tell of each step on
         stderr; None: in one line, on a terminal only. engine: "serial", "petsc" (on all processes
         that mpirun started) or an engine with settings. record: results keep the steps before them,
-        which derivatives need where pages have history. Raises StudyError; NotConverged if the end
-        is not reached: its `reached` is the last Result, or None.
+        which derivatives need where pages have history, and the last factors, which saves time.
+        Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
+        or None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")

@@ -91,7 +91,11 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Pa
         found = user.definitions(source, On(cells, geometry or None, materials))
     else:
         found = _definitions(source, where)
-    return library([d.for_derivatives() for d in found if not d.given], key).folder
+    free = [d for d in found if not d.given]
+    if not free:
+        names = ", ".join(d.name for d in found)
+        raise ModelFileError(f"{names}: gives derivatives of its own, and results have none by it")
+    return library([d.for_derivatives() for d in free], key).folder
 
 
 def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:

@@ -215,6 +215,10 @@ class Places:
         there = {b.name: b for b in trail.problem.assembler.blocks}
         statement = trail.system.statement
         assert statement is not None
+        known = {*trail.system.blocks, *(f.label for f in statement.forces)}
+        for name in there:
+            if name not in known:
+                raise StudyError(f"by: places of nodes are not followed through {name!r}")
         for force in statement.forces:
             if isinstance(force.kernel, Tie) and callable(force.kernel.offset):
                 raise StudyError(f"{force.label}: an offset that depends on places is not followed")

@@ -9,6 +9,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.held import Remembering
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import Step, System
 
@@ -17,8 +18,9 @@ from softehl.runtime.system import Step, System
 class Trail:
     """A converged step: its equations, its unknowns x (n,), and the step before it.
 
-    before: None at the beginning, and where the path was not recorded. memo: factors that may be
-    needed again; they save time.
+    before: None at the beginning, and where the path was not recorded. kept: the linear solver of
+    the path with the factors of its latest step, None if it was not recorded. memo: factors that
+    may be needed again. Both save time only.
     """
 
     system: System
@@ -26,6 +28,7 @@ class Trail:
     problem: Any
     x: Array
     before: Trail | None = None
+    kept: Remembering | None = None
     memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def chain(self) -> list[Trail]:
@@ -36,7 +39,9 @@ class Trail:
         """
         system = self.system
         if not isinstance(self.problem, Problem):
-            raise StudyError('derivatives are those of engine "serial": this result is spread')
+            raise StudyError(
+                'derivatives need engine="serial": this result is of several processes'
+            )
         if system.statement is None or system.statement.count != system.written:
             raise StudyError("the study was changed after this result: solve it again")
         if not remembers(system):

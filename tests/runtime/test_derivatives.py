@@ -10,11 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.sparse import csc_array
 
 from softehl import Definition, Mesh, Model, Newton, Study, page, quadrature
 from softehl.runtime.arrays import Array
-from softehl.runtime.derivatives import results
+from softehl.runtime.derivatives import linear, results
+from softehl.runtime.derivatives.linear import refined
 from softehl.runtime.result import Result
+from softehl.runtime.solve.superlu import SuperLU
 from softehl.runtime.study import StudyError
 
 EXACT = Newton(tolerance=1e-13)
@@ -331,3 +334,36 @@ def test_a_study_that_changed_has_no_derivatives() -> None:
     study.load("right", u_x=1)
     with pytest.raises(StudyError, match="changed after this result: solve it again"):
         result.sensitivity("u_y", at=PLACE, by={"body": "mu"})
+
+
+def test_factors_near_by_are_refined_or_refused() -> None:
+    """Those of the last iteration give the digits of new ones; others are not taken."""
+    generator = np.random.default_rng(0)
+    K, b = generator.standard_normal((20, 20)) + 10 * np.eye(20), generator.standard_normal(20)
+    near, far = (csc_array(K + s * generator.standard_normal(K.shape)) for s in (1e-4, 10.0))
+    assert refined(SuperLU().factorise(near), csc_array(K), b) == pytest.approx(
+        np.linalg.solve(K, b), rel=1e-12
+    )
+    assert refined(SuperLU().factorise(far), csc_array(K), b) is None
+
+
+def test_a_recorded_result_needs_no_new_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    by = {"body": ["mu", "K"], "nodes": ["x"]}
+    expected = panel(p=0.0).solve().sensitivity("u_y", at=PLACE, by=by)
+    result = panel(p=0.0).solve(record=True)
+    monkeypatch.setattr(linear, "choose", lambda _: pytest.fail("factorised again"))
+    found = result.sensitivity("u_y", at=PLACE, by=by)
+    for key, value in expected.items():
+        assert np.allclose(found[key], value, rtol=1e-10, atol=1e-12)
+
+
+def test_a_page_with_derivatives_of_its_own_is_refused() -> None:
+    m = Model("own", nodes=1, rule=quadrature.point_rule())
+    ((u,),) = m.nodal_unknowns("u")
+    (k,) = m.parameters(k="stiffness")
+    m.weak_form([(m.define("force", k * u, derivative={u: k}), u)])
+    study = Study(Mesh.line(1.0, cells=1))
+    study.add("node", m.finish(), on="boundary", k=2.0)
+    study.load((0.0,), u=1.0)
+    with pytest.raises(ValueError, match="own: gives derivatives of its own"):
+        study.solve().sensitivity("u", at=(0.0,), by={"node": "k"})
