@@ -10,17 +10,18 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, Beginning
 from softehl.runtime.bifurcation import Bifurcation, Detector
+from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
 from softehl.runtime.solve.arclength import Arclength
-from softehl.runtime.solve.held import FirstStep
+from softehl.runtime.solve.held import FirstStep, Remembering, recorded
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.stability import warn_unstable
-from softehl.runtime.system import System
+from softehl.runtime.system import Step, System
 
 _NAME = "load factor"
 
@@ -42,7 +43,8 @@ class LoadPath:
 class _Reached:
     """A study on its path: after each point history is committed, and `on_step` is told.
 
-    x, histories: after the last point. results: all of them, or the last one.
+    x, histories: after the last point. results: all of them, or the last one. kept: the
+    linear solver of a path that is recorded. before: what the first step goes on from.
     """
 
     system: System
@@ -50,22 +52,32 @@ class _Reached:
     histories: dict[str, Array]
     on_step: Callable[[Result], object]
     keep_all: bool = False
+    kept: Remembering | None = None
+    before: Trail | None = None
     results: list[Result] = field(default_factory=list)
 
     def problem_at(self, t: float) -> Problem:
         """The problem at a load factor."""
-        return self.system.problem(self.system.still(t, self.x, self.histories))
+        return self.system.problem(self._step(t))
 
     def keep(self, point: Point) -> None:
         """Go on from a converged point."""
-        problem = self.problem_at(point.parameter)
+        step = self._step(point.parameter)
+        problem = self.system.problem(step)
+        before = self.results[-1].trail if self.results else self.before
         self.x = point.solution.x
         self.histories = self.system.committed(problem, self.x, self.histories)
-        result = Result(self.system, problem.at(self.x), point, self.histories)
+        problem = problem.at(self.x)
+        known = (before, self.kept) if self.kept else ()
+        trail = Trail(self.system, step, problem, self.x, *known)
+        result = Result(self.system, problem, point, self.histories, trail)
         if not self.keep_all:
             self.results.clear()
         self.results.append(result)
         self.on_step(result)
+
+    def _step(self, t: float) -> Step:
+        return self.system.still(t, self.x, self.histories)
 
     def require_end(self, branch: Branch) -> None:
         """Raise NotConverged where the path did not reach its end."""
@@ -75,16 +87,23 @@ class _Reached:
 
 @dataclass(frozen=True, eq=False)
 class LoadSteps:
-    """Settings of load steps: their number; each result is handed to `on_step`."""
+    """Settings of load steps: their number; each result is handed to `on_step`.
+
+    record: whether results keep the steps before them. before: what the first goes on from.
+    """
 
     steps: int
     newton: Newton
     on_step: Callable[[Result], object]
+    record: bool = False
+    before: Trail | None = None
 
     def run(self, system: System, start: Beginning, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
         begin, x0, histories = start
-        at, first_step = _Reached(system, x0, histories, self.on_step), FirstStep(self.newton)
+        newton, kept = recorded(self.newton) if self.record else (self.newton, None)
+        at = _Reached(system, x0, histories, self.on_step, False, kept, self.before)
+        first_step = FirstStep(newton)
 
         def keep(point: Point) -> None:
             first_step.check(at.problem_at(point.parameter), point.solution)

@@ -14,11 +14,12 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, beginning
+from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.held import require_held
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.share import Share
-from softehl.runtime.solve.held import FirstStep
+from softehl.runtime.solve.held import FirstStep, Remembering, recorded
 from softehl.runtime.solve.homotopy import Trial, Way, walk
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.predictor import through
@@ -123,13 +124,16 @@ class March:
 
     method: "euler" (backward, order 1) or "bdf2" (order 2, of variable steps). tolerance: largest
     local error of a step relative to the largest value of each unknown; None for equal steps.
-    dt: length of step that is asked for.
+    dt: length of step that is asked for. record: whether results keep the steps before them.
+    before: what the first goes on from.
     """
 
     method: Method
     tolerance: float | None
     dt: float
     newton: Newton
+    record: bool = False
+    before: Trail | None = None
 
     def run(
         self, system: System, clock: Clock, until: float, checkpoint: Path | None
@@ -142,7 +146,9 @@ class March:
         with np.errstate(all="ignore"):
             posed = system.problem(self.posed(system, clock, shortest))
             require_held(system, posed, clock.states[0])
-        way = _ByTime(self, FirstStep(self.newton), system, clock, until, ROUNDING * length)
+        newton, kept = recorded(self.newton) if self.record else (self.newton, None)
+        over = ROUNDING * length
+        way = _ByTime(self, FirstStep(newton), system, clock, until, over, kept)
         log = Record("t")
         marks = {} if checkpoint is None else marks_of(system.everywhere)
         for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):
@@ -161,10 +167,11 @@ class March:
         if self.method == "bdf2" and len(clock.times) > 1:
             r = dt / (clock.times[0] - clock.times[1])
             rate = (1.0 + 2.0 * r) / (1.0 + r) / dt
+            weights: tuple[float, ...] = -(1.0 + r) / dt, r * r / (1.0 + r) / dt
             rest = (r * r / (1.0 + r) * clock.states[1] - (1.0 + r) * old) / dt
         else:
-            rate, rest = 1.0 / dt, -old / dt
-        return Step(clock.t + dt, 1.0, old, rate, rest, dt, clock.histories)
+            rate, weights, rest = 1.0 / dt, (-1.0 / dt,), -old / dt
+        return Step(clock.t + dt, 1.0, old, rate, rest, dt, clock.histories, weights=weights)
 
     def factor(self, system: System, clock: Clock, step: Step, x: Array) -> float:
         """By how much the next step may be longer; below 1 where the error is too large."""
@@ -191,9 +198,9 @@ class March:
 
 @dataclass(eq=False)
 class _ByTime(Way):
-    """clock: where it stands; over: time left before the end that is none; result: of
-    the last step, None at the start; again: the last attempt failed, so that the next one is as
-    long as it is told.
+    """clock: where it stands; over: time left before the end that is none; kept: the linear solver
+    of a march that is recorded; result: of the last step, None at the start; again: the last
+    attempt failed, so that the next one is as long as it is told.
     """
 
     march: March
@@ -202,6 +209,7 @@ class _ByTime(Way):
     clock: Clock
     until: float
     over: float
+    kept: Remembering | None = None
     result: Result | None = None
     again: bool = False
     _tried: tuple[Step, Any] | None = None
@@ -241,7 +249,11 @@ class _ByTime(Way):
         times = (posed.t, *self.clock.times)[:3]
         assert trial.following is not None
         self.clock = Clock(times, states, after, trial.following)
-        self.result = Result(system, problem.at(solution.x), Point(posed.t, solution), after)
+        problem = problem.at(solution.x)
+        before = self.result.trail if self.result else self.march.before
+        known = (before, self.kept) if self.kept else ()
+        trail = Trail(system, posed, problem, solution.x, *known)
+        self.result = Result(system, problem, Point(posed.t, solution), after, trail)
 
     def end(self) -> End | None:
         """See `Way`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.derivatives.asked import By, inputs
+from softehl.runtime.derivatives.inputs import Input, Key
+from softehl.runtime.derivatives.quantities import quantity
+from softehl.runtime.derivatives.results import derivative, sensitivity
+from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mass import Masses
@@ -19,6 +24,7 @@ from softehl.runtime.names import meant
 from softehl.runtime.output import Picture, piece_names
 from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.stability import negative_directions
+from softehl.runtime.statement.records import StudyError
 
 if TYPE_CHECKING:
     from softehl.runtime.mesh.mesh import Predicate
@@ -30,13 +36,15 @@ class Result:
     """A converged state of a study.
 
     If it is spread over processes, all of them call every method and get the same
-    values. histories: of the elements of this process.
+    values. histories: of the elements of this process. trail: the step with those before it, of
+    which derivatives are taken.
     """
 
     system: System
     problem: Problem
     point: Point
     histories: Mapping[str, Array] = field(default_factory=dict)
+    trail: Trail | None = field(default=None, repr=False)
 
     @property
     def t(self) -> float:
@@ -178,6 +186,38 @@ class Result:
         x = self.point.solution.x
         squares, found = natural(self.system, self.problem, x, count, mass)
         return Modes(squares, tuple(Shape.of(self, mode) for mode in found))
+
+    def sensitivity(
+        self,
+        what: str | Callable[[Array], tuple[float, Array]],
+        *,
+        by: By,
+        at: tuple[float, ...] | None = None,
+        reaction: str | None = None,
+    ) -> dict[Key, float | Array]:
+        """Derivatives of a quantity: {("rubber", "mu"): number, ...}.
+
+        what: an unknown `at` a place, or its `reaction` at a side, or a function of all unknowns
+        (n,) that returns its value and its gradient (n,). by: block -> parameters and data (of data
+        an array, one number an element), "load:right" -> unknowns, "pressure:right" ->
+        ["pressure"], "spring:foot", "tie:left", "fix:left" -> unknowns, "nodes" or "nodes:SIDE" ->
+        axes (an array, one number a node) or modes {name: (points, dim)}. Functions are
+        differentiated by a factor of them. Steps in time and of the load are held. Raises
+        StudyError, MeshError.
+        """
+        trail, given = self._differentiated(by)
+        return sensitivity(trail, quantity(what, at, reaction), given)
+
+    def derivative(self, *, by: By) -> Array:
+        """Derivatives (n, k) of all unknowns; columns in the order of `by`, see `sensitivity`."""
+        return derivative(*self._differentiated(by))
+
+    def _differentiated(self, by: By) -> tuple[Trail, list[Input]]:
+        statement = self.system.everywhere.statement
+        if self.trail is None or statement is None:
+            raise StudyError("this result is of no path of a study: it has no derivatives")
+        self.trail.chain()
+        return self.trail, inputs(statement, by)
 
     def deformed(self, names: tuple[str, ...]) -> Array:
         """Places of the nodes moved by the unknowns of these names, (points, dim)."""

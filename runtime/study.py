@@ -13,7 +13,8 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast
 
@@ -23,6 +24,7 @@ from softehl.runtime.arrays import Integers
 from softehl.runtime.begin import beginning
 from softehl.runtime.bifurcation import Bifurcation, require_detect
 from softehl.runtime.buckling import Buckling, linear_buckling
+from softehl.runtime.derivatives.trail import continued
 from softehl.runtime.dynamics.schemes import METHODS, require_method, require_none
 from softehl.runtime.dynamics.schemes import Method as Dynamic
 from softehl.runtime.dynamics.start import Motions, require_no_inertia
@@ -30,6 +32,7 @@ from softehl.runtime.engines.engine import AnyEngine, engine_of, note_of
 from softehl.runtime.engines.sizes import Linear
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.fit.fitted import Fitted
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.load import ArcSteps, LoadPath, LoadSteps
 from softehl.runtime.march import Clock, March, Method
@@ -45,6 +48,7 @@ from softehl.runtime.statement.contacts import touch
 from softehl.runtime.statement.pages import (
     elements_of,
     geometry_of,
+    is_folder,
     kinds_of,
     page_on,
     require_page,
@@ -68,7 +72,7 @@ function decorated by `softehl.page`."""
 
 
 @dataclass(eq=False)
-class Study:
+class Study(Fitted):
     """A boundary-value problem that is being written down; `solve` solves what is there.
 
     mesh: on which it lives; a cell that is turned inside out is a MeshError. geometry: what a page
@@ -127,7 +131,8 @@ class Study:
         for kernel in kernels:
             label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
             elements = elements_of(self.mesh, label, kernel, on, cells)
-            blocks[label] = page_on(self.mesh, label, kernel, elements, shared, given)
+            block = page_on(self.mesh, label, kernel, elements, shared, given)
+            blocks[label] = replace(block, differentiated=self._later(page, model, kernel, law))
 
     def load(self, where: Where, **components: Amount) -> None:
         """Dead loads per reference length or area of a side, or forces at a place or nodes.
@@ -267,6 +272,7 @@ class Study:
         linear: Linear = "auto",
         write: str | Path | Series | None = None,
         progress: bool | None = None,
+        record: bool = False,
     ) -> Result:
         """The solution at load factor `until`, from 0 (or from `start`) in `steps` steps.
 
@@ -278,8 +284,10 @@ class Study:
         stderr; None: in one line, on a terminal only. engine: "serial", "petsc" (on all processes
         that mpirun started) or an engine with settings. linear: "direct", "superlu" and "pardiso"
         factorise; "amg" is algebraic multigrid (pyamg) for displacements or one scalar; "auto"
-        takes it for large problems. Raises StudyError; NotConverged if the end is not reached: its
-        `reached` is the last Result, or None.
+        takes it for large problems. record: results keep the steps before them,
+        which derivatives need where pages have history, and the last factors, which saves time.
+        Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
+        or None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
@@ -288,10 +296,12 @@ class Study:
             read.function("on_step", on_step, "result")
         where = engine_of(engine, linear)
         system = where.spread(self.system())
-        begin, newton = beginning(system, start), where.newton(newton)
+        begin, before = beginning(system, start), continued(system, start.trail if start else None)
+        newton = where.newton(newton)
         told = Telling(progress, system.share.first, "load factor", begin[0], note_of(where))
         with Watch(told.until(until), write, on_step) as watch:
-            return LoadSteps(steps, newton, watch).run(system, begin, until)
+            path = LoadSteps(steps, newton, watch, record, before)
+            return path.run(system, begin, until)
 
     def march(
         self,
@@ -311,6 +321,7 @@ class Study:
         linear: Linear = "auto",
         write: str | Path | None = None,
         progress: bool | None = None,
+        record: bool = False,
     ) -> Iterator[Result]:
         """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
 
@@ -328,8 +339,8 @@ class Study:
         pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
         `engine` "petsc" on any number of processes; another `dt` than then is the next step.
         write: a .pvd file that names the results of all steps (with start or restart, it
-        goes on). linear, progress: as in `solve`. Raises StudyError, and NotConverged as `solve`
-        does.
+        goes on). linear, progress, record: as in `solve`. Raises StudyError, and NotConverged as
+        `solve` does.
         """
         require_method(method, ("euler", "bdf2"))
         for name, value in (("dt", dt), ("until", until), ("tolerance", tolerance)):
@@ -354,7 +365,8 @@ class Study:
         else:
             clock = Clock.load(Path(restart), system, dt)
         clock.require_before(until)
-        settings = March(cast(Method, method), tolerance, dt, where.newton(newton))
+        before, newton = continued(system, start.trail if start else None), where.newton(newton)
+        settings = March(cast(Method, method), tolerance, dt, newton, record, before)
         file = None if checkpoint is None else Path(checkpoint)
         series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
         told = Telling(progress, system.share.first, "t", clock.t, note_of(where))
@@ -445,6 +457,27 @@ class Study:
             materials=law,
         )
 
+    def _later(
+        self, source: Source, model: str | None, kernel: Kernel, law: bool
+    ) -> Callable[[], Kernel] | None:
+        """Maker of the kernel of derivatives of a page, which is derived when it is asked for."""
+        if isinstance(source, Kernel) or is_folder(source):
+            return None
+        if "pseudo_load" in kernel.tasks and not kernel.point_data:
+            return None  # it comes with what is needed
+        import softehl
+
+        return cache(
+            lambda: softehl.load_kernel(
+                source,  # type: ignore[arg-type]
+                model or (None if kernel.cell else kernel.name),
+                cell=kernel.cell or None,
+                geometry=geometry_of(self.mesh, self.geometry),
+                materials=law,
+                derivatives=True,
+            )
+        )
+
     def _add_force(
         self,
         what: str,
@@ -455,7 +488,8 @@ class Study:
     ) -> None:
         forces = self._statement.forces
         label = f"{what} {len(forces) + 1}: {what}({shown(where)}, {', '.join(names)})"
-        forces.append(Force(label, kernel, nodes, names))
+        place = where if isinstance(where, str) else shown(where)
+        forces.append(Force(label, kernel, nodes, names, what, place))
 
 
 __all__ = ["MeshError", "Study", "StudyError"]

@@ -33,7 +33,7 @@ class Step:
     factor: of all numbers in loads and supports. old: (n,) unknowns of the step
     before. rate, rest: du/dt = rate u + rest, rest (n,). dt: length of the step. histories: block
     -> (cells, points, k) point data. acceleration, remainder: likewise d2u/dt2 = acceleration u +
-    remainder; None is zero.
+    remainder; None is zero. weights: of the states before in rest, the latest first.
     """
 
     t: float
@@ -45,6 +45,7 @@ class Step:
     histories: Mapping[str, Array]
     acceleration: float = 0.0
     remainder: Array | None = None
+    weights: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 from softehl.codegen.abi import AT_POINTS, Task, derivative_task
 from softehl.codegen.derive import modal
@@ -123,7 +124,9 @@ def moved_unknowns(d: Definition, first: int) -> dict[Node, Node]:
 
 
 def moved_arguments(d: Definition) -> dict[Node, Node]:
-    """Coordinates, data and parameters that move along `direction`, in this order."""
+    """Coordinates, data and parameters that move along `direction`, in this order, and point data
+    that move as the model says.
+    """
     widths = {
         "coordinates": d.coordinate_width,
         "data": len(d.data),
@@ -131,7 +134,12 @@ def moved_arguments(d: Definition) -> dict[Node, Node]:
     }
     places = ((array, k) for array, width in widths.items() for k in range(width))
     g = d.graph
-    return {g.input(*place): g.input("direction", n) for n, place in enumerate(places)}
+    seeds = {g.input(*place): g.input("direction", n) for n, place in enumerate(places)}
+    half = len(d.point_data) // 2 if d.point_rates else 0
+    for k, varying in product(range(half), (False, True)):
+        value = g.input("point data", k, varying=varying)
+        seeds[value] = g.input("point data", half + k, varying=varying)
+    return seeds
 
 
 def _slots(d: Definition) -> list[Slot]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.elements.quadrature import QuadratureRule
@@ -103,6 +103,8 @@ class Definition:
     """Of every unknown its name without number, and its node or None."""
     history: tuple[str, ...] = ()
     """Point data that the last fields are the new values of."""
+    point_rates: bool = False
+    """Whether the second half of the point data says how the first moves along a variation."""
     cell: str = ""
     """The cell of a page of fields, which could stand on another one, too."""
     point: PointForm | None = field(default=None, compare=False)
@@ -119,3 +121,23 @@ class Definition:
     def conservative(self) -> bool:
         """True when the residual is the gradient of the potential (no exceptions)."""
         return not self.constant and not self.given
+
+    def for_derivatives(self) -> Definition:
+        """The model of what derivatives of results are made of, along any variation.
+
+        It has the tasks `pseudo_load` and, where there are fields, `fields_rate` alone. Its point
+        data are those of this model, then the rate of each.
+        """
+        rates = tuple(Argument(f"rate_{a.name}", f"rate of {a.name}") for a in self.point_data)
+        return replace(
+            self,
+            point_data=(*self.point_data, *rates),
+            point_rates=True,
+            product=False,
+            pseudo_load=True,
+            fields_rate=bool(self.fields),
+            derivatives=(),
+            tasks=(),
+            point=self.point
+            and replace(self.point, definition=self.point.definition.for_derivatives()),
+        )

@@ -47,12 +47,20 @@ class Library:
     compiled: Mapping[str, float]
 
 
-def folder_of(source: Path | Definition | Page | Law, where: Where = ((), "", False)) -> Path:
+def folder_of(
+    source: Path | Definition | Page | Law,
+    where: Where = ((), "", False),
+    *,
+    derivatives: bool = False,
+) -> Path:
     """Folder of compiled kernels of a model file (SymPy is imported only if it must be derived).
 
-    where: cells and geometry of pages of fields, and whether materials are wanted.
+    where: cells and geometry of pages of fields, and whether materials are wanted. derivatives:
+    the kernels of `Definition.for_derivatives` instead.
     """
     cells, geometry, materials = where
+    if derivatives:
+        return _for_derivatives(source, where)
     if not isinstance(source, Path):
         return library(_definitions(source, where)).folder
     anywhere = _file_key(source)
@@ -65,6 +73,29 @@ def folder_of(source: Path | Definition | Page | Law, where: Where = ((), "", Fa
         found = user.definitions(source, On(cells, geometry or None, materials))
         return library(found, here if any(d.cell for d in found) else anywhere).folder
     return compiled(files)[0]
+
+
+def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Path:
+    """Folder of the kernels of what derivatives of results are made of."""
+    cells, geometry, materials = where
+    key = None
+    if isinstance(source, Path):
+        told = geometry, "materials" if materials else "", "derivatives"
+        key = _file_key(source, *cells, *told)
+        files = store.recall(key)
+        if files is not None:
+            return compiled(files)[0]
+        from softehl.codegen.language.pages import On
+        from softehl.codegen.tools import user
+
+        found = user.definitions(source, On(cells, geometry or None, materials))
+    else:
+        found = _definitions(source, where)
+    free = [d for d in found if not d.given]
+    if not free:
+        names = ", ".join(d.name for d in found)
+        raise ModelFileError(f"{names}: gives derivatives of its own, and results have none by it")
+    return library([d.for_derivatives() for d in free], key).folder
 
 
 def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:

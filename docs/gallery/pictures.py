@@ -104,6 +104,31 @@ def cook(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(loc="lower right")
 
 
+def fit(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.25])
+    truth, slopes = space["truth"], space["slopes"]
+    mesh = truth.system.mesh
+    drawn = mesh.cells["quad4"]
+    draw_cells(left, mesh.points, drawn, np.zeros(len(drawn)), cmap="Greys", clim=(-0.2, 1.5))
+    nodes = mesh.nodes("boundary")
+    arrows = np.stack([slopes["nodes", axis][nodes] for axis in "xy"])
+    left.quiver(*mesh.points[nodes].T, *arrows, color=BLUE, angles="xy", width=0.008)
+    left.set(xlim=(-10, 62), ylim=(-4, 68), title="slope of the lift by places of nodes")
+    moduli = np.linspace(0.3, 0.7, 5)
+    lifts, tangents = [], []
+    for mu in moduli:
+        result = space["panel"](mu, 0.9154).solve(steps=4)
+        lifts.append(result.at((48, 60))["u_y"])
+        tangents.append(result.sensitivity("u_y", at=(48, 60), by={"rubber": "mu"}))
+    right.plot(moduli, lifts, "o", color=BLUE, label="solutions")
+    for mu, lift, slope in zip(moduli, lifts, tangents, strict=True):
+        ends = np.array([-0.04, 0.04])
+        right.plot(mu + ends, lift + ends * slope["rubber", "mu"], color=ORANGE)
+    right.plot([], [], color=ORANGE, label="tangents")
+    right.set(xlabel="shear modulus [MPa]", ylabel="lift of the upper corner [mm]")
+    right.legend()
+
+
 def plasticity(figure: Figure, space: dict[str, Any]) -> None:
     early, late, right = figure.subplots(1, 3, width_ratios=[1, 1, 1.4])
     path, W = space["pulled"](16), space["W"]
@@ -431,6 +456,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "fbar": fbar,
     "cahn-hilliard": cahn_hilliard,
     "friction": friction,
+    "fit": fit,
     "maxwell": maxwell,
     "seal": seal,
     "finite-plasticity": finite_plasticity,

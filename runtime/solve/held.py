@@ -49,6 +49,12 @@ class Remembering:
         return factors
 
 
+def recorded(newton: Newton) -> tuple[Newton, Remembering]:
+    """Newton's method whose latest factors are kept, and what keeps them."""
+    kept = Remembering(newton.linear)
+    return replace(newton, linear=kept), kept
+
+
 @dataclass
 class FirstStep:
     """Newton's method of a path whose first step that factorises is looked at once."""

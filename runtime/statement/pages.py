@@ -152,6 +152,11 @@ def geometry_of(mesh: Mesh, geometry: str | None) -> str:
     return geometry or allowed[0]
 
 
+def is_folder(source: object) -> bool:
+    """True for a folder of C, from which nothing can be derived."""
+    return isinstance(source, str | Path) and Path(source).is_dir()
+
+
 def require_page(source: object) -> None:
     """Raise StudyError for what cannot be loaded."""
     if isinstance(source, str | Path) or hasattr(source, "at_point"):

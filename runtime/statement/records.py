@@ -34,6 +34,7 @@ class Block:
     previous: column of the kernel's data -> name and node of the unknown whose value at the step
     before it is; rates, accelerations: likewise of what `rates` adds. initial: (n, points, k) point
     data at the start, or None.
+    differentiated: makes the kernel of derivatives, or None where the page is C.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Block:
     accelerations: Mapping[str, Slot]
     initial: Array | None
     parameters: Mapping[str, Number]
+    differentiated: Callable[[], Kernel] | None = None
 
     @property
     def filled(self) -> dict[str, Slot]:
@@ -72,12 +74,17 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Force:
-    """A load, a pressure, a spring or a tie: elements of a kernel of ours on unknowns by name."""
+    """A load, a pressure, a spring or a tie: elements of a kernel of ours on unknowns by name.
+
+    what, where: the call and its place in words: "load", "right".
+    """
 
     label: str
     kernel: DeadLoad | NodalForce | Pressure | Spring | Tie
     nodes: Integers
     names: tuple[str, ...]
+    what: str = ""
+    where: str = ""
 
 
 @dataclass(frozen=True, eq=False)

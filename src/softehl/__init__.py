@@ -162,6 +162,7 @@ def load_kernel(
     cell: str | None = None,
     geometry: str | None = None,
     materials: bool = False,
+    derivatives: bool = False,
 ) -> "Kernel":
     """A compiled kernel, by any of
 
@@ -174,6 +175,8 @@ def load_kernel(
     cell, geometry: where a page of fields stands, as in `load_kernel(page, cell="hex8")`; the
     geometry is "plane strain" (the default), "axisymmetric" or "solid". Others ignore them.
     materials: take the stress laws of a file, as bodies, and not its pages.
+    derivatives: the kernel with the tasks `pseudo_load` and `fields_rate`, of which derivatives of
+    results are made; its point data are those of the page, then the rate of each.
     Raises `runtime.kernels.KernelError`, or what is wrong with the model or the compiler.
     """
     from softehl.runtime import kernels
@@ -181,7 +184,13 @@ def load_kernel(
     # os.path: a name that is too long for a file is none
     folder_given = isinstance(source, (str, Path)) and os.path.isdir(source)
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
-        return kernels.load_kernel(source)
+        shipped = kernels.load_kernel(source)
+        if not derivatives:
+            return shipped
+        with with_sympy():
+            from softehl.codegen.models import ALL
+
+            return load_kernel(ALL[source](), derivatives=True)
     if isinstance(source, (str, Path)) and folder_given:
         return kernels.kernel_in(Path(source).resolve(), name, cell)
     from softehl.codegen.tools import library
@@ -189,5 +198,5 @@ def load_kernel(
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
         where = (() if cell is None else (cell,), geometry or "", materials)
-        folder = library.folder_of(place, where)
+        folder = library.folder_of(place, where, derivatives=derivatives)
     return kernels.kernel_in(folder, name, cell)

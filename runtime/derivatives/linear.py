@@ -1,0 +1,133 @@
+"""The linearised equations of a converged step: its tangent, factors, and loads of variations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.derivatives.elements import Elements
+from softehl.runtime.derivatives.trail import Trail
+from softehl.runtime.fem.loads import Spring, Tie
+from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear import Factors, SingularMatrix
+
+_EXACT, _ROUNDING = 1e-15, 1e-14
+"""Errors of an equation relative to its terms: nothing is left, and only rounding can be left."""
+_TINY = 1e-30  # of the largest entry on the right: equations of zeros are exact
+_SYMMETRIC = 1e-13  # of the largest entry: what rounding leaves of a symmetric tangent
+
+
+class Linear:
+    """R_x dx + R_p dp = 0 at a converged step, with dx of prescribed unknowns given."""
+
+    def __init__(self, trail: Trail) -> None:
+        self.trail = trail
+        self.fixed: Integers = trail.problem.fixed
+        self.blocks = {
+            b.name: Elements(trail, b.name)
+            for b in trail.problem.assembler.blocks
+            if b.name in trail.problem.parameters
+        }
+
+    @cached_property
+    def full(self) -> csc_array[np.float64]:
+        """The tangent of all unknowns."""
+        problem = self.trail.problem
+        tangent: csc_array[np.float64] = problem.assembler.linearise(
+            self.trail.x, problem.parameters
+        )[1]
+        return tangent
+
+    @cached_property
+    def _reduced(self) -> csc_array[np.float64]:
+        reduced: csc_array[np.float64] = self.trail.problem.eliminated(self.full.copy())
+        return reduced
+
+    def solve(self, b: Array, held: Array) -> Array:
+        """dx (n,) of -R_p dp = b, with the rates of prescribed unknowns in held (n,)."""
+        right = b - self.full @ held if held.any() else b.copy()
+        right[self.fixed] = held[self.fixed]
+        return self._solved(right, transposed=False)
+
+    def adjoint(self, gradient: Array) -> Array:
+        """l (n,) of K^T l = gradient, zero at prescribed unknowns."""
+        right = gradient.copy()
+        right[self.fixed] = 0.0
+        return self._solved(right, transposed=True)
+
+    def reacting(self) -> set[str]:
+        """Blocks whose forces make reactions: all but springs and ties."""
+        return {
+            name
+            for name, elements in self.blocks.items()
+            if not isinstance(elements.block.kernel, Spring | Tie)
+        }
+
+    def forces(self) -> Array:
+        """Forces (n,) that make reactions."""
+        found = self.trail.problem.assembler.residual(self.trail.x, self._others())
+        return np.asarray(found)
+
+    def by_unknowns(self, weights: Array) -> Array:
+        """Derivative (n,) of weights (n,) times the forces that make reactions."""
+        K = self.trail.problem.assembler.linearise(self.trail.x, self._others())[1]
+        return np.asarray(K.T @ weights)
+
+    def _others(self) -> dict[str, Array]:
+        acting = self.reacting()
+        return {n: v for n, v in self.trail.problem.parameters.items() if n in acting}
+
+    def summed(self, parts: Mapping[str, Array]) -> Array:
+        """(n,): the sums of residuals (elements, ndof) of blocks."""
+        total = np.zeros(len(self.trail.x))
+        for name, values in parts.items():
+            np.add.at(total, self.blocks[name].block.dofs.ravel(), values.ravel())
+        return total
+
+    def _solved(self, b: Array, *, transposed: bool) -> Array:
+        """By factors of this tangent, or by those of the last iteration if they are near enough."""
+        memo, kept = self.trail.memo, self.trail.kept
+        turned = transposed and not self._symmetric
+        key = "transposed" if turned else "plain"
+        if key not in memo:
+            if not turned and kept is not None and kept.last is not None:
+                found = refined(kept.last[1], self._reduced, b)
+                if found is not None:
+                    return found
+            K = csc_array(self._reduced.T) if turned else self._reduced
+            memo[key] = choose("auto").factorise(K)
+        return np.asarray(memo[key].solve(b))
+
+    @property
+    def _symmetric(self) -> bool:
+        memo, K = self.trail.memo, self._reduced
+        if "symmetric" not in memo:
+            memo["symmetric"] = abs(K - K.T).max() <= _SYMMETRIC * abs(K).max()
+        return bool(memo["symmetric"])
+
+
+def refined(factors: Factors, K: csc_array[np.float64], b: Array) -> Array | None:
+    """x (n,) of K x = b by factors of a matrix near K; None where they are not near enough.
+
+    Each correction must make the error of the equations a tenth, until rounding is left: relative
+    to the terms of each, as after a factorisation of K itself.
+    """
+    if not b.any():
+        return np.zeros_like(b)
+    sizes, x, before = abs(K), np.zeros_like(b), np.inf
+    scale = _TINY * float(np.abs(b).max(initial=0.0))
+    try:
+        while True:
+            r = b - K @ x
+            error = float((np.abs(r) / (sizes @ np.abs(x) + np.abs(b) + scale)).max(initial=0.0))
+            if error <= _EXACT:
+                return x
+            if not error < 0.1 * before:
+                return x if error <= _ROUNDING else None
+            x, before = x + factors.solve(r), error
+    except SingularMatrix:
+        return None

@@ -1,0 +1,79 @@
+"""A converged step of a path with the steps that led to it; derivatives are taken of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.held import Remembering
+from softehl.runtime.statement.records import StudyError
+from softehl.runtime.system import Step, System
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """A converged step: its equations, its unknowns x (n,), and the step before it.
+
+    before: None at the beginning, and where the path was not recorded. kept: the linear solver of
+    the path with the factors of its latest step, None if it was not recorded. memo: factors that
+    may be needed again. Both save time only.
+    """
+
+    system: System
+    step: Step
+    problem: Any
+    x: Array
+    before: Trail | None = None
+    kept: Remembering | None = None
+    memo: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def chain(self) -> list[Trail]:
+        """The steps on which the unknowns depend, first to last.
+
+        One alone where nothing remembers the step before. Raises StudyError where a step is missing
+        or the study was changed.
+        """
+        system = self.system
+        if not isinstance(self.problem, Problem):
+            raise StudyError(
+                'derivatives need engine="serial": this result is of several processes'
+            )
+        if system.statement is None or system.statement.count != system.written:
+            raise StudyError("the study was changed after this result: solve it again")
+        if not remembers(system):
+            return [self]
+        steps: list[Trail] = []
+        step: Trail | None = self
+        while step is not None:
+            steps.append(step)
+            step = step.before
+        if not _at_rest(steps[-1]):
+            raise StudyError(
+                "the result depends on the steps before it, which were not recorded: give "
+                "record=True to solve or march, and to what it began with"
+            )
+        return steps[::-1]
+
+
+def remembers(system: System) -> bool:
+    """True if a step depends on the steps before it."""
+    blocks = system.blocks.values()
+    return any(b.previous or b.rates or b.initial is not None for b in blocks)
+
+
+def continued(system: System, start: Trail | None) -> Trail | None:
+    """The path that goes on from a start: None where that is of another study."""
+    if start is None or start.system.statement is not system.statement:
+        return None
+    return start if start.system.written == system.written else None
+
+
+def _at_rest(first: Trail) -> bool:
+    """True if a step begins with the values that the study says of the start."""
+    rest = first.system.histories()
+    same = [np.array_equal(first.step.histories[name], values) for name, values in rest.items()]
+    return all(same) and np.array_equal(first.step.old, first.system.at_rest())

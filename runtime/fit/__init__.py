@@ -1,0 +1,1 @@
+"""Inputs of a study that make its results what was measured; functions for optimisers."""

@@ -1,0 +1,124 @@
+"""Methods of a study that use derivatives: other values of inputs, objectives, fits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.derivatives import asked
+from softehl.runtime.derivatives.asked import By
+from softehl.runtime.derivatives.inputs import Input, Key, varied
+from softehl.runtime.derivatives.quantities import quantity
+from softehl.runtime.fit.measured import Data, Measured
+from softehl.runtime.fit.scale import Bounds
+from softehl.runtime.fit.squares import Fit, LeastSquares
+from softehl.runtime.fit.trials import Objective, Run, Trials
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.result import Result
+from softehl.runtime.statement.given import finite
+from softehl.runtime.statement.records import Statement
+
+
+class Solvable(Protocol):
+    """A study: what was written down, and its paths."""
+
+    mesh: Mesh
+    _statement: Statement
+
+    @property
+    def solve(self) -> Callable[..., Result]:
+        """See `Study`."""
+        ...
+
+    @property
+    def march(self) -> Callable[..., Iterator[Result]]:
+        """See `Study`."""
+        ...
+
+
+S = TypeVar("S", bound=Solvable)
+
+
+class Fitted:
+    """Base of `Study`: see there for the arguments of paths."""
+
+    def varied(self: S, values: Mapping[Key, float | Array]) -> S:
+        """A copy of the study with other values of inputs, {("rubber", "mu"): 0.5}.
+
+        A function is multiplied by the value. Raises StudyError for a name that is not there.
+        """
+        items = asked.of_keys(self._statement, list(values))
+        return _changed(self, [*zip(items, map(np.atleast_1d, values.values()), strict=True)])
+
+    def objective(
+        self: Solvable,
+        what: str | Callable[[Array], tuple[float, Array]],
+        *,
+        by: By,
+        at: tuple[float, ...] | None = None,
+        reaction: str | None = None,
+        **path: Any,
+    ) -> Objective:
+        """A quantity as a function of inputs (k,), with its gradient, for SciPy's optimisers.
+
+        what, by, at, reaction: as in `Result.sensitivity`. path: arguments of `solve`, or of
+        `march` where there is a `dt`.
+        """
+        items = asked.inputs(self._statement, by)
+        return Objective(Trials(items, _runner(self, path)), quantity(what, at, reaction))
+
+    def fit(
+        self: Solvable,
+        measured: Measured,
+        *,
+        by: By,
+        bounds: Bounds | None = None,
+        sigma: float | Array | None = None,
+        most: int = 100,
+        **path: Any,
+    ) -> Fit:
+        """Inputs with which results are what was measured, by least squares from those given here.
+
+        measured: {(48, 60): {"u_y": 12.4}, "left": {"u_x": 0.3}}: unknowns at places, reactions at
+        sides, at the end, or a list of one number for each step, or {load factor or time: number}.
+        by: as in `Result.sensitivity`. bounds:
+        {("rubber", "mu"): (0, 1)}; parameters and data of pages that are positive stay so, unless
+        their bounds allow other values. sigma: standard deviation of the numbers, one or one for
+        each; without it all count alike, and the covariance comes from their scatter. most:
+        evaluations. path: arguments of `solve`, or of `march` where there is a `dt`. Raises
+        StudyError, and NotConverged where the study as it is given has no solution.
+        """
+        until = finite("until", path.get("until", 1.0))
+        count = path.get("steps", 1)
+        times = until * np.arange(1, count + 1) / count
+        if "dt" in path:
+            times = path["dt"] * np.arange(1, round(until / path["dt"]) + 1)
+        data = Data.read(measured, times)
+        scales = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
+        trials = Trials(asked.inputs(self._statement, by), _runner(self, path))
+        return LeastSquares(trials, data, scales).fit(bounds, most)
+
+
+def _changed(study: S, changes: Sequence[tuple[Input, Array]]) -> S:
+    """A copy of a study with other values of inputs."""
+    statement, other = varied(study._statement, changes), copy(study)
+    other.mesh, other._statement = statement.mesh, statement
+    return other
+
+
+def _runner(study: Solvable, path: Mapping[str, Any]) -> Run:
+    """Results of all steps with other values of inputs."""
+
+    def run(changes: Sequence[tuple[Input, Array]]) -> list[Result]:
+        other, found = _changed(study, changes), list[Result]()
+        given = {"progress": False, "record": True, **path}
+        if "dt" in path:
+            return list(other.march(**given))
+        other.solve(on_step=found.append, **given)
+        return found
+
+    return run
