@@ -1,8 +1,8 @@
 """The dry contact on one mesh: by its path from rest, or from the state of another mesh.
 
 A loaded state of another mesh is carried over and corrected by Newton's method. Where that fails
-the path is taken up at a checkpoint under less pressure, carried in the same way; where no
-checkpoint leads on, at rest, which is the same on every mesh.
+the path is taken up at a checkpoint under less pressure, carried in the same way; where that does
+not lead on either, at rest, which is the same on every mesh.
 """
 
 from __future__ import annotations
@@ -51,14 +51,12 @@ class ContactSolver:
         self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
     ) -> State | StageFailed:
         """The contact state x (n,) of one mesh on another; name: of the stage."""
-        pressure = new.parameters.sealed_pressure
-        found = self._corrected(Checkpoint(old, pressure, x), new, name)
-        for state in self.checkpoints.restarts(new.parameters):
+        p_s, before = new.parameters.sealed_pressure, self.checkpoints.restart(new.parameters)
+        found = self._corrected(Checkpoint(old, p_s, x), new, name)
+        if isinstance(found, StageFailed) and before:
+            found = self._corrected(before, new, f"contact at {before.pressure:.4g} MPa")
             if not isinstance(found, StageFailed):
-                break
-            found = self._corrected(state, new, f"contact at {state.pressure:.4g} MPa")
-            if not isinstance(found, StageFailed):
-                found = self._loaded(new, found, state.pressure)
+                found = self._loaded(new, found, before.pressure)
         if isinstance(found, StageFailed):
             found = self.from_rest(new)
         return found if isinstance(found, StageFailed) else (new, found)
