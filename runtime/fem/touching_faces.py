@@ -71,7 +71,7 @@ class FaceContact:
         return found
 
     def _partners(self, side: Side, at: Array, places: Array) -> list[Partners]:
-        """What the points at one parent place look at: of each kind of the others."""
+        """Partners of the points at one parent place, of each kind of the others."""
         cell = CELLS[side.kind]
         corners = places[side.faces]
         point = np.einsum("k,nkc->nc", cell.shape(at[None])[0], corners)
