@@ -172,7 +172,7 @@ def sweep(
 )
 @click.option("--xlsx", is_flag=True, help="Write its tables beside it, as .xlsx.")
 def report_runs(folders: tuple[Path, ...], out: Path | None, xlsx: bool) -> int:
-    """Report the run in DIR, or several side by side: one file of HTML that works offline.
+    """Report the run in DIR, several side by side, or a sweep: one file of HTML, works offline.
 
     It has what was asked, the gland, the deformed section and the film with a slider over the
     speeds; the curve with errors and verdicts, friction, leakage, tolerances, limits and versions.
@@ -207,13 +207,19 @@ def _report_of(folder: Path, code: int, *, quiet: bool) -> int:
 def _write_report(folders: tuple[Path, ...], path: Path, *, xlsx: bool, quiet: bool) -> None:
     from softehl.cases.harness.errors import BadInput
     from softehl.cases.harness.report.page import parts_of, read_finished, write_page, write_xlsx
+    from softehl.cases.harness.report.sweep_page import is_sweep, read_sweep, sweep_parts
 
     if path.suffix not in (".html", ".htm"):
         raise BadInput(f'--out {str(path)!r}: a report is a page; allowed: a name with ".html"')
-    runs = [read_finished(folder, SHIPPED) for folder in folders]
-    try:
+    runs, title = [], ""
+    if len(folders) == 1 and is_sweep(folders[0]):
+        sweep = read_sweep(folders[0], SHIPPED)
+        parts, title = sweep_parts(sweep), sweep.title
+    else:
+        runs = [read_finished(folder, SHIPPED) for folder in folders]
         parts = parts_of(runs)
-        size = write_page(runs, parts, path)
+    try:
+        size = write_page(runs, parts, path, title)
         if xlsx:
             write_xlsx(parts, path.with_suffix(".xlsx"))
     except OSError as error:

@@ -28,6 +28,8 @@ from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.seal.states.state import Observer as SealObserver
 from softehl.cases.seal.states.state import Outcome as SealOutcome
 
+_THINNEST = "thinnest film [um]"
+
 
 class ORingCase(Case[ORing, FilmRow]):
     """One curve: h* over the rod speed, of both strokes, at one sealed pressure."""
@@ -102,6 +104,22 @@ class ORingCase(Case[ORing, FilmRow]):
     def answer(self, parameters: ORing, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
         return answer(rows, parameters.travel)
+
+    def merits(self, parameters: ORing, rows: Sequence[FilmRow]) -> Mapping[str, float]:
+        """See :class:`Case`; of all speeds the worst."""
+        found = {
+            "largest friction [N]": max(abs(row.rod_friction_N) for row in rows),
+            _THINNEST: min(row.h_min_um for row in rows),
+        }
+        if nets := net_leakage(rows):
+            volume = parameters.travel * max(net.net_mm3_per_mm for net in nets)
+            cycle = f"leakage in a cycle of {parameters.travel:g} mm out and back [mm3]"
+            return {cycle: volume, **found}
+        return found
+
+    def sense(self, merit: str) -> float:
+        """See :class:`Case`."""
+        return -1.0 if merit == _THINNEST else 1.0
 
     def titled(self, parameters: ORing) -> str:
         """See :class:`Case`."""

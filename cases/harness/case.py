@@ -111,6 +111,21 @@ class Case(Generic[P, R]):
         """The main results in words, a line each; what should alarm a reader is an Alarm."""
         return []
 
+    def merits(self, parameters: P, rows: Sequence[R]) -> Mapping[str, float]:
+        """Numbers that runs of a sweep are judged by: words with a unit -> value.
+
+        Of every number of the rows with a head the largest, unless the case knows better.
+        """
+        return {
+            f"largest {c.title}": max(float(getattr(row, c.name)) for row in rows)
+            for c in self.row.columns()
+            if c.head and c.kind is float and c != self.row.key_column()
+        }
+
+    def sense(self, merit: str) -> float:
+        """Sign of a merit, 1 where less is better and -1 where more is."""
+        return 1.0
+
     def titled(self, parameters: P) -> str:
         """Title of a run with these parameters."""
         return self.title

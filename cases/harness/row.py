@@ -5,6 +5,7 @@ run.json, the heads of the table on the terminal and the table in the documentat
 """
 
 import dataclasses
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
@@ -32,6 +33,12 @@ class Column:
     meaning: str
     head: str = ""
     shown: str = ""
+
+    @property
+    def title(self) -> str:
+        """The head of a column for readers: the beginning of its meaning, and its unit."""
+        words = re.split(r"[,;:] |, | \(|: ", self.meaning)[0]
+        return f"{words} [{self.unit}]" if self.unit else words
 
     def read(self, text: str) -> Cell:
         """The value of a cell; that of a number which is not there is nan.  Raises ValueError."""
@@ -68,6 +75,11 @@ class Record:
     def header(cls) -> tuple[str, ...]:
         """The names of the columns: the first line of the file."""
         return tuple(column.name for column in cls.columns())
+
+    @classmethod
+    def titles(cls) -> tuple[str, ...]:
+        """The heads of the columns for readers."""
+        return tuple(column.title for column in cls.columns())
 
     @classmethod
     def parse(cls, cells: Sequence[str]) -> Self:

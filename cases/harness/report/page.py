@@ -30,8 +30,7 @@ def read_finished(folder: Path, shipped: Mapping[str, str]) -> FinishedRun:
         content = read_json(folder / "run.json")
         if "points" in content:
             raise BadInput(
-                f"{folder} holds a sweep, which has no report: its results are in sweep.csv and "
-                f"response_*.png; its runs can be reported, as in softehl report "
+                f"{folder} holds a sweep; allowed: one sweep alone, or runs, as in softehl report "
                 f"{folder}/runs/00001 {folder}/runs/00002"
             )
         case = load_case(shipped[content["case"]])
@@ -45,9 +44,14 @@ def read_finished(folder: Path, shipped: Mapping[str, str]) -> FinishedRun:
     return FinishedRun(folder, case, parameters, curve.rows, rejected.rows, content)
 
 
-def write_page(runs: Sequence[FinishedRun], parts: Sequence[Part], path: Path) -> int:
-    """Write a report; returns its size in bytes.  Raises OSError, and BadInput without Bokeh."""
-    text = render(runs, parts)
+def write_page(
+    runs: Sequence[FinishedRun], parts: Sequence[Part], path: Path, title: str = ""
+) -> int:
+    """Write a report; returns its size in bytes.  Raises OSError, and BadInput without Bokeh.
+
+    title: that of a page on something else than runs.
+    """
+    text = render(runs, parts, title or _title(runs))
     write_text(path, text)
     return len(text.encode())
 
@@ -71,7 +75,7 @@ def parts_of(runs: Sequence[FinishedRun]) -> list[Part]:
     return [*parts, _all_rows(runs), _all_keys(runs), _versions(runs)]
 
 
-def render(runs: Sequence[FinishedRun], parts: Sequence[Part]) -> str:
+def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str) -> str:
     """The page, with everything that it needs."""
     try:
         from bokeh.embed import components
@@ -89,7 +93,7 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part]) -> str:
     page.tests["alarm"] = lambda line: isinstance(line, Alarm)
     page.filters["base64"] = lambda data: base64.b64encode(data).decode()
     return page.get_template("report.html").render(
-        title=_title(runs),
+        title=title,
         runs=runs,
         parts=parts,
         resources=resources.render() if plots else "",
@@ -196,7 +200,7 @@ def _side_by_side(runs: Sequence[FinishedRun]) -> Part:
             rows.append([at, *values, *changes])
         header = [f"{key.head} [{key.unit}]", *(run.name for run in runs)]
         header += [f"{run.name}, difference in %" for run in others]
-        tables.append(Table(f"{column.name}: {column.meaning}", header, rows))
+        tables.append(Table(column.title, header, rows))
     words = "" if common else "The runs share no row."
     return Part("Side by side", words, tables=tables if common else [])
 
@@ -208,9 +212,8 @@ def _percent(value: float, reference: float) -> float:
 def _all_rows(runs: Sequence[FinishedRun]) -> Part:
     tables = []
     for run in runs:
-        columns = run.case.row.columns()
-        header = [f"{c.name}" for c in columns]
-        tables.append(Table(f"{run.name}: curve.csv", header, [row.cells() for row in run.rows]))
+        header, cells = run.case.row.titles(), [row.cells() for row in run.rows]
+        tables.append(Table(f"{run.name}: every state", header, cells))
     return Part("All columns", tables=tables, folded=True)
 
 

@@ -15,6 +15,8 @@ from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 
 _WIDTH, _HEIGHT = 460, 300
+_LEAST = 300  # px of a plot
+_WRAP = ":host { flex-wrap: wrap; }"
 _POINTS = 400  # of a profile at most
 _SPEED, _FILM = "rod speed |U| [mm/s]", "film thickness h* [µm]"
 _DASHES = {"out": "solid", "in": "dashed"}
@@ -51,13 +53,13 @@ def film_plot(run: FinishedRun) -> Any:
         panel.legend.orientation = "horizontal"
         panel.add_layout(panel.legend[0], "above")
     titles = [f"{run.name}: |U| = {speed:g} mm/s" for speed in speeds]
-    both = row(*panels)
+    both = row(*panels, sizing_mode="stretch_width", stylesheets=[_WRAP])
     if len(speeds) == 1:
         return both
     slider = Slider(start=0, end=len(speeds) - 1, value=0, step=1, title=titles[0], name="speed")
-    slider.update(show_value=False, width=2 * _WIDTH)
+    slider.update(show_value=False, sizing_mode="stretch_width", max_width=2 * _WIDTH)
     slider.js_on_change("value", CustomJS(args={"pairs": pairs, "titles": titles}, code=_MOVE))
-    return column(slider, both)
+    return column(slider, both, sizing_mode="stretch_width")
 
 
 def profiles_of(run: FinishedRun, speeds: Sequence[float]) -> tuple[Profiles, dict[str, Any]]:
@@ -96,12 +98,17 @@ def _line(run: FinishedRun, row: FilmRow | None) -> dict[str, list[float]]:
     }
 
 
+def _narrow(width: int) -> dict[str, Any]:
+    """A width that shrinks with the window, so that a telephone shows the whole plot."""
+    return {"width_policy": "max", "max_width": width, "min_width": min(width, _LEAST)}
+
+
 def _panel(label: str, limits: dict[str, Any], *, log: bool) -> Any:
     from bokeh.plotting import figure
 
     panel = figure(
-        width=_WIDTH,
         height=_HEIGHT,
+        **_narrow(_WIDTH),
         x_range=limits["x"],
         y_range=limits["h" if log else "p"],
         y_axis_type="log" if log else "linear",
@@ -179,7 +186,7 @@ def _over_speed(runs: Sequence[FinishedRun], label: str) -> Any:
     from bokeh.plotting import figure
 
     panel = figure(
-        width=int(1.4 * _WIDTH),
+        **_narrow(int(1.4 * _WIDTH)),
         height=int(1.2 * _HEIGHT),
         x_axis_type="log",
         y_axis_type="log",

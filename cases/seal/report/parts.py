@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
+from softehl.cases.harness.row import Record
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.oils import is_grade
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
@@ -23,6 +24,7 @@ from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.report.stribeck import stribeck_figure
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.states.observer_adapter import read_profile, read_section
+from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import read_csv
 
 if TYPE_CHECKING:
@@ -39,7 +41,34 @@ def parts(runs: Sequence[FinishedRun]) -> list[Part]:
         found = [_gland(runs), *_rubber(runs), _section(runs)]
         surfaces, curve = _surfaces(runs), _curve(runs)
     found += [_film(runs), curve, _friction(runs), *_leakage(runs), *surfaces]
-    return [*found, _tolerances(runs)]
+    return [*_compared(runs), *found, _tolerances(runs)]
+
+
+def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
+    """Materials, and leakage of a cycle, of several runs side by side."""
+    if len(runs) < 2:
+        return []
+    p = [run.parameters for run in runs]
+    names = [run.name for run in runs]
+    rows: list[tuple[Cell, ...]] = [
+        ("rubber", *(q.compound or q.material for q in p), ""),
+        ("shear modulus", *(q.shear_modulus for q in p), "MPa"),
+        ("oil", *(q.oil or "by its viscosity" for q in p), ""),
+        ("viscosity", *(q.viscosity * 1e9 for q in p), "mPa s"),
+        ("sealed pressure", *(q.sealed_pressure for q in p), "MPa"),
+        ("rms height of the seal", *(q.roughness[1] for q in p), "um"),
+    ]
+    tables = [Table("Materials", ("", *names, "unit"), rows)]
+    nets = [{row.speed_mm_s: row for row in net_leakage(run.rows)} for run in runs]
+    shared = [speed for speed in nets[0] if all(speed in net for net in nets[1:])]
+    if shared:
+        cells = [
+            (s, *(q.travel * net[s].net_mm3_per_mm for q, net in zip(p, nets, strict=True)))
+            for s in shared
+        ]
+        caption = "Leakage in a cycle out and back [mm3]; negative: dry on balance"
+        tables.append(Table(caption, ("rod speed |U| [mm/s]", *names), cells))
+    return [Part("Materials and leakage side by side", tables=tables)]
 
 
 def _gland(runs: Sequence[FinishedRun]) -> Part:
@@ -136,7 +165,7 @@ def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
         rows = net_leakage(run.rows)
         if rows:
             travel = run.parameters.travel
-            header = (*LeakageRow.header(), f"mm3 in a cycle of {travel:g} mm out and back")
+            header = (*LeakageRow.titles(), f"in a cycle of {travel:g} mm out and back [mm3]")
             cells = [(*row.cells(), travel * row.net_mm3_per_mm) for row in rows]
             tables.append(Table(run.name, header, cells))
     text = (
@@ -153,7 +182,7 @@ def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
             pictures.append(Picture(run.name, _png(figure)))
         if any(isfinite(row.lambda_ratio) for row in run.rows):
             rows = [[getattr(row, name) for name in _SURFACE] for row in run.rows]
-            tables.append(Table(run.name, _SURFACE, rows))
+            tables.append(Table(run.name, _titles(FilmRow, _SURFACE), rows))
     text = (
         "Friction over eta U / p with the regimes, and what asperities carry. Lambda is the mean "
         "gap over the roughness of both surfaces."
@@ -165,6 +194,11 @@ _SURFACE = (
     *("rod_speed_mm_s", "lambda_ratio", "regime", "mean_gap_um"),
     *("asperity_load_percent", "boundary_friction_percent"),
 )
+
+
+def _titles(kind: type[Record], names: Sequence[str]) -> list[str]:
+    """Heads of some columns for readers."""
+    return [column.title for column in kind.columns() if column.name in names]
 
 
 def _tolerances(runs: Sequence[FinishedRun]) -> Part:
@@ -206,7 +240,7 @@ def _bands(run: FinishedRun) -> list[Table]:
         rows = [ToleranceRow.parse(row).cells() for row in cells]
     except (OSError, ValueError):
         return []
-    return [Table(f"{run.name}: changes that follow", ToleranceRow.header(), rows)]
+    return [Table(f"{run.name}: changes that follow", ToleranceRow.titles(), rows)]
 
 
 def _tornados(runs: Sequence[FinishedRun]) -> list[Picture]:

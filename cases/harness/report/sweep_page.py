@@ -1,0 +1,191 @@
+"""Report of a sweep: runs compared by the numbers that the case judges them by."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+from pathlib import Path
+from typing import Any
+
+from softehl.cases.harness.case import AnyCase, load_case
+from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.parameters import keys_of
+from softehl.cases.harness.report.page import read_finished
+from softehl.cases.harness.report.part import FinishedRun, Part, Table
+from softehl.cases.harness.responses import titled, titled_value
+from softehl.runtime.io import Cell, read_json
+
+_HEIGHT, _WIDTH, _LEAST = 320, 620, 300  # px
+_COLOURS = ("#1b6ca8", "#c8553d", "#4f8a52", "#7a5195", "#b58900", "#444444")
+
+
+@dataclass(frozen=True)
+class Point:
+    """A run of a sweep: its number, the values of its keys, how it ended, the run, its numbers."""
+
+    number: int
+    values: Mapping[str, Cell]
+    status: str
+    run: FinishedRun | None
+    merits: Mapping[str, float]
+
+    def merit(self, name: str) -> float:
+        """A number that the run is judged by, nan where it has none."""
+        return self.merits.get(name, nan)
+
+
+@dataclass(frozen=True)
+class FinishedSweep:
+    """A sweep in a folder. keys: those that varied -> their units."""
+
+    case: AnyCase
+    keys: Mapping[str, str]
+    points: Sequence[Point]
+    title: str
+
+    @property
+    def names(self) -> list[str]:
+        """The numbers that runs are judged by."""
+        return list(dict.fromkeys(name for point in self.points for name in point.merits))
+
+    def words(self, point: Point, keys: Sequence[str]) -> str:
+        """The values of some keys of a run in words."""
+        return ", ".join(titled_value(k, point.values[k], self.keys[k]) for k in keys)
+
+
+def is_sweep(folder: Path) -> bool:
+    """True if a folder holds a sweep."""
+    try:
+        return "points" in read_json(folder / "run.json")
+    except (OSError, ValueError, TypeError):
+        return False
+
+
+def read_sweep(folder: Path, shipped: Mapping[str, str]) -> FinishedSweep:
+    """The sweep in a folder.  Raises BadInput where it cannot be read or has no result yet."""
+    try:
+        content = read_json(folder / "run.json")
+        case = load_case(shipped[content["case"]])
+        with (folder / "sweep.csv").open(encoding="utf-8", newline="") as file:
+            rows = {int(row["run"]): row for row in csv.DictReader(file)}
+        units = {key.name: key.unit for key in keys_of(case.parameters)}
+        keys = {key: units[key] for key in content["keys"]}
+        points = [_point(folder, number, row, keys, shipped) for number, row in rows.items()]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        reason = " ".join(str(error).split())[:120]
+        raise BadInput(f"{folder} holds no sweep that can be read: {reason}") from None
+    found = [point.run for point in points if point.run is not None and point.run.rows]
+    if not found:
+        raise BadInput(f"{folder} has no result yet: nothing to report")
+    names = ", ".join(keys)
+    return FinishedSweep(case, keys, points, f"{case.titled(found[0].parameters)}; over {names}")
+
+
+def sweep_parts(sweep: FinishedSweep) -> list[Part]:
+    """Best and worst runs, a table and a plot of each number, every run."""
+    keys = list(sweep.keys)
+    parts = [_best(sweep)]
+    for name in sweep.names:
+        tables = [_pivot(sweep, name)] if len(keys) > 1 else []
+        parts.append(Part(name, plots=[_plot(sweep, name)], tables=tables))
+    return [*parts, _every(sweep)]
+
+
+def _point(
+    folder: Path, number: int, row: Mapping[str, str], keys: Mapping[str, str], shipped: Any
+) -> Point:
+    try:
+        run: FinishedRun | None = read_finished(folder / "runs" / f"{number:05d}", shipped)
+    except BadInput:  # it is not possible, or did not begin
+        run = None
+    merits = run.case.merits(run.parameters, run.rows) if run and run.rows else {}
+    values = {key: _value(row[key]) for key in keys}
+    return Point(number, values, row["status"], run, merits)
+
+
+def _value(text: str) -> Cell:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _best(sweep: FinishedSweep) -> Part:
+    """The runs with the least and the largest number of each kind."""
+    rows: list[Sequence[Cell]] = []
+    for name in sweep.names:
+        known = [p for p in sweep.points if isfinite(p.merit(name))]
+        if not known:
+            continue
+        best = min(known, key=lambda p: p.merit(name) * sweep.case.sense(name))
+        worst = max(known, key=lambda p: p.merit(name) * sweep.case.sense(name))
+        cells = [
+            cell
+            for p in (best, worst)
+            for cell in (p.merit(name), f"{sweep.words(p, list(sweep.keys))} (run {p.number})")
+        ]
+        rows.append((name, *cells))
+    table = Table("Of all runs with a result", ("", "best", "at", "worst", "at"), rows)
+    wrong = [p for p in sweep.points if p.status != "converged"]
+    lines = [f"run {p.number}, {sweep.words(p, list(sweep.keys))}: {p.status}" for p in wrong]
+    return Part("Best and worst", tables=[table], lines=lines)
+
+
+def _pivot(sweep: FinishedSweep, name: str) -> Table:
+    """A number over the last key (columns) and all others (rows)."""
+    *others, last = sweep.keys
+    columns = list(dict.fromkeys(p.values[last] for p in sweep.points))
+    found: dict[str, dict[Cell, float]] = {}
+    for p in sweep.points:
+        found.setdefault(sweep.words(p, others), {})[p.values[last]] = p.merit(name)
+    header = ("", *(titled_value(last, value, sweep.keys[last]) for value in columns))
+    rows = [(words, *(cells.get(c, nan) for c in columns)) for words, cells in found.items()]
+    return Table(name, header, rows)
+
+
+def _plot(sweep: FinishedSweep, name: str) -> Any:
+    """A number over the first key, a line for each value of the others."""
+    from bokeh.plotting import figure
+
+    first, *others = sweep.keys
+    along = list(dict.fromkeys(p.values[first] for p in sweep.points))
+    numbers = all(isinstance(value, float) for value in along)
+    size: dict[str, Any] = {} if numbers else {"x_range": [str(value) for value in along]}
+    panel = figure(
+        height=_HEIGHT,
+        width_policy="max",
+        max_width=_WIDTH,
+        min_width=_LEAST,
+        x_axis_label=titled(first, sweep.keys[first]),
+        y_axis_label=name,
+        tools="pan,box_zoom,wheel_zoom,reset,save",
+        **size,
+    )
+    panel.toolbar.logo = None
+    lines: dict[str, list[tuple[Any, float]]] = {}
+    for p in sweep.points:
+        if isfinite(p.merit(name)):
+            at = p.values[first] if numbers else str(p.values[first])
+            lines.setdefault(sweep.words(p, others), []).append((at, p.merit(name)))
+    for number, (words, points) in enumerate(lines.items()):
+        x, y = zip(*(sorted(points) if numbers else points), strict=True)
+        look = {"color": _COLOURS[number % len(_COLOURS)]}
+        label = {"legend_label": words} if words and len(lines) <= len(_COLOURS) else {}
+        panel.line(x, y, **look, **label)
+        panel.scatter(x, y, size=6, **look, **label)
+    if panel.legend:
+        panel.add_layout(panel.legend[0], "above")
+    return panel
+
+
+def _every(sweep: FinishedSweep) -> Part:
+    """Every run with its keys and numbers."""
+    heads = (titled(key, unit) for key, unit in sweep.keys.items())
+    rows = [
+        (p.number, *p.values.values(), p.status, *(p.merit(name) for name in sweep.names))
+        for p in sweep.points
+    ]
+    table = Table("Every run", ("run", *heads, "status", *sweep.names), rows)
+    return Part("All runs", tables=[table], folded=True)
