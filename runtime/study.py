@@ -21,7 +21,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.begin import beginning
-from softehl.runtime.engines.engine import AnyEngine, Serial, engine_of
+from softehl.runtime.engines.engine import AnyEngine, Linear, Serial, engine_of
 from softehl.runtime.equations import equations
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.kernels import Kernel
@@ -226,6 +226,7 @@ class Study:
         newton: Newton | None = None,
         on_step: Callable[[Result], object] | None = None,
         engine: AnyEngine = None,
+        linear: Linear | None = None,
         write: str | Path | Series | None = None,
         progress: bool | None = None,
     ) -> Result:
@@ -237,15 +238,16 @@ class Study:
         fails and grow again; history is committed after each. on_step is given the result of every
         converged step, write: a .pvd file that names them all. progress: tell of each step on
         stderr; None: in one line, on a terminal only. engine: "serial", "petsc" (on all processes
-        that mpirun started) or an engine with settings. Raises StudyError; NotConverged if the end
-        is not reached: its `reached` is the last Result, or None.
+        that mpirun started) or an engine with settings. linear: "matrix-free" for large bodies of
+        pages with products, see docs/matrix-free.md; None: the engine's own. Raises StudyError;
+        NotConverged if the end is not reached: its `reached` is the last Result, or None.
         """
         if not (isinstance(steps, int) and steps > 0):
             raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
         until = read.finite("until", until)
         if on_step is not None:
             read.function("on_step", on_step, "result")
-        where = engine_of(engine)
+        where = engine_of(engine, linear)
         system = where.spread(self.system())
         begin = beginning(system, start)
         told = Telling(progress, system.share.first, "load factor", begin[0])

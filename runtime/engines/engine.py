@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.newton import Newton
@@ -24,6 +24,8 @@ class Engine(Protocol):
 
 AnyEngine: TypeAlias = "str | Engine | None"
 """An engine, or the name of one; None is "serial"."""
+Linear: TypeAlias = Literal["matrix-free"]
+"""Linear solvers that `Study.solve` names; without one the engine's own."""
 
 
 class Serial:
@@ -38,8 +40,19 @@ class Serial:
         return given or Newton(linear=choose("auto"))
 
 
-def engine_of(engine: AnyEngine) -> Engine:
-    """The engine of that name.  Raises StudyError for an unknown one, MissingPetsc."""
+def engine_of(engine: AnyEngine, linear: Linear | None = None) -> Engine:
+    """The engine of that name, or of a linear solver, which is an engine too.
+
+    Raises StudyError for an unknown one, MissingPetsc.
+    """
+    if linear is not None:
+        if linear != "matrix-free":
+            raise StudyError(f'linear = {linear!r}: allowed is "matrix-free"')
+        if engine is not None:
+            raise StudyError('linear = "matrix-free" is an engine by itself: leave engine out')
+        from softehl.runtime.engines.matrix_free import MatrixFree
+
+        return MatrixFree()
     if engine is None or engine == "serial":
         return Serial()
     if engine == "petsc":

@@ -1,0 +1,104 @@
+"""Multigrid as a preconditioner: Chebyshev smoothing on every level, any solver on the coarsest.
+
+Every level but the coarsest knows its operator as a function, its diagonal and the interpolation
+from the next one. A cycle is symmetric, and so fit for conjugate gradients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from softehl.runtime.arrays import Array
+
+Apply = Callable[[Array], Array]
+
+DEGREE = 3
+"""Products in one smoothing."""
+RANGE = 20.0
+"""Part of the largest eigenvalue down to which eigenvalues are smoothed. Of degrees 2 to 8 and
+ranges 10 to 40, these need at most 10 % more products than the best, for nu = 0.3 to 0.499.
+"""
+_POWERS = 12  # products for an estimate of the largest eigenvalue, which is then raised by a tenth
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """An operator with its diagonal (n,), and the interpolation (n, m) from the next level.
+
+    top: largest eigenvalue of the operator over its diagonal.
+    """
+
+    apply: Apply
+    diagonal: Array
+    interpolation: csr_array
+    top: float
+
+    @classmethod
+    def of(cls, apply: Apply, diagonal: Array, interpolation: csr_array) -> Level:
+        """With an estimate of the largest eigenvalue."""
+        safe = np.where(diagonal > 0.0, diagonal, 1.0)
+        return cls(apply, safe, interpolation, 1.1 * largest(apply, safe))
+
+    def smoothed(self, b: Array, x: Array | None) -> Array:
+        """x after a smoothing of A x = b; None: from zero, which spares a product."""
+        centre = 0.5 * self.top * (1.0 + 1.0 / RANGE)
+        half = 0.5 * self.top * (1.0 - 1.0 / RANGE)
+        r = b if x is None else b - self.apply(x)
+        x = np.zeros_like(b) if x is None else x
+        step = r / self.diagonal / centre
+        rho = half / centre
+        for k in range(DEGREE):
+            x = x + step
+            if k == DEGREE - 1:
+                break
+            r = r - self.apply(step)
+            following = 1.0 / (2.0 * centre / half - rho)
+            step = following * rho * step + 2.0 * following / half * r / self.diagonal
+            rho = following
+        return x
+
+
+@dataclass(frozen=True, eq=False)
+class Multigrid:
+    """Levels, the finest first, and a solver of the coarsest."""
+
+    levels: Sequence[Level]
+    coarsest: Apply
+
+    def __call__(self, b: Array) -> Array:
+        """One cycle for A x = b from zero."""
+        return self._cycle(b, 0)
+
+    def _cycle(self, b: Array, k: int) -> Array:
+        if k == len(self.levels):
+            return self.coarsest(b)
+        level = self.levels[k]
+        x = level.smoothed(b, None)
+        r = level.interpolation.T @ (b - level.apply(x))
+        x = x + level.interpolation @ self._cycle(r, k + 1)
+        return level.smoothed(b, x)
+
+
+def largest(apply: Apply, diagonal: Array) -> float:
+    """Largest eigenvalue of an operator over its diagonal, estimated by Lanczos' method."""
+    root = 1.0 / np.sqrt(diagonal)
+    v = np.random.default_rng(0).uniform(-1.0, 1.0, len(diagonal))
+    v /= np.linalg.norm(v)
+    before, off = np.zeros_like(v), 0.0
+    alphas, betas = [], []
+    for _ in range(_POWERS):
+        w = root * apply(root * v) - off * before
+        alphas.append(float(w @ v))
+        w -= alphas[-1] * v
+        off = float(np.linalg.norm(w))
+        if not off > 1e-12 * abs(alphas[0]):
+            break
+        betas.append(off)
+        before, v = v, w / off
+    size = len(alphas)
+    T = np.diag(alphas) + np.diag(betas[: size - 1], 1) + np.diag(betas[: size - 1], -1)
+    return float(np.abs(np.linalg.eigvalsh(T)).max())
