@@ -39,6 +39,7 @@ def coarse_solver(A: csr_array, near: Array, block: int) -> Apply:
         presmoother=("block_gauss_seidel", {"sweep": "symmetric"}),
         postsmoother=("block_gauss_seidel", {"sweep": "symmetric"}),
         max_coarse=500,
+        coarse_solver="splu",  # its own choice, a pseudo-inverse, takes ten seconds
     )
     cycle = solver.aspreconditioner(cycle="V")
     return lambda b: np.asarray(cycle @ b)

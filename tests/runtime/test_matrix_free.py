@@ -43,6 +43,16 @@ def carried(m: Fields) -> None:
     m.offer(product=True)
 
 
+@softehl.page
+def warming(m: Fields) -> None:
+    """Heat in time."""
+    T = m.scalar("T")
+    (k,) = m.parameters(k="conductivity")
+    m.weak(k * m.grad(T), m.grad(T))
+    m.weak(m.rate(T), T)
+    m.offer(product=True)
+
+
 def block(order: int, nu: float, cells: tuple[int, int, int] = (3, 3, 3)) -> Study:
     """A block of rubber that is held below, pushed, pressed and on springs."""
     mesh = Mesh.box((1, 1, 1), cells=cells, order=order)
@@ -190,3 +200,14 @@ def test_negative_curvature_ends_conjugate_gradients(rng: np.random.Generator) -
     found = conjugate_gradients(shifted.__matmul__, lambda r: r, b, 1e-12, 30)
     assert found.negative
     assert found.x @ b > 0.0
+
+
+def test_a_march_without_matrices() -> None:
+    study = Study(Mesh.rectangle(1, 1, cells=(3, 3), order=3))
+    study.add("plate", warming, k=1.0)
+    study.start(T=lambda x: np.sin(np.pi * x[:, 0]))
+    study.fix("left", T=0)
+    study.fix("right", T=0)
+    *_, wanted = study.march(dt=0.01, until=0.05)
+    *_, found = study.march(dt=0.01, until=0.05, engine=MatrixFree())
+    assert apart(wanted, found, ("T",)) < 1e-8
