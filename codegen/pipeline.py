@@ -23,7 +23,7 @@ alone, and loops over points and nodes around it (`emit.points`).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import ModuleType
 
 from softehl.codegen.abi import DESIGN, ROLLED, Target, Task, derivative_task
@@ -41,6 +41,7 @@ from softehl.codegen.emit import source as emit_source
 from softehl.codegen.emit import ufcx as emit_ufcx
 from softehl.codegen.emit.order import arranged
 from softehl.codegen.emit.points import constants as emit_constants
+from softehl.codegen.emit.points import factored as emit_factored
 from softehl.codegen.emit.points import family as emit_points
 from softehl.codegen.emit.points.choice import Choice, choose
 from softehl.codegen.emit.points.function import Outputs
@@ -98,7 +99,8 @@ class KernelSource:
     """A kernel family: its model, its C file and its functions by task.
 
     design: a second C file with the tasks of sensitivities, empty where none is offered. shared:
-    files that other families may have, too, by name.
+    files that other families may have, too, by name. kept: numbers that products by sum
+    factorisation keep at a point, 0 where there are none.
     """
 
     definition: Definition
@@ -106,6 +108,7 @@ class KernelSource:
     functions: Mapping[str, Function]
     design: str = ""
     shared: Mapping[str, str] = field(default_factory=dict)
+    kept: int = 0
 
 
 def compile_model(definition: Definition, target: Target = Target.SIMD) -> KernelSource:
@@ -114,7 +117,7 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     if target is Target.UFCX:
         tasks = emit_ufcx.tasks(definition, tasks)
     if target is Target.SIMD and form(definition).at_points:
-        return _at_points(definition, tasks)
+        return _with_action(_at_points(definition, tasks))
     functions = {t: compile_task(definition, t, target) for t in tasks}
     if target is Target.UFCX:
         texts = [f.text for f in functions.values()]
@@ -124,7 +127,28 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     design = [f for t, f in functions.items() if t in DESIGN]
     others = [f for t, f in functions.items() if t not in DESIGN]
     text, more = _file(definition, others), _file(definition, design) if design else ""
-    return KernelSource(definition, text, functions, more)
+    made = KernelSource(definition, text, functions, more)
+    return _with_action(made) if target is Target.SIMD else made
+
+
+def _with_action(made: KernelSource) -> KernelSource:
+    """With a file for products by sum factorisation, where the page offers products on such a cell.
+
+    See `emit.points.factored`.
+    """
+    d = made.definition
+    if d.point is None or Task.PRODUCT not in made.functions:
+        return made
+    layout = Layout(d, d.point)
+    if not emit_factored.fits(layout):
+        return made
+    outputs, plan, called = _ordered(layout, Task.PRODUCT)
+    action = emit_factored.Factored(layout, outputs, plan)
+    before = emit_lane_routines.texts(layout.site, dict.fromkeys(called))
+    text = action.text(before)
+    text = action.text([*emit_lanes.wrappers(text), *before])
+    shared = {**made.shared, f"{d.name}_action.c": text}
+    return replace(made, shared=shared, kept=len(action.kept))
 
 
 def form(d: Definition) -> Choice:
@@ -164,8 +188,21 @@ def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
 
 def _at_point(layout: Layout, task: str) -> Function:
     """One kernel of a page of fields: the function of a point and the loops of the cell."""
+    chosen = _moduli(layout.site, task)
+    outputs, plan, called = _ordered(layout, task, chosen)
+    made = emit_points.kernel(layout, task, outputs, plan)
+    shared = () if made.shared is None else (made.shared,)
+    return Function(
+        made.text, plan, made.temporaries, None, (chosen,), chosen, "points", called, shared
+    )
+
+
+def _ordered(
+    layout: Layout, task: str, chosen: Attempt | None = None
+) -> tuple[Outputs, Schedule, tuple[Routine, ...]]:
+    """Outputs of a task at a point, statements in the printed order, and routines they call."""
     site = layout.site
-    chosen = _moduli(site, task)
+    chosen = chosen or _moduli(site, task)
     entries, plan = chosen.entries, chosen.plan
     called = tuple(emit_routines.called([x.node for x in entries]))
     if is_straight(plan):
@@ -173,12 +210,7 @@ def _at_point(layout: Layout, task: str) -> Function:
         entries, plan = placed(entries, roots), straight_line(order)
     else:
         plan = arranged_plan(site.graph, plan, [x.node for x in entries])
-    outputs = Outputs(entries)
-    made = emit_points.kernel(layout, task, outputs, plan)
-    shared = () if made.shared is None else (made.shared,)
-    return Function(
-        made.text, plan, made.temporaries, None, (chosen,), chosen, "points", called, shared
-    )
+    return Outputs(entries), plan, called
 
 
 def _file(d: Definition, functions: Sequence[Function]) -> str:

@@ -67,7 +67,8 @@ class Family:
     data (n, len(data)), point_data (n, points, len(point_data)), parameters (len(parameters),) or
     a mapping by name, rule None for the model's default (the only one when `unrolled`).
     places: of every unknown its name without number, and its node or None. history: point data
-    whose new values the last fields are. cell: on which a page of fields stands.
+    whose new values the last fields are. cell: on which a page of fields stands. kept: numbers that
+    products by sum factorisation keep at a point, 0 where the family has none.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Family:
     places: tuple[tuple[str, int | None], ...] = ()
     history: tuple[str, ...] = ()
     cell: str = ""
+    kept: int = 0
 
 
 @dataclass(frozen=True, eq=False)

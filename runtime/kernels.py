@@ -134,6 +134,7 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
         places=tuple((n, a) for n, a in entry.get("places", ())),
         history=tuple(entry.get("history", ())),
         cell=entry.get("cell", ""),
+        kept=entry.get("kept", 0),
     )
 
 

@@ -31,13 +31,21 @@ _SIGNATURE = (
     "(ptrdiff_t, ptrdiff_t, ptrdiff_t, const double *, const double *, const double *,"
     " const double *, const double *, const double *, const double *, double *, double *);"
 )
+_ACTION = (
+    "(ptrdiff_t, ptrdiff_t, const double *, const double *, const int *, const double *, double *);"
+)
 _ffi = cffi.FFI()
+_INTS = _ffi.typeof("int[]")
 _DOUBLES = _ffi.typeof("double[]")
 _ffi.cdef("const char *softehl_signature(void);")
 
 Function = Callable[[tuple[int, int, int], Sequence[Array], Array, "Array | None"], None]
 """counts (elements, points, modes), arrays that are read, values and tangent that are written; the
 order and the shapes are those of `codegen/abi.py`."""
+
+
+Action = Callable[[tuple[int, int], Array, Array, Any, Array, Array], None]
+"""Elements (first, last), parameters, what was kept, node numbers, x, and y, which it adds to."""
 
 
 class KernelError(RuntimeError):
@@ -97,6 +105,20 @@ class Library:
         def call(dofs: Array, values: Array, tangent: Array | None) -> None:
             written = _ffi.NULL if tangent is None else _pointer(tangent)
             function(*counts, before, _pointer(dofs), *after, _pointer(values), written)
+
+        return call
+
+    def action(self, kernel: str) -> Action:
+        """The C function of products by sum factorisation; see `codegen.emit.points.factored`."""
+        name = f"softehl_{kernel}_action"
+        _declare(name, _ACTION)
+        function = getattr(self.loaded, name)
+
+        def call(
+            span: tuple[int, int], parameters: Array, kept: Array, index: Any, x: Array, y: Array
+        ) -> None:
+            given = _pointer(parameters), _pointer(kept), _ffi.from_buffer(_INTS, index)
+            function(*span, *given, _pointer(x), _pointer(y))
 
         return call
 
@@ -214,6 +236,6 @@ def _sources_signature(directory: Path) -> str:
 
 
 @cache
-def _declare(name: str) -> None:
+def _declare(name: str, signature: str = _SIGNATURE) -> None:
     """Tell cffi of a C function; to tell it of all of them at once takes half a second."""
-    _ffi.cdef(f"void {name}{_SIGNATURE}")
+    _ffi.cdef(f"void {name}{signature}")

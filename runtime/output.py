@@ -64,11 +64,18 @@ class Picture:
         """Write .vtu, atomically."""
         import meshio  # late: it is slow to import
 
+        small = {kind: _small(kind, nodes) for kind, nodes in self.cells.items()}
         found = meshio.Mesh(
             np.pad(self.points, ((0, 0), (0, 3 - self.points.shape[1]))),
-            [(CELLS[kind].meshio, nodes) for kind, nodes in self.cells.items()],
+            list(small.values()),
             point_data={**self.nodal, **_vectors(self.nodal)},
-            cell_data={name: list(data.values()) for name, data in self.cellwise.items()},
+            cell_data={
+                name: [
+                    np.repeat(values, len(small[kind][1]) // max(len(values), 1))
+                    for kind, values in data.items()
+                ]
+                for name, data in self.cellwise.items()
+            },
         )
         with replacing(path) as temporary:
             meshio.write(temporary, found, file_format="vtu")
@@ -89,6 +96,21 @@ class Picture:
             "</VTKFile>",
         ]
         write_text(path, "\n".join(lines) + "\n")
+
+
+def _small(kind: str, nodes: Integers) -> tuple[str, Integers]:
+    """Cells for a file; those of order 3 and more as linear ones between their nodes."""
+    cell = CELLS[kind]
+    if cell.exponents:
+        return cell.meshio, nodes
+    linear = CELLS[{1: "line2", 2: "quad4", 3: "hex8"}[cell.dimension]]
+    rank = np.argsort(np.argsort(cell.line))[cell.lines]
+    at = np.empty((cell.order + 1,) * cell.dimension, dtype=np.int64)
+    at[tuple(rank.T)] = np.arange(len(nodes[0]))
+    steps = np.moveaxis(np.indices((cell.order,) * cell.dimension), 0, -1)
+    corners = steps.reshape(-1, 1, cell.dimension) + (linear.nodes > 0.0)
+    local = at[tuple(np.moveaxis(corners, -1, 0))]
+    return linear.meshio, nodes[:, local].reshape(-1, len(linear.nodes))
 
 
 def piece_names(path: Path, count: int) -> list[str]:

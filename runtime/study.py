@@ -284,8 +284,9 @@ class Study(Fitted):
         stderr; None: in one line, on a terminal only. engine: "serial", "petsc" (on all processes
         that mpirun started) or an engine with settings. linear: "direct", "superlu" and "pardiso"
         factorise; "amg" is algebraic multigrid (pyamg) for displacements or one scalar; "auto"
-        takes it for large problems. record: results keep the steps before them,
-        which derivatives need where pages have history, and the last factors, which saves time.
+        takes it for large problems; "matrix-free" needs no matrix (docs/matrix-free.md). record:
+        results keep the steps before them, which derivatives need where pages have history, and
+        the last factors, which saves time.
         Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
         or None.
         """
@@ -401,6 +402,8 @@ class Study(Fitted):
             raise StudyError(f"step = {step}: must be positive")
         read.function("until", until, "result")
         require_detect(detect)
+        if linear == "matrix-free":
+            raise StudyError('follow takes no linear = "matrix-free"; leave it out')
         where, other = engine_of(None, linear), start if isinstance(start, Bifurcation) else None
         system = where.spread(self.system())
         begin = beginning(system, start.state if isinstance(start, Bifurcation) else start)

@@ -40,6 +40,8 @@ GROUP = (
     ("double *restrict", "R"),
     ("double *restrict", "K"),
 )
+WIDE = 256
+"""Unknowns of an element above which a group of tangents has no room on a stack."""
 _READ = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
 
 
@@ -357,7 +359,8 @@ def batch(d: Definition, task: str) -> str:
     ]
     used = {k: w for k, w in wide.items() if w != "0"}
     for array, width in used.items():
-        lines.append(f"    double {letters[array]}[SOFTEHL_LANES * {width}];")
+        kept = "static _Thread_local " if array == "tangent" and len(d.unknowns) > WIDE else ""
+        lines.append(f"    {kept}double {letters[array]}[SOFTEHL_LANES * {width}];")
         if array in _READ:
             lines.append(f"    softehl_pad({letters[array]}, {array}, {width}, n);")
     names = [a.split()[-1].strip("*") for a in " ".join(abi.ARGUMENTS).split(",")]

@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.language.definition import Component, Definition
-from softehl.codegen.language.elements.cells import ELEMENTS, Element
+from softehl.codegen.language.elements.cells import ELEMENTS, SHAPES, Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.elements.shapes import interpolate
 from softehl.codegen.language.fields import Fields, Traced
@@ -24,8 +24,9 @@ CORNERS = {
     "tet10": "tet4",
     "hex20": "hex8",
     "hex27": "hex8",
+    **{name: SHAPES[shape][0] for shape in SHAPES for name in SHAPES[shape][2:]},
 }
-"""The linear element with the corners of a quadratic one."""
+"""The linear element with the corners of one of higher order."""
 
 
 class Nodal(Fields):
@@ -46,6 +47,7 @@ class Nodal(Fields):
         self._X = self.coordinates(*"XYZ"[:dimension])
         self._at = self.point()
         self._values: dict[int, list[Any]] = {}
+        self._along: list[tuple[list[Any], list[Any]]] = []
 
     @abstractmethod
     def _slopes_of(self, component: Component, column: Sequence[Any]) -> list[Any]:
@@ -73,10 +75,35 @@ class Nodal(Fields):
         """Shape functions of an order."""
         if order not in self._values:
             label = "" if order == self.order else f"_of_order_{order}"
-            values = self._element(order).shape(*self._at) if order else [sp.Integer(1)]
+            values = self._parent(order)[0] if order else [sp.Integer(1)]
             named = [self.define(f"shape{label}_{a}", v) for a, v in enumerate(values)]
             self._values[order] = named
         return self._values[order]
+
+    def _parent(self, order: int) -> tuple[list[Any], list[tuple[Any, ...]]]:
+        """Shape functions of an order and their gradients by the parent coordinates.
+
+        Those of high order are products of names, or SymPy would need minutes for them.
+        """
+        cell = self._element(order)
+        if cell.lines is None:
+            return cell.shape(*self._at), cell.gradient(*self._at)
+        along = self._along
+        if not along:
+            for k, x in enumerate(self._at):
+                N = cell.along(x)
+                dN = [sp.diff(v, x) for v in N]
+                label = f"along_{'xyz'[k]}"
+                values = [self.define(f"{label}_{a}", v) for a, v in enumerate(N)]
+                slopes = [self.define(f"{label}_slope_{a}", v) for a, v in enumerate(dN)]
+                along.append((values, slopes))
+        axes = range(cell.dimension)
+
+        def product(place: tuple[int, ...], by: int | None) -> Any:
+            return sp.Mul(*(along[k][k == by][place[k]] for k in axes))
+
+        values = [product(place, None) for place in cell.lines]
+        return values, [tuple(product(place, by) for by in axes) for place in cell.lines]
 
     def _components_of(self, components: Sequence[Component]) -> list[Traced]:
         N = self._shape(components[0].order)

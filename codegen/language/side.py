@@ -24,7 +24,7 @@ class Side(Nodal):
         self, name: str, cell: Element, geometry: str, rule: QuadratureRule, doc: str
     ) -> None:
         super().__init__(name, cell, geometry, rule, doc, dimension=cell.dimension + 1)
-        self._tangents = self._along(self._X, [list(g) for g in cell.gradient(*self._at)])
+        self._tangents = self._derived(self._X, self._parent(self.order)[1])
         vector = self.define("reference_area", sp.Matrix(self._crossed(self._tangents)))
         self._area = self.define("size_of_area", sp.sqrt(vector.dot(vector)))
         self._unit = vector / self._area
@@ -59,7 +59,7 @@ class Side(Nodal):
         """Refused: a side knows values alone."""
         raise ModelError(f"grad of {value}: on a side there are values of fields, no gradients")
 
-    def _along(self, columns: Sequence[Sequence[Any]], parent: Sequence[Sequence[Any]]) -> Any:
+    def _derived(self, columns: Sequence[Sequence[Any]], parent: Sequence[Sequence[Any]]) -> Any:
         """Derivatives of nodal values by the parent coordinates, [component][direction]."""
         size = range(self.cell.dimension)
         return [[interpolate([g[k] for g in parent], c) for k in size] for c in columns]
@@ -71,8 +71,8 @@ class Side(Nodal):
         return list(sp.Matrix([c[0] for c in t]).cross(sp.Matrix([c[1] for c in t])))
 
     def _slopes_of(self, component: Component, column: Sequence[Any]) -> list[Any]:
-        parent = [list(g) for g in self._element(component.order).gradient(*self._at)]
-        return list(self._along([column], parent)[0])
+        parent = self._parent(component.order)[1]
+        return list(self._derived([column], parent)[0])
 
     def _volume(self) -> Any:
         if self.geometry == AXISYMMETRIC:

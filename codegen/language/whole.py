@@ -23,13 +23,13 @@ class Whole(Nodal):
         self, name: str, cell: Element, geometry: str, rule: QuadratureRule, doc: str
     ) -> None:
         super().__init__(name, cell, geometry, rule, doc, dimension=cell.dimension)
-        self._map = kinematics.isoparametric(self, self._X, cell.gradient(*self._at))
+        self._map = kinematics.isoparametric(self, self._X, self._parent(self.order)[1])
         self._slopes_by_order = {self.order: self._map.dN}
 
     def _of_cell(self, order: int) -> list[list[Any]]:
         """Gradients of the shape functions of an order."""
         if order not in self._slopes_by_order:
-            parent = self._element(order).gradient(*self._at)
+            parent = self._parent(order)[1]
             rows = [sp.Matrix([list(g)]) * self._map.inverse for g in parent]
             dN = [
                 [self.define(f"slope_of_order_{order}_{a}{k}", v) for k, v in enumerate(row)]

@@ -62,6 +62,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "places": [list(place) for place in d.places],
         "history": list(d.history),
         **({"cell": d.cell} if d.cell else {}),
+        **({"kept": kernel.kept} if kernel.kept else {}),
         "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],
         "fields": [name for name, _ in d.fields],
         "unrolled": any(f.chosen.unrolled for f in kernel.functions.values()),

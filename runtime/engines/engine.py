@@ -57,7 +57,16 @@ class Serial:
 
 
 def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
-    """The engine of that name.  Raises StudyError for an unknown one, MissingPetsc."""
+    """The engine of that name, or of a linear solver that is an engine by itself.
+
+    Raises StudyError for an unknown one, MissingPetsc.
+    """
+    if linear == "matrix-free":
+        if engine is not None:
+            raise StudyError('linear = "matrix-free" is an engine by itself: leave engine out')
+        from softehl.runtime.engines.matrix_free import MatrixFree
+
+        return MatrixFree()
     if engine is None or engine == "serial":
         return Serial(linear)
     if linear != "auto":

@@ -9,14 +9,14 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.names import listed
-from softehl.runtime.solve import multigrid, pardiso
+from softehl.runtime.solve import amg, pardiso
+from softehl.runtime.solve.amg import Modes, Multigrid, OrFactors
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.linear import LinearSolver
-from softehl.runtime.solve.multigrid import Modes, Multigrid, OrFactors
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
 
-Linear: TypeAlias = Literal["auto", "direct", "superlu", "pardiso", "amg"]
+Linear: TypeAlias = Literal["auto", "direct", "superlu", "pardiso", "amg", "matrix-free"]
 
 FACTORS_UP_TO = {1: np.inf, 2: 1e5, 3: 1e4}
 """Dimension -> unknowns up to which factors by SuperLU are the default.
@@ -48,7 +48,7 @@ def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callabl
     modes = nodal_modes(system)
     if modes is None:
         why = "multigrid needs the components of one vector, or one scalar, as the only unknowns"
-    elif not multigrid.available():
+    elif not amg.available():
         why = "pyamg is not installed: pip install 'softehl[fast]'"
     elif linear == "amg":
         return Multigrid(modes), lambda: f"multigrid, {size}"

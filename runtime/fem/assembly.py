@@ -22,6 +22,7 @@ Again: TypeAlias = Callable[[Array, Array, Array | None], None]
 """A task of a kernel: of its unknowns, and of the values and the tangent that it writes."""
 
 _PIECE = 1 << 18  # entries of the tangents that are evaluated before they are added up
+_GROUP = 8  # elements that a kernel evaluates at once at most
 _SETS = 4  # sets of prescribed unknowns that are remembered
 
 
@@ -147,7 +148,7 @@ class ElementBlock:
     def pieces(self, scatter: Integers) -> Iterator[tuple[ElementBlock, Integers]]:
         """Parts of the block whose tangents fit into a core's cache, with theirs of `scatter`."""
         n = len(self.dofs)
-        step = max(_PIECE // max(self.dofs.shape[1] ** 2, 1), 1)
+        step = max(_PIECE // max(self.dofs.shape[1] ** 2, 1), _GROUP)
         if n <= step:
             yield self, scatter
             return

@@ -1,7 +1,9 @@
 """The kinds of cells: parent nodes, shape functions and faces, in the node order of VTK and meshio.
 
 Corners first, then the middles of edges, of faces, of the cell. Quadrilaterals and hexahedra live
-on [-1, 1]^d, triangles and tetrahedra on the unit simplex, wedges on triangle x [-1, 1].
+on [-1, 1]^d, triangles and tetrahedra on the unit simplex, wedges on triangle x [-1, 1]. Lines,
+quadrilaterals and hexahedra of order 3 to 6 have the nodes of Gauss and Lobatto along every line;
+those inside an edge, a face or the cell follow one another with x running first, then y, then z.
 """
 
 from __future__ import annotations
@@ -14,9 +16,10 @@ from math import factorial
 from typing import TypeAlias
 
 import numpy as np
+from numpy.polynomial import Legendre
 from scipy.special import roots_jacobi, roots_legendre
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 
 Groups: TypeAlias = tuple[tuple[int, ...], ...]
 _Kind: TypeAlias = tuple[str, str, Groups, Groups, tuple[str, ...]]
@@ -73,16 +76,47 @@ class Cell:
 
     def shape(self, at: Array) -> Array:
         """Shape functions (q, k) at parent points (q, dim)."""
+        if not self.exponents:
+            return self._products(np.asarray(at, dtype=np.float64), None)
         return _monomials(at, self.exponents) @ self._coefficients
 
     def gradient(self, at: Array) -> Array:
         """Their derivatives (q, k, dim) by the parent coordinates."""
+        if not self.exponents:
+            at = np.asarray(at, dtype=np.float64)
+            return np.stack([self._products(at, d) for d in range(self.dimension)], axis=2)
         parts = []
         for d in range(self.dimension):
             factor = [e[d] for e in self.exponents]
             lowered = [tuple(max(e - (i == d), 0) for i, e in enumerate(x)) for x in self.exponents]
             parts.append((_monomials(at, lowered) * factor) @ self._coefficients)
         return np.stack(parts, axis=2)
+
+    @cached_property
+    def line(self) -> Array:
+        """Nodes of the line that a product of lines is made of: ends first, then rising."""
+        found = np.unique(self.nodes[:, 0])
+        return np.concatenate([found[[0, -1]], found[1:-1]])
+
+    @cached_property
+    def lines(self) -> Integers:
+        """Numbers of nodes of the line along the directions, (k, dim), of a product of lines."""
+        return np.asarray(np.abs(self.nodes[:, :, None] - self.line).argmin(axis=2))
+
+    @property
+    def order(self) -> int:
+        """Of the shape functions along an edge."""
+        if len(self.nodes) == self.corners:
+            return 1
+        return 2 if self.exponents else len(self.line) - 1
+
+    def _products(self, at: Array, by: int | None) -> Array:
+        """Products (q, k) of Lagrange's polynomials; along `by` their derivatives."""
+        found = np.ones((len(at), len(self.nodes)))
+        for d in range(self.dimension):
+            values = lagrange(self.line, at[:, d])[int(d == by)]
+            found *= values[:, self.lines[:, d]]
+        return found
 
     @cached_property
     def side_nodes(self) -> tuple[tuple[Cell, tuple[int, ...]], ...]:
@@ -107,6 +141,23 @@ class Cell:
     def rule(self, degree: int) -> tuple[Array, Array]:
         """Points (q, dim) and weights (q,) that integrate polynomials of a degree exactly."""
         return _rule(self.corners, self.dimension, degree)
+
+
+def lagrange(nodes: Array, x: Array) -> tuple[Array, Array]:
+    """Lagrange's polynomials of nodes (k,) and their derivatives at x (q,): both (q, k)."""
+    values, slopes = np.ones((len(x), len(nodes))), np.zeros((len(x), len(nodes)))
+    for a, node in enumerate(nodes):
+        for b in np.delete(nodes, a):
+            slopes[:, a] = (slopes[:, a] * (x - b) + values[:, a]) / (node - b)
+            values[:, a] *= (x - b) / (node - b)
+    return values, slopes
+
+
+def lobatto(order: int) -> Array:
+    """Points of Gauss and Lobatto on [-1, 1], (order + 1,), rising."""
+    inside = np.sort(Legendre.basis(order).deriv().roots().real)
+    inside = 0.5 * (inside - inside[::-1])  # exactly symmetric
+    return np.concatenate([[-1.0], inside, [1.0]])
 
 
 def _monomials(at: Array, exponents: Sequence[tuple[int, ...]]) -> Array:
@@ -145,6 +196,30 @@ def _means(corners: Sequence[tuple[int, ...]], groups: Sequence[tuple[int, ...]]
     """The corners and the means of groups of them."""
     first = np.array(corners, dtype=np.float64)
     return np.vstack([first, *(first[list(g)].mean(axis=0)[None] for g in groups)])
+
+
+def _between(corners: Sequence[tuple[int, ...]], groups: Groups, order: int) -> Array:
+    """The corners, and the nodes inside edges, faces and cell, x running first."""
+    inner, found = lobatto(order)[1:-1], [np.array(corners, dtype=np.float64)]
+    for group in groups:
+        ends = [sorted({corners[k][d] for k in group}) for d in range(len(corners[0]))]
+        lines = [inner if len(some) > 1 else np.array(some, dtype=np.float64) for some in ends]
+        found.append(np.array([place[::-1] for place in product(*reversed(lines))]))
+    return np.vstack(found)
+
+
+def _high(shape: str, corners: Groups, sides: Groups, groups: Groups) -> list[Cell]:
+    """Products of lines of order 3 to 6."""
+    found, dimension = [], len(corners[0])
+    file = {"line": "line", "quad": "quad", "hex": "hexahedron"}[shape]
+    face = {"line": "", "quad": "line", "hex": "quad"}[shape]
+    for order in range(3, HIGHEST + 1):
+        count = (order + 1) ** dimension
+        faces = f"{face}{(order + 1) ** (dimension - 1)}" if face else "point1"
+        nodes = _between(corners, groups, order)
+        name = f"{shape}{count}"
+        found.append(Cell(name, f"{file}{count}", nodes, (), len(corners), sides, (faces,)))
+    return found
 
 
 def _powers(dimension: int, largest: int, total: int, squares: int) -> tuple[tuple[int, ...], ...]:
@@ -204,11 +279,16 @@ def _cells() -> dict[str, Cell]:
                 ("hex27", "hexahedron27", hex27_groups, _powers(3, 2, 6, 3), ("quad9",)),
             ],
         ),
+        *_high("line", _ENDS, _LINE_SIDES, ((0, 1),)),
+        *_high("quad", _SQUARE, _SQUARE_SIDES, quad9_groups),
+        *_high("hex", _CUBE, _CUBE_SIDES, hex27_groups),
         *_family(_WEDGE, _WEDGE_SIDES, [("wedge6", "wedge", (), wedge, ("tri3", "quad4"))]),
     ]
     return {cell.name: cell for cell in found}
 
 
+HIGHEST = 6
+"""Order of shape functions up to which there are lines, quadrilaterals and hexahedra."""
 _LINEAR = {(1, 0): "point1", (2, 1): "line2", (3, 2): "tri3", (4, 2): "quad4"}
 CELLS = _cells()
 """Every kind of cell by its name."""

@@ -43,7 +43,7 @@ def _by_meshio(path: Path) -> gmsh.Content:
     cells: dict[str, list[Integers]] = {}
     names: dict[str, dict[str, list[Integers]]] = {name: {} for name in found.cell_sets}
     for number, block in enumerate(found.cells):
-        if block.type not in BY_FILE:
+        if block.type not in BY_FILE or not BY_FILE[block.type].exponents:
             known = ", ".join(BY_FILE)
             raise ValueError(f"cells of kind {block.type!r} are not known; known: {known}")
         kind = BY_FILE[block.type].name
@@ -95,6 +95,12 @@ def _used(mesh: Mesh) -> Mesh:
 
 def write(mesh: Mesh, path: Path) -> None:
     """See `Mesh.write`: to Gmsh sides are cells of one dimension less, with names."""
+    high = [kind for kind in mesh.cells if not CELLS[kind].exponents]
+    if high:
+        raise MeshError(
+            f"{high[0]}: cells of order 3 and more cannot be written as a mesh, formats know no "
+            "nodes of Gauss and Lobatto; write a result for pictures"
+        )
     points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dimension)))
     if path.suffix == ".msh":
         try:

@@ -88,7 +88,8 @@ class Mesh:
     ) -> Mesh:
         """[0, width] x [0, height]; sides "left" "right" (x), "bottom" "top" (y).
 
-        shape: "quad" (quad4, quad9), "serendipity" (quad8) or "triangle" (tri3, tri6).
+        shape: "quad" (quad4, quad9, up to quad49 of order 6), "serendipity" (quad8) or
+        "triangle" (tri3, tri6).
         """
         from softehl.runtime.mesh.structured import grid
 
@@ -105,8 +106,8 @@ class Mesh:
     ) -> Mesh:
         """[0, a] x [0, b] x [0, c]; "left" "right" (x), "front" "back" (y), "bottom" "top" (z).
 
-        shape: "hex" (hex8, hex27), "serendipity" (hex20) "tetrahedron" (tet4, tet10)
-        or "wedge" (wedge6).
+        shape: "hex" (hex8, hex27, up to hex343 of order 6), "serendipity" (hex20), "tetrahedron"
+        (tet4, tet10) or "wedge" (wedge6).
         """
         from softehl.runtime.mesh.structured import grid
 

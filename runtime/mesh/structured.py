@@ -8,20 +8,20 @@ from itertools import permutations
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.cells import CELLS, lobatto
 from softehl.runtime.mesh.mesh import Mesh, MeshError
 
 KINDS = {
-    (1, "quad"): ("line2", "line3"),
-    (2, "quad"): ("quad4", "quad9"),
+    (1, "quad"): ("line2", "line3", "line4", "line5", "line6", "line7"),
+    (2, "quad"): ("quad4", "quad9", "quad16", "quad25", "quad36", "quad49"),
     (2, "serendipity"): ("", "quad8"),
     (2, "triangle"): ("tri3", "tri6"),
-    (3, "hex"): ("hex8", "hex27"),
+    (3, "hex"): ("hex8", "hex27", "hex64", "hex125", "hex216", "hex343"),
     (3, "serendipity"): ("", "hex20"),
     (3, "tetrahedron"): ("tet4", "tet10"),
     (3, "wedge"): ("wedge6", ""),
 }
-"""(dimension, shape) -> kinds of order 1 and 2."""
+"""(dimension, shape) -> kinds of order 1, 2, ..."""
 
 SIDES = {1: ("left", "right"), 2: ("left", "right", "bottom", "top")}
 SIDES[3] = ("left", "right", "front", "back", "bottom", "top")
@@ -37,7 +37,7 @@ def grid(size: Sequence[float], cells: int | Sequence[int], order: int, shape: s
         raise MeshError(f"cells = {cells}: {dimension} numbers of at least 1 are needed")
     if not all(np.isfinite(length) and length > 0 for length in size):
         raise MeshError(f"size = {tuple(size)}: lengths must be positive")
-    axes = [np.linspace(0.0, a, order * n + 1) for a, n in zip(size, counts, strict=True)]
+    axes = [_axis(a, n, order) for a, n in zip(size, counts, strict=True)]
     points = np.stack([x.ravel(order="F") for x in np.meshgrid(*axes, indexing="ij")], axis=1)
     nodes = _numbers(kind, counts, order)
     used, renumbered = np.unique(nodes, return_inverse=True)
@@ -45,13 +45,24 @@ def grid(size: Sequence[float], cells: int | Sequence[int], order: int, shape: s
     return Mesh(mesh.points, mesh.cells, sides=_sides(mesh, size))
 
 
+def _axis(length: float, cells: int, order: int) -> Array:
+    """Nodes along one axis: those of Gauss and Lobatto in every cell."""
+    if order < 3:
+        return np.linspace(0.0, length, order * cells + 1)
+    inside = 0.5 * (1.0 + lobatto(order)[:-1])
+    steps = np.arange(cells)[:, None] + inside
+    return np.append(steps.ravel() / cells, 1.0) * length
+
+
 def _kind(dimension: int, order: int, shape: str) -> str:
     allowed = [name for d, name in KINDS if d == dimension]
     if (dimension, shape) not in KINDS:
         raise MeshError(f"shape = {shape!r}: allowed are {', '.join(allowed)}")
-    kind = KINDS[dimension, shape][order - 1] if order in (1, 2) else ""
+    kinds = KINDS[dimension, shape]
+    kind = kinds[order - 1] if order in range(1, len(kinds) + 1) else ""
     if not kind:
-        orders = {"serendipity": "2", "wedge": "1"}.get(shape, "1 or 2")
+        known = {"serendipity": "2", "wedge": "1"}
+        orders = known.get(shape, "1 or 2" if len(kinds) == 2 else f"1 to {len(kinds)}")
         raise MeshError(f"order = {order}: {shape} cells have order {orders}")
     return kind
 
@@ -66,7 +77,8 @@ def _numbers(kind: str, counts: Sequence[int], order: int) -> Integers:
     elif kind == "wedge6":
         parts = [_wedge(corners) for corners in _simplices(2)]
     else:
-        parts = [0.5 * (CELLS[kind].nodes + 1.0)]
+        rank = np.argsort(np.argsort(CELLS[kind].line)) if order > 2 else np.empty(0)
+        parts = [rank[CELLS[kind].lines] / order if order > 2 else 0.5 * (CELLS[kind].nodes + 1.0)]
     local = [np.rint(order * part).astype(np.int64) @ strides for part in parts]
     rows = np.asarray(origins)[:, None, None] + np.array(local)[None]
     return np.asarray(rows.reshape(-1, rows.shape[-1]))

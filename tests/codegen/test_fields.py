@@ -72,6 +72,7 @@ def called(kernel: Kernel, task: str, X: Array, dofs: Array, given: Any) -> list
         (field_pages.heat, "hex8", "solid"),
         (field_pages.creep, "quad4", "axisymmetric"),
         pytest.param(field_pages.mixed, "quad9", "axisymmetric", marks=pytest.mark.slow),
+        pytest.param(field_pages.mixed, "quad16", "plane strain", marks=pytest.mark.slow),
         pytest.param(field_pages.mixed, "tet10", "solid", marks=pytest.mark.slow),
         pytest.param(field_pages.mixed, "hex27", "solid", marks=pytest.mark.slow),
         pytest.param(field_pages.creep, "wedge6", "solid", marks=pytest.mark.slow),

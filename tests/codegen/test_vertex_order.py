@@ -15,7 +15,7 @@ from softehl.codegen.language.elements.cells import ELEMENTS, Element
 from softehl.codegen.language.model import Model
 
 NOT_NODAL = ("quad8", "hex20")
-NODAL = [name for name in ELEMENTS if name not in NOT_NODAL]
+NODAL = [name for name in ELEMENTS if ELEMENTS[name].lines is None and name not in NOT_NODAL]
 KINDS = {
     "line": "interval",
     "tri": "triangle",

@@ -118,6 +118,7 @@ def test_pieces_of_a_block_add_up_to_it(
     assembler = Assembler.build(SIZE, blocks)
     whole = assembler.linearise(x, PARAMETERS)
     monkeypatch.setattr(assembly, "_PIECE", 9 * 4)  # 4 of the 25 elements at a time
+    monkeypatch.setattr(assembly, "_GROUP", 1)
     pieces = [piece for piece, _ in blocks[0].pieces(assembler.pattern.scatter[0])]
     assert [len(piece.dofs) for piece in pieces] == [4] * 6 + [1]
     r, K = assembler.linearise(x, PARAMETERS)

@@ -12,7 +12,7 @@ from softehl.codegen.emit.points import constants, dense, tensor
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout, orders
 from softehl.codegen.emit.points.lines import Lines
-from softehl.codegen.emit.points.pairs import STEM, Pair, Parent, stored
+from softehl.codegen.emit.points.pairs import STEM, Pair, Parent, ranks, stored
 from softehl.codegen.emit.source import HEADER
 
 _SHORT = 65536
@@ -40,7 +40,8 @@ def declaration(name: str, size: int) -> str:
 def _body(layout: Layout, outputs: Outputs) -> str:
     out, parent = Lines(), Parent(layout, outputs)
     count = len(layout.d.unknowns) ** 2
-    out.add(f"V k_lanes[{count}];")
+    kept = "static _Thread_local " if count > _SHORT else ""  # a stack has no room for it
+    out.add(f"{kept}V k_lanes[{count}];")
     found = orders(parent.quantities)
     pairs = []
     for n, e in enumerate(found):
@@ -61,13 +62,31 @@ def _body(layout: Layout, outputs: Outputs) -> str:
 
 def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
     whole, name = count - count % 4, f"{STEM}{layout.d.cell}_K"
+    if count > _SHORT:
+        _store_by_ranks(out, layout, symmetric=symmetric)
+        return
     places = ", ".join(map(str, stored(layout, symmetric=symmetric)))
-    kind = "unsigned short" if count <= _SHORT else "unsigned"
-    out.add(f"static const {kind} {name}[{count}] = {{{places}}};")
+    out.add(f"static const unsigned short {name}[{count}] = {{{places}}};")
     out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
-    out.add(f"const {kind} *const at = {name} + k;")
+    out.add(f"const unsigned short *const at = {name} + k;")
     values = ", ".join(f"k_lanes[at[{i}]]" for i in range(4))
     out.add(f"softehl_store4(K + k, {count}, {values});")
     out.close()
     for k in range(whole, count):
         out.add(f"softehl_store1(K + {k}, {count}, k_lanes[{name}[{k}]]);")
+
+
+def _store_by_ranks(out: Lines, layout: Layout, *, symmetric: bool) -> None:
+    """The same for a large tangent: of two mirrored entries that of the lower rank is there."""
+    size = len(layout.d.unknowns)
+    order = {rank: n for n, rank in enumerate(sorted(ranks(layout)))}
+    numbers = ", ".join(str(order[rank]) for rank in ranks(layout))
+    if symmetric:
+        out.add(f"static const unsigned short rank[{size}] = {{{numbers}}};")
+    out.open(f"for (int i = 0; i < {size}; ++i)")
+    out.open(f"for (int j = 0; j < {size}; ++j)")
+    mirrored = f"rank[j] < rank[i] ? j * {size} + i : " if symmetric else ""
+    out.add(f"const V entry = k_lanes[{mirrored}i * {size} + j];")
+    out.add(f"softehl_store1(K + i * {size} + j, {size * size}, entry);")
+    out.close()
+    out.close()

@@ -64,10 +64,37 @@ class Frame:
     def factors(self, order: int, wanted: Iterable[str], node: str) -> None:
         """Shape functions N and slopes D0, D1, D2 of a node at the point q."""
         name = self.layout.d.cell
+        if self.layout.shape(order).long:
+            for f in sorted(wanted):
+                table = f"N{order}[{node}]" if f == "N" else f"D{order}[{node}][{f[1:]}]"
+                self.out.add(f"const double {f} = {table};")
+            return
         for f in sorted(wanted):
             entry = "" if f == "N" else f"[{f[1:]}]"
             table = "N" if f == "N" else "D"
             self.out.add(f"const double {f} = {name}_{table}{order}[q][{node}]{entry};")
+
+
+def products(f: Frame) -> None:
+    """Shape functions N<order> and slopes D<order> at the point q where their tables are long."""
+    out, D, name = f.out, f.D, f.layout.d.cell
+    for order in f.layout.long_orders:
+        shape = f.layout.shape(order)
+        assert shape.line is not None
+        points, nodes = len(shape.line.values), shape.nodes
+        out.add(f"double N{order}[{nodes}], D{order}[{nodes}][{D}];")
+        out.open(f"for (int n = 0; n < {nodes}; ++n)")
+        out.add(f"const int *const at = {name}_along{order}[n];")
+        for k in range(D):
+            place = f"q / {points ** (D - 1 - k)} % {points}"
+            out.add(f"const double l{k} = {name}_L{order}[{place}][at[{k}]];")
+            out.add(f"const double m{k} = {name}_M{order}[{place}][at[{k}]];")
+        out.add(f"N{order}[n] = {' * '.join(f'l{k}' for k in range(D))};")
+        for by in range(D):
+            terms = " * ".join(f"{'m' if k == by else 'l'}{k}" for k in range(D))
+            out.add(f"D{order}[n][{by}] = {terms};")
+        out.close()
+        out.idle(f"N{order}", f"D{order}")
 
 
 def components(quantities: Iterable[Quantity]) -> list[Component]:

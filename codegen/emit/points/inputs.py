@@ -18,8 +18,8 @@ class Inputs:
 
     f: Frame
 
-    def write(self) -> None:
-        """The arrays x, g, e, b, t of the function of the point."""
+    def write(self, *, direction: bool = True) -> None:
+        """The arrays x, g, e, b, t of the function of the point; without direction not t."""
         site, form = self.f.layout.site, self.f.layout.form
         known = self._interpolated("us", {k: form.all[k] for k in self._read("dofs")}, "g")
         data = {k: form.data[k] for k in self._read("data") if k in form.data}
@@ -33,6 +33,8 @@ class Inputs:
         self._array("g", len(form.all), known)
         self._array("e", len(site.data), known)
         self._point_data()
+        if not direction:
+            return
         moved = self._direction(known)
         width = 1 + max([*self.f.needs["direction"], 0])
         self._array("t", width, moved)

@@ -13,6 +13,7 @@ from softehl.codegen.graph.graph import Input
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Component, Definition, PointForm, Quantity
 from softehl.codegen.language.elements.cells import ELEMENTS
+from softehl.codegen.language.fields import order_of
 from softehl.codegen.language.nodal import CORNERS
 
 
@@ -88,6 +89,13 @@ class Layout:
             self._shapes[order] = tables.shape(order, cell, self.d.rule)
         return self._shapes[order]
 
+    @property
+    def long_orders(self) -> list[int]:
+        """Orders of shape functions whose tables are long."""
+        every = [*self.form.all, *self.form.data.values()]
+        found = {self.geometry.order, *orders(every)}
+        return sorted(order for order in found if self.shape(order).long)
+
     @cached_property
     def _shapes(self) -> dict[int, Shape]:
         return {}
@@ -95,7 +103,7 @@ class Layout:
     @cached_property
     def geometry(self) -> Shape:
         """Shape functions of the map from the parent cell."""
-        return self.shape(2 if self.d.cell in CORNERS else 1)
+        return self.shape(order_of(ELEMENTS[self.d.cell]))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from softehl.codegen import abi
 from softehl.codegen.abi import Task
 from softehl.codegen.emit import simd
 from softehl.codegen.emit.points import function, geometry, pairs
-from softehl.codegen.emit.points.frame import Frame, components
+from softehl.codegen.emit.points.frame import Frame, components, products
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.inputs import Inputs
 from softehl.codegen.emit.points.layout import Layout, orders
@@ -28,6 +28,7 @@ class Group(Frame):
         """C text of the group function."""
         self._start()
         self.out.open(f"for (int q = 0; q < {self.layout.points}; ++q)")
+        products(self)
         geometry.write(self)
         Inputs(self).write()
         self._call()

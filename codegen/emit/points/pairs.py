@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout
@@ -170,13 +171,18 @@ def stored(layout: Layout, *, symmetric: bool) -> list[int]:
 
     Of a symmetric one that of the two mirrored entries which is computed.
     """
+    size, rank = len(layout.d.places), ranks(layout)
+    pairs = product(range(size), repeat=2)
+    return [j * size + i if symmetric and rank[j] < rank[i] else i * size + j for i, j in pairs]
+
+
+def ranks(layout: Layout) -> list[tuple[Any, ...]]:
+    """Ranks of the unknowns: of two mirrored entries that with the row of lower rank is kept."""
     names = {c.name: c for c in layout.components}
-    size = len(layout.d.places)
-    ranks = []
+    found = []
     for n, (name, node) in enumerate(layout.d.places):
         c = names[name]
         line = layout.shape(c.order).line
         along = line.places[node or 0][::-1] if line is not None else (node,)
-        ranks.append((layout.field(c), along, n))
-    pairs = product(range(size), repeat=2)
-    return [j * size + i if symmetric and ranks[j] < ranks[i] else i * size + j for i, j in pairs]
+        found.append((layout.field(c), along, n))
+    return found

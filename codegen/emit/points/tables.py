@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
+from math import prod
 from typing import Any
 
 import mpmath
@@ -35,30 +36,50 @@ class Line:
 class Shape:
     """Values [point][node] and slopes [point][node][direction] of shape functions of an order.
 
-    line: for cells that are products of lines, under a rule that is a product too.
+    line: for cells that are products of lines, under a rule that is a product too. long: whether
+    tables of the cell would be long, so that loops multiply what they need from those of the line.
     """
 
     order: int
     values: tuple[tuple[float, ...], ...]
     slopes: tuple[tuple[tuple[float, ...], ...], ...]
     line: Line | None
+    long: bool = False
 
     @property
     def nodes(self) -> int:
         """Number of shape functions."""
         return len(self.values[0])
 
-    def text(self, name: str) -> str:
-        """Tables NAME_N<order> and NAME_D<order>."""
-        N = _array(f"{name}_N{self.order}", self.values)
-        return f"{N}\n{_array(f'{name}_D{self.order}', self.slopes)}"
+    def texts(self, name: str) -> dict[str, Callable[[], str]]:
+        """Tables NAME_N<order>, NAME_D<order>, of products of lines also NAME_L<order>,
+        NAME_M<order> (values and slopes of the line) and NAME_along<order>, by name.
+        """
+        found: dict[str, Callable[[], str]] = {}
+
+        def table(letter: str, values: Any) -> None:
+            label = f"{name}_{letter}{self.order}"
+            found[label] = lambda: _array(label, values)
+
+        table("N", self.values)
+        table("D", self.slopes)
+        if self.line is not None:
+            line = self.line
+            table("L", line.values)
+            table("M", line.slopes)
+            label = f"{name}_along{self.order}"
+            found[label] = lambda: _whole_numbers(label, line.places)
+        return found
 
 
 @cache
 def shape(order: int, cell: Element, rule: QuadratureRule) -> Shape:
     """Shape functions of a cell at the points of a rule."""
+    line = _line(cell, rule)
+    if cell.lines is not None and line is not None:
+        return Shape(order, *_products(line, cell.dimension), line, long=True)
     values, slopes = _evaluated(cell.shape, rule.points, cell.dimension)
-    return Shape(order, values, slopes, _line(cell, rule))
+    return Shape(order, values, slopes, line)
 
 
 def constant(points: int, dimension: int) -> Shape:
@@ -84,7 +105,7 @@ def _evaluated(function: Any, points: Sequence[Sequence[Any]], dimension: int) -
 
 def _line(cell: Element, rule: QuadratureRule) -> Line | None:
     """The line that a cell of all products is made of, with the points of the rule along it."""
-    sides = sorted({c for place in cell.nodes for c in place}, key=lambda c: (c == 0, c))
+    sides = sorted({c for place in cell.nodes for c in place}, key=lambda c: (abs(c) != 1, c))
     count = round(len(rule.points) ** (1 / cell.dimension))
     of_lines = len(cell.nodes) == len(sides) ** cell.dimension and -1 in sides
     if not of_lines or count**cell.dimension != len(rule.points):
@@ -104,6 +125,21 @@ def _line(cell: Element, rule: QuadratureRule) -> Line | None:
 
     values, slopes = _evaluated(lagrange, [(x,) for x in along], 1)
     return Line(values, tuple(tuple(s for (s,) in row) for row in slopes), places)
+
+
+def _products(line: Line, dimension: int) -> tuple[Any, Any]:
+    """Values and slopes of the products of a line's shape functions."""
+    values, slopes = [], []
+    for point in product(range(len(line.values)), repeat=dimension):
+        directions = (-1, *range(dimension))  # -1: the value
+        pairs = [(line.values[q], line.slopes[q]) for q in point]
+        rows = [
+            [prod(pairs[k][k == by][a] for k, a in enumerate(place)) for by in directions]
+            for place in line.places
+        ]
+        values.append(tuple(row[0] for row in rows))
+        slopes.append(tuple(tuple(row[1:]) for row in rows))
+    return tuple(values), tuple(slopes)
 
 
 def weights(name: str, rule: QuadratureRule) -> str:
@@ -134,6 +170,12 @@ def nodes(name: str, line: Line) -> str:
     at = {place: k for k, place in enumerate(line.places)}
     order = [at[place] for place in product(range(size), repeat=D)]
     return f"static const int {name}[{size**D}] = {{{', '.join(map(str, order))}}};\n"
+
+
+def _whole_numbers(name: str, rows: Sequence[Sequence[int]]) -> str:
+    """A constant array of rows of whole numbers."""
+    inside = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in rows)
+    return f"static const int {name}[{len(rows)}][{len(rows[0])}] = {{{inside}}};\n"
 
 
 def _array(name: str, values: Any) -> str:

@@ -1,6 +1,8 @@
 """Elements by name: parent nodes, shape functions and default rules of every kind of cell.
 
-Node order of VTK and meshio: corners, then the middles of edges, of faces, of the cell.
+Node order of VTK and meshio: corners, then the middles of edges, of faces, of the cell. Lines,
+quadrilaterals and hexahedra of order 3 to 6 have the nodes of Gauss and Lobatto along every line;
+those inside an edge, a face or the cell follow one another with x running first, then y, then z.
 Quadrilaterals and hexahedra live on [-1, 1]^d, triangles and tetrahedra on the unit simplex,
 wedges on triangle x [-1, 1].
 """
@@ -9,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, TypeAlias
 
 import sympy as sp
@@ -40,6 +43,19 @@ class Element:
         """Of the parent element."""
         return self.rule.dimension
 
+    @property
+    def lines(self) -> tuple[tuple[int, ...], ...] | None:
+        """Of elements of order 3 and more: along every direction the node of a line, by nodes."""
+        order = len({place[0] for place in self.nodes}) - 1
+        if order < 3:
+            return None
+        number = {c: k for k, c in enumerate(_line_nodes(order))}
+        return tuple(tuple(number[c] for c in place) for place in self.nodes)
+
+    def along(self, x: Any) -> list[Any]:
+        """Shape functions of a line at x, in the numbers of `lines`."""
+        return _line(len({place[0] for place in self.nodes}) - 1, x)
+
     def gradient(self, *point: Any) -> list[tuple[Any, ...]]:
         """(dN_a/dxi, dN_a/deta, ...) of every shape function."""
         places = [sp.Dummy(real=True) for _ in point]
@@ -48,33 +64,67 @@ class Element:
         return [tuple(slope.xreplace(values) for slope in row) for row in slopes]
 
 
-def element(name: str) -> Element:
-    """The element of a name, such as "hex20".  Raises ValueError that names what there is."""
+def element(name: str, order: int | None = None) -> Element:
+    """The element of a name, such as "hex20", or of a shape and an order: element("hex", order=4).
+
+    Shapes are "line", "quad" and "hex" (orders 1 to 6), "tri" and "tet" (1 and 2), "wedge" (1).
+    Raises ValueError that names what there is.
+    """
+    if order is not None:
+        if name not in SHAPES:
+            raise ValueError(f"no shape {name!r} of elements; there are {', '.join(SHAPES)}")
+        of_shape = SHAPES[name]
+        if order not in range(1, len(of_shape) + 1):
+            last = f" to {len(of_shape)}" if len(of_shape) > 1 else ""
+            raise ValueError(f"order = {order!r} of {name}: allowed is 1{last}")
+        name = of_shape[order - 1]
     if name not in ELEMENTS:
         raise ValueError(f"no element {name!r}; there are {', '.join(ELEMENTS)}")
     return ELEMENTS[name]
 
 
 def _line(order: int, x: Any) -> list[Any]:
-    """Lagrange polynomials on [-1, 1]: ends first, then the middle."""
+    """Lagrange polynomials on [-1, 1]: ends first, then the nodes between, rising."""
     if order == 1:
         return [(1 - x) * _HALF, (1 + x) * _HALF]
-    return [x * (x - 1) * _HALF, x * (x + 1) * _HALF, 1 - x**2]
+    if order == 2:
+        return [x * (x - 1) * _HALF, x * (x + 1) * _HALF, 1 - x**2]
+    nodes = _line_nodes(order)
+    return [
+        sp.prod([x - b for b in nodes if b != a]) / sp.prod([a - b for b in nodes if b != a])
+        for a in nodes
+    ]
+
+
+def _line_nodes(order: int) -> tuple[Any, ...]:
+    """Nodes of a line: ends first, then those of Gauss and Lobatto between, rising."""
+    return (sp.Integer(-1), sp.Integer(1), *quadrature.lobatto(order))
 
 
 def _tensor(nodes: Sequence[Place]) -> Shape:
     """Products of Lagrange polynomials, in the order of the nodes."""
-    order = 2 if any(c == 0 for place in nodes for c in place) else 1
-    number = {-1: 0, 1: 1, 0: 2}
+    order = len({place[0] for place in nodes}) - 1
+    number = {c: k for k, c in enumerate(_line_nodes(order))}
 
     def shape(*point: Any) -> list[Any]:
         lines = [_line(order, x) for x in point]
         return [
-            sp.prod([line[number[int(c)]] for line, c in zip(lines, place, strict=True)])
+            sp.prod([line[number[c]] for line, c in zip(lines, place, strict=True)])
             for place in nodes
         ]
 
     return shape
+
+
+def _between(corners: Sequence[Sequence[int]], groups: Sequence[Sequence[int]], order: int) -> Any:
+    """The corners, and the nodes inside edges, faces and cell, x running first."""
+    inner, found = quadrature.lobatto(order), [tuple(map(sp.Integer, c)) for c in corners]
+    for group in groups:
+        some = [corners[k] for k in group]
+        axes = [sorted({c[d] for c in some}) for d in range(len(corners[0]))]
+        lines = [inner if len(ends) > 1 else [sp.Integer(ends[0])] for ends in axes]
+        found += [tuple(reversed(place)) for place in product(*reversed(lines))]
+    return tuple(found)
 
 
 def _serendipity(nodes: Sequence[Place]) -> Shape:
@@ -152,7 +202,7 @@ def _elements() -> dict[str, Element]:
     gauss, triangle, tetrahedron = quadrature.gauss, quadrature.triangle, quadrature.tetrahedron
     quad9 = _places(_SQUARE, (*_SQUARE_EDGES, range(4)))
     hex27 = _places(_CUBE, (*_CUBE_EDGES, *_CUBE_FACES, range(8)))
-    tensor = {
+    tensor: dict[str, tuple[tuple[Place, ...], QuadratureRule]] = {
         "line2": (_places(_LINE), gauss(1, 1)),
         "line3": (_places(_LINE, [(0, 1)]), gauss(2, 1)),
         "quad4": (_places(_SQUARE), gauss(2, 2)),
@@ -160,6 +210,13 @@ def _elements() -> dict[str, Element]:
         "hex8": (_places(_CUBE), gauss(2, 3)),
         "hex27": (hex27, gauss(3, 3)),
     }
+    groups: dict[str, Any] = {"line": (_LINE, [(0, 1)])}
+    groups["quad"] = (_SQUARE, (*_SQUARE_EDGES, range(4)))
+    groups["hex"] = (_CUBE, (*_CUBE_EDGES, *_CUBE_FACES, range(8)))
+    for shape, (corners, some) in groups.items():
+        for order, name in enumerate(SHAPES[shape][2:], start=3):
+            nodes = _between(corners, some, order)
+            tensor[name] = (nodes, gauss(order + (shape != "line"), len(corners[0])))
     serendipity = {"quad8": (quad9[:8], gauss(3, 2)), "hex20": (hex27[:20], gauss(3, 3))}
     simplex = {
         "tri3": (_places(_TRIANGLE), triangle(1)),
@@ -176,6 +233,15 @@ def _elements() -> dict[str, Element]:
     return found
 
 
+SHAPES = {
+    "line": ("line2", "line3", "line4", "line5", "line6", "line7"),
+    "quad": ("quad4", "quad9", "quad16", "quad25", "quad36", "quad49"),
+    "hex": ("hex8", "hex27", "hex64", "hex125", "hex216", "hex343"),
+    "tri": ("tri3", "tri6"),
+    "tet": ("tet4", "tet10"),
+    "wedge": ("wedge6",),
+}
+"""Elements with all nodes of an order, from order 1 on."""
 ELEMENTS: dict[str, Element] = _elements()
 """Every element by its name."""
 

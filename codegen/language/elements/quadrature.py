@@ -86,6 +86,26 @@ def gauss(order: int, dimension: int) -> QuadratureRule:
     return QuadratureRule(dimension, points, tuple(sp.prod([w for _, w in e]) for e in grid))
 
 
+def lobatto(order: int) -> tuple[Any, ...]:
+    """Points of Gauss and Lobatto inside (-1, 1), rising: with both ends as many as nodes of a line
+    of this order, 1 to 6; rational to 100 digits where they are no rational numbers.
+    """
+    root = sp.sqrt
+    squares = {  # of the positive ones, roots of the derivative of Legendre's polynomial
+        1: [],
+        2: [],
+        3: [sp.Rational(1, 5)],
+        4: [sp.Rational(3, 7)],
+        5: [(7 - 2 * root(7)) / 21, (7 + 2 * root(7)) / 21],
+        6: [(15 - 2 * root(15)) / 33, (15 + 2 * root(15)) / 33],
+    }
+    if order not in squares:
+        raise ValueError(f"lobatto: order = {order!r}; allowed is 1 to 6")
+    right = [_rounded(sp.N(root(s), _DIGITS + 20)) for s in squares[order]]
+    middle = [] if order % 2 else [sp.Integer(0)]
+    return (*(-x for x in reversed(right)), *middle, *right)
+
+
 def triangle(degree: int) -> QuadratureRule:
     """Rule on the unit triangle for polynomials of a degree, at least.
 

@@ -12,7 +12,7 @@ import sympy as sp
 
 import softehl
 from softehl.runtime.engines import sizes
-from softehl.runtime.solve import multigrid
+from softehl.runtime.solve import amg
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.solve.superlu import SuperLU
 from softehl.runtime.statement.records import StudyError
@@ -67,10 +67,10 @@ def test_multigrid_keeps_rigid_motions() -> None:
     r, K = problem.linearise(system.at_rest())
     right = sizes.nodal_modes(system)
     assert right is not None
-    shifts = multigrid.Modes(right.order, 3, right.near[:, :3])
+    shifts = amg.Modes(right.order, 3, right.near[:, :3])
     steps = []
     for modes in (right, shifts):
-        factors = multigrid.Multigrid(modes).factorise(K)
+        factors = amg.Multigrid(modes).factorise(K)
         norms = list[float]()
         factors.levels.solve(-r[modes.order], tol=1e-6, accel="cg", residuals=norms)
         steps.append(len(norms))
@@ -83,7 +83,7 @@ def test_size_decides_and_progress_says_so(
     monkeypatch.setitem(sizes.FACTORS_UP_TO, 3, 100)
     cube().solve(progress=True)
     assert "(multigrid, because of 1029 unknowns in 3-D)" in capsys.readouterr().err
-    monkeypatch.setattr(multigrid, "available", lambda: False)
+    monkeypatch.setattr(amg, "available", lambda: False)
     cube().solve(progress=True)
     assert "in spite of 1029 unknowns in 3-D: pyamg is not installed" in capsys.readouterr().err
 
@@ -92,7 +92,7 @@ def test_factors_stand_in_where_multigrid_fails(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sizes.FACTORS_UP_TO, 3, 100)
-    monkeypatch.setattr(sizes, "Multigrid", partial(multigrid.Multigrid, most=3))
+    monkeypatch.setattr(sizes, "Multigrid", partial(amg.Multigrid, most=3))
     study, reference = cube(), cube().solve(linear="direct")
     found = study.solve(progress=True)
     assert "superlu after multigrid failed, because of 1029" in capsys.readouterr().err

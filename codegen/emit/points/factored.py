@@ -1,0 +1,321 @@
+"""The tangent times a vector by sum factorisation, without a matrix: `keep` and `action`.
+
+On quadrilaterals and hexahedra of any order, for pages whose fields all have the order of the cell.
+`keep` computes once a state what a product needs at every quadrature point: the inverse Jacobian,
+the volume, and the inputs of the function of the point (gradients, data, history). `action` adds
+the product for a range of elements: values from the nodes to the points, one direction after the
+other, slopes there, fluxes, and all of it back.
+
+    void softehl_NAME_keep(...)      as a task; values (n, points, kept), n a multiple of 8
+    void softehl_NAME_action(ptrdiff_t first, ptrdiff_t last, const double *parameters,
+        const double *kept, const int *index, const double *x, double *y)
+
+first, last: elements, multiples of 8. kept: by groups of lanes, [group][point][number][lane].
+index: nodes of elements with x running first, then y, then z, [element][node]. x, y: unknowns of
+a node are neighbours, in the order of the page.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softehl.codegen import abi
+from softehl.codegen.abi import Task
+from softehl.codegen.emit import source
+from softehl.codegen.emit.points import constants, function, geometry
+from softehl.codegen.emit.points.frame import Frame, components, products
+from softehl.codegen.emit.points.function import Outputs
+from softehl.codegen.emit.points.inputs import Inputs
+from softehl.codegen.emit.points.layout import Layout
+from softehl.codegen.emit.points.lines import Lines, load
+from softehl.codegen.emit.points.sweeps import Table, sweep
+from softehl.codegen.emit.schedule import Schedule
+from softehl.codegen.language.definition import Component, Quantity
+from softehl.codegen.language.elements.cells import ELEMENTS
+
+
+def fits(layout: Layout) -> bool:
+    """Whether a page has a product by sum factorisation on its cell."""
+    shape, cell = layout.geometry, layout.d.cell
+    if shape.line is None or not cell.startswith(("quad", "hex")) or layout.dimension < 2:
+        return False
+    orders = {c.order for c in layout.components}
+    return orders == {shape.order} and len(shape.line.values) >= len(shape.line.values[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """The functions of a page whose product at a point has these outputs."""
+
+    layout: Layout
+    outputs: Outputs
+    plan: Schedule
+
+    def text(self, before: list[str]) -> str:
+        """C file. before: routines that the function of the point calls."""
+        point, _ = function.text(self.layout, Task.PRODUCT, self.outputs, self.plan)
+        keep, action = self._keep(), self._action()
+        tables = constants.used(self.layout, keep)
+        wide = (
+            "typedef double softehl_wide "
+            "__attribute__((vector_size(8 * SOFTEHL_LANES), aligned(8)));\n"
+        )
+        pieces = [self._tables_of_lines(), point, keep, action]
+        return source.source(self.layout.d, pieces, [*before, wide, *tables])
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The frame whose inputs are kept."""
+        return Frame(self.layout, Task.PRODUCT, self.outputs)
+
+    @property
+    def kept(self) -> list[str]:
+        """What is kept at a point: variables of C."""
+        D, needs = range(self.layout.dimension), self.frame.needs
+        found = [f"I{k}{m}" for k in D for m in D] + ["w"]
+        for array, letter in function.ARRAYS.items():
+            if array != "direction":
+                found += [f"{letter}[{k}]" for k in needs[array]]
+        return found
+
+    # what is kept -------------------------------------------------------------------------------
+
+    def _keep(self) -> str:
+        f = self.frame
+        f.out, d = Lines(), self.layout.d
+        out, count, points = f.out, len(self.kept), self.layout.points
+        sizes = {
+            "xs": ("X", d.coordinate_width, f.widths["coordinates"]),
+            "us": ("d", len(d.unknowns), f.widths["dofs"]),
+            "es": ("a", len(d.data), f.widths["data"]),
+        }
+        out.add(f"enum {{ points = {points} }};")
+        for array, (start, size, width) in sizes.items():
+            if size:
+                out.add(f"V {array}[{size}];")
+                load(out, array, start, size, width)
+                out.idle(array)
+        out.open(f"for (int q = 0; q < {points}; ++q)")
+        products(f)
+        geometry.write(f)
+        Inputs(f).write(direction=False)
+        out.add(f"softehl_wide *const to = (softehl_wide *)R + {count} * q;")
+        for k, value in enumerate(self.kept):
+            out.add(f"to[{k}] = {value};")
+        out.close()
+        name, body = abi.function_name(d.name, "keep"), "\n".join(out.lines)
+        moved = {"X": f.widths["coordinates"], "d": f.widths["dofs"], "a": f.widths["data"]}
+        arrays = {"X": "coordinates", "d": "dofs", "a": "data"}
+        given = [f"{arrays[k]} + {w} * e" if w != "0" else "0" for k, w in moved.items()]
+        return (
+            f"static void {name}_group(const double *restrict X, const double *restrict d,\n"
+            "    const double *restrict a, const double *restrict parameters, double *restrict R)\n"
+            f"{{\n    (void)X, (void)d, (void)a, (void)parameters;\n{body}\n}}\n\n"
+            f"{abi.declaration(d.name, 'keep')};\n{abi.declaration(d.name, 'keep')}\n{{\n"
+            "    (void)points, (void)modes, (void)data, (void)direction, (void)rule, (void)basis;\n"
+            "    (void)tangent;\n"
+            "    for (ptrdiff_t e = 0; e < n; e += SOFTEHL_LANES)\n"
+            f"        {name}_group({', '.join(given)}, parameters, values + {count * points} * e);"
+            "\n}\n"
+        )
+
+    # the product --------------------------------------------------------------------------------
+
+    @property
+    def _sizes(self) -> tuple[int, int]:
+        """Nodes and points along a line."""
+        line = self.layout.geometry.line
+        assert line is not None
+        return len(line.values[0]), len(line.values)
+
+    @cached_property
+    def _tables(self) -> dict[str, Table]:
+        """to: from nodes to points. slope: derivatives at points from values there."""
+        rule, D = self.layout.d.rule, self.layout.dimension
+        n, count = self._sizes
+        at = [float(p[-1]) for p in rule.points[:count]]
+        cell = sorted({float(place[0]) for place in ELEMENTS[self.layout.d.cell].nodes})
+        assert len(cell) == n
+        assert len(rule.points) == count**D
+        to, slope = _lagrange(cell, at)[0], _lagrange(at, at)[1]
+        return {"to": Table(to, 1), "slope": Table(slope, -1)}
+
+    def _tables_of_lines(self) -> str:
+        return "\n".join(
+            sweep(f"{abi.function_name(self.layout.d.name, label)}_{kind}", table, kind)
+            for label, table in self._tables.items()
+            for kind in ("forth", "back")
+        )
+
+    def _action(self) -> str:
+        out, D, d = Lines(), self.layout.dimension, self.layout.d
+        n, q = self._sizes
+        C, big = len(self.layout.components), max(n, q) ** D
+        out.add(f"V u[{C}][{big}], other[{big}], slopes[{C}][{D}][{q**D}];")
+        out.add("M failed = softehl_mask(0);")
+        self._gather(out, C, n**D)
+        out.open(f"for (int c = 0; c < {C}; ++c)")
+        self._sweeps(out, "to", "forth", range(D))
+        for axis in range(D):
+            self._sweep(out, "slope", "forth", ("u[c]", f"slopes[c][{axis}]"), (q,) * D, axis)
+        out.close()
+        self._points(out, q**D)
+        out.open(f"for (int c = 0; c < {C}; ++c)")
+        if not self._of_values:
+            out.add(f"for (int q = 0; q < {q**D}; ++q) u[c][q] = softehl_splat(0.0);")
+        for axis in range(D):
+            self._sweep(out, "slope", "back", (f"slopes[c][{axis}]", "u[c]"), (q,) * D, axis)
+        self._sweeps(out, "to", "back", reversed(range(D)))
+        out.add(f"if (softehl_any(failed)) for (int a = 0; a < {n**D}; ++a)")
+        out.add("    u[c][a] = softehl_blend(failed, softehl_splat(NAN), u[c][a]);")
+        out.close()
+        self._scatter(out, C, n**D)
+        name, body = abi.function_name(d.name, "action"), "\n".join(out.lines)
+        step = len(self.kept) * q**D
+        arguments = (
+            "ptrdiff_t first, ptrdiff_t last, const double *restrict parameters,\n"
+            "    const double *restrict kept, const int *restrict index, const double *restrict x,"
+            "\n    double *restrict y"
+        )
+        return (
+            f"static void {name}_group(const double *restrict parameters,\n"
+            "    const softehl_wide *restrict kept, const int *restrict index,\n"
+            "    const int *restrict next, const double *restrict x, double *restrict y)\n"
+            f"{{\n    (void)parameters;\n{body}\n}}\n\n"
+            f"void {name}({arguments});\nvoid {name}({arguments})\n{{\n"
+            "    for (ptrdiff_t e = first; e < last; e += SOFTEHL_LANES) {\n"
+            f"        const int *const here = index + {n**D} * e;\n"
+            "        const int *const next = e + SOFTEHL_LANES < last ? here + "
+            f"{n**D} * SOFTEHL_LANES : here;\n"
+            f"        {name}_group(parameters, (const softehl_wide *)(kept + {step} * e), here, "
+            "next, x, y);\n    }\n}\n"
+        )
+
+    def _gather(self, out: Lines, C: int, nodes: int) -> None:
+        """Values of the nodes in lanes; those of the next group are called for."""
+        out.open("for (int l = 0; l < SOFTEHL_LANES; ++l)")
+        out.open(f"for (int a = 0; a < {nodes}; ++a)")
+        out.add(f"const double *const at = x + {C} * (ptrdiff_t)index[{nodes} * l + a];")
+        for c in range(C):
+            out.add(f"((double *)&u[{c}][a])[l] = at[{c}];")
+        out.add(f"__builtin_prefetch(x + {C} * (ptrdiff_t)next[{nodes} * l + a]);")
+        out.close()
+        out.close()
+
+    def _scatter(self, out: Lines, C: int, nodes: int) -> None:
+        out.open("for (int l = 0; l < SOFTEHL_LANES; ++l)")
+        out.open(f"for (int a = 0; a < {nodes}; ++a)")
+        out.add(f"double *const at = y + {C} * (ptrdiff_t)index[{nodes} * l + a];")
+        for c in range(C):
+            out.add(f"at[{c}] += ((const double *)&u[{c}][a])[l];")
+        out.close()
+        out.close()
+
+    def _sweeps(self, out: Lines, table: str, kind: str, axes: object) -> None:
+        """All directions, from u[c] to u[c]."""
+        n, q = self._sizes
+        sizes = [n if kind == "forth" else q] * self.layout.dimension
+        names = ["u[c]", "other"]
+        for axis in axes:  # type: ignore[attr-defined]
+            self._sweep(out, table, kind, (names[0], names[1]), tuple(sizes), axis)
+            sizes[axis] = q if kind == "forth" else n
+            names.reverse()
+        if names[0] == "other":
+            count = int(np.prod(sizes))
+            out.add(f"for (int k = 0; k < {count}; ++k) u[c][k] = other[k];")
+
+    def _sweep(
+        self,
+        out: Lines,
+        table: str,
+        kind: str,
+        arrays: tuple[str, str],
+        sizes: tuple[int, ...],
+        axis: int,
+    ) -> None:
+        """One direction: every line along it from one array to another."""
+        name = f"{abi.function_name(self.layout.d.name, table)}_{kind}"
+        n, q = self._sizes
+        new = sizes[axis] if table == "slope" else (q if kind == "forth" else n)
+        step, lines = int(np.prod(sizes[:axis])), int(np.prod(sizes[axis + 1 :]))
+        out.open(f"for (int j = 0; j < {lines}; ++j)")
+        out.add(f"for (int i = 0; i < {step}; ++i)")
+        out.add(
+            f"    {name}(&{arrays[0]}[{step * sizes[axis]} * j + i], "
+            f"&{arrays[1]}[{step * new} * j + i], {step});"
+        )
+        out.close()
+
+    @property
+    def _of_values(self) -> bool:
+        """Whether there are fluxes that belong to values."""
+        return any(q.axis is None for q in self.layout.form.unknowns)
+
+    def _points(self, out: Lines, points: int) -> None:
+        """Fluxes at every point, in the places of the slopes."""
+        layout, D, count = self.layout, self.layout.dimension, len(self.kept)
+        f = self.frame
+        out.open(f"for (int q = 0; q < {points}; ++q)")
+        out.add(f"const softehl_wide *const from = kept + {count} * q;")
+        out.add(f"for (int k = 0; k < {count}; ++k)")
+        out.add(f"    __builtin_prefetch(from + {count * points} + k);")
+        # the rule has its first direction outermost, arrays have it innermost
+        out.add(f"const int p = {self._place()};")
+        sizes = {"X": D, "g": len(layout.form.all), "e": len(layout.site.data)}
+        sizes["b"] = len(layout.d.point_data)
+        sizes["t"] = 1 + max([*f.needs["direction"], 0])
+        sizes["P"], sizes["A"] = max(len(self.outputs.rows), 1), 1
+        for letter, size in sizes.items():
+            out.add(f"V {letter}[{max(size, 1)}];")
+        for k, value in enumerate(self.kept):
+            value = value.replace("x[", "X[")  # x is the vector here
+            kind = "" if "[" in value else "const V "
+            out.add(f"{kind}{value} = from[{k}];")
+        number = {c: k for k, c in enumerate(layout.components)}
+        for k in f.needs["direction"]:
+            quantity = layout.form.all[k]
+            c = number[quantity.component]
+            terms = [f"slopes[{c}][{m}][p] * I{m}{quantity.axis}" for m in range(D)]
+            value = f"u[{c}][p]" if quantity.axis is None else " + ".join(terms)
+            out.add(f"t[{k}] = {value};")
+        call = function.name(layout, Task.PRODUCT)
+        out.add(f"failed |= {call}(parameters, X, g, e, b, t, P, A);")
+        self._fluxes(out, number, D)
+        out.close()
+
+    def _place(self) -> str:
+        D, q = self.layout.dimension, self._sizes[1]
+        terms = [f"q / {q ** (D - 1 - k)} % {q} * {q**k}" for k in range(D)]
+        return " + ".join(terms)
+
+    def _fluxes(self, out: Lines, number: dict[Component, int], D: int) -> None:
+        places = {quantity: f"P[{k}]" for k, quantity in enumerate(self.layout.form.unknowns)}
+        met = components(places)
+        for c, k in number.items():
+            value = places.get(Quantity(c, None))
+            if self._of_values:
+                out.add(f"u[{k}][p] = {f'w * {value}' if value else 'softehl_splat(0.0)'};")
+            slopes = {q.axis: v for q, v in places.items() if q.component == c}
+            slopes.pop(None, None)
+            for m in range(D):
+                total = " + ".join(f"{v} * I{m}{axis}" for axis, v in slopes.items())
+                text = f"w * ({total})" if slopes and c in met else "softehl_splat(0.0)"
+                out.add(f"slopes[{k}][{m}][p] = {text};")
+
+
+def _lagrange(
+    nodes: list[float], at: list[float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values and slopes (points, nodes) of Lagrange's polynomials."""
+    values, slopes = np.ones((len(at), len(nodes))), np.zeros((len(at), len(nodes)))
+    for a, x in enumerate(nodes):
+        others = [b for b in nodes if b != x]
+        scale = float(np.prod([x - b for b in others]))
+        for k, p in enumerate(at):
+            values[k, a] = np.prod([p - b for b in others]) / scale
+            slopes[k, a] = sum(np.prod([p - b for b in others if b != c]) for c in others) / scale
+    return values, slopes

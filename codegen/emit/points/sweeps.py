@@ -1,0 +1,69 @@
+"""A matrix along one direction of a cell, with half of its products by its symmetry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softehl.codegen.emit.printer import number
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A matrix (rows, columns) that is the same, or its negative, when both are reversed.
+
+    sign: 1 or -1.
+    """
+
+    values: NDArray[np.float64]
+    sign: int
+
+    def __post_init__(self) -> None:
+        """Raises ValueError where it has no such symmetry."""
+        mirrored = self.sign * self.values[::-1, ::-1]
+        if not np.allclose(mirrored, self.values, rtol=0.0, atol=1e-12):
+            raise ValueError("the matrix along a line is not symmetric to its middle")
+
+
+def sweep(name: str, table: Table, kind: str) -> str:
+    """A function of C that multiplies values along a line by the matrix.
+
+    kind: "forth", or "back" by the transpose; back along slopes adds to what is there. Sums and
+    differences of mirrored values are multiplied, each by half of the matrix.
+    """
+    matrix = table.values if kind == "forth" else table.values.T
+    rows, columns = matrix.shape
+    half = columns // 2
+    lines = [f"    const V a{k} = a[{k} * step];" for k in range(columns)]
+    for i in range(half):
+        j = columns - 1 - i
+        lines.append(f"    const V e{i} = a{i} + a{j}, o{i} = a{i} - a{j};")
+    if columns % 2:
+        lines.append(f"    const V e{half} = a{half};")
+    adds = "+=" if kind == "back" and table.sign < 0 else "="
+    for k in range((rows + 1) // 2):
+        row, mirror = matrix[k], rows - 1 - k
+        even = [(row[i] + row[columns - 1 - i]) / 2 for i in range(half)]
+        odd = [(row[i] - row[columns - 1 - i]) / 2 for i in range(half)]
+        even += [row[half]] if columns % 2 else []
+        if k == mirror and table.sign < 0:
+            even = []
+        if k == mirror and table.sign > 0:
+            odd = []
+        lines.append(f"    const V E{k} = {_sum('e', even)};")
+        lines.append(f"    const V O{k} = {_sum('o', odd)};")
+        lines.append(f"    b[{k} * step] {adds} E{k} + O{k};")
+        if k != mirror:
+            value = f"E{k} - O{k}" if table.sign > 0 else f"O{k} - E{k}"
+            lines.append(f"    b[{mirror} * step] {adds} {value};")
+    body = "\n".join(lines)
+    head = "const V *restrict a, V *restrict b, const int step"
+    return f"static inline void {name}({head})\n{{\n{body}\n}}\n"
+
+
+def _sum(letter: str, factors: list[float]) -> str:
+    """Sum of products; zero if there are none."""
+    terms = [f"{letter}{i} * {number(float(f))}" for i, f in enumerate(factors)]
+    return " + ".join(terms) or "softehl_splat(0.0)"

@@ -1,0 +1,91 @@
+"""Levels of multigrid in the order of shape functions, for pages on cells of one order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.fem.assembly import ElementBlock
+from softehl.runtime.fem.orders import LOWER, Transfer, cell_of, interpolation
+from softehl.runtime.fem.products import Places, require_product
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """What all states share: places of elements, and the levels of lower order.
+
+    places: of the elements of a block. transfers: to the first lower order, and lower: unknowns
+    (n, k) of the elements there. unknowns: of every level by their numbers in the system; on lower
+    levels those of a node are neighbours. steps: interpolation to each level from the next.
+    components: unknowns of a node. near: (m, k) motions that the lowest level hardly resists.
+    """
+
+    places: dict[str, Places]
+    transfers: dict[str, Transfer]
+    lower: dict[str, Integers]
+    unknowns: tuple[Integers, ...]
+    steps: tuple[csr_array, ...]
+    components: int
+    near: Array
+
+    @classmethod
+    def of(cls, system: System, pages: Sequence[ElementBlock], order: int, threads: int) -> Levels:
+        """For blocks of cells of an order."""
+        names = list(dict.fromkeys(n for b in pages for n, _ in require_product(b).places))
+        nodal = [system.numbering.nodal[name] for name in names]
+        orders = [order, LOWER[order]] if order > 1 else [1, 1]
+        while orders[-1] > 1:
+            orders.append(LOWER[orders[-1]])
+        dofs = [{b.name: b.dofs for b in pages}]
+        unknowns = [np.arange(system.size)]
+        steps: list[csr_array] = []
+        for upper, now in pairwise(orders):
+            own = {b.name: Transfer.of(b, now).lower_dofs(b) for b in pages}
+            first = np.concatenate([d[:, :, 0].ravel() for d in own.values()])
+            at = np.flatnonzero(np.isin(nodal[0], first))
+            found = np.stack([numbers[at] for numbers in nodal], axis=1).ravel()
+            inverse = np.empty(system.size, dtype=np.int64)
+            inverse[found] = np.arange(len(found))
+            dofs.append({n: inverse[d.reshape(len(d), -1)] for n, d in own.items()})
+            pairs = [
+                (dofs[-2][b.name], dofs[-1][b.name], _element(b, upper, now, whole=len(steps) == 0))
+                for b in pages
+            ]
+            steps.append(interpolation(pairs, len(unknowns[-1]), len(found)))
+            unknowns.append(found)
+        places = {b.name: Places.of(b, threads) for b in pages}
+        transfers = {b.name: Transfer.of(b, orders[1]) for b in pages}
+        near = _motions(system, names, at)
+        return cls(places, transfers, dofs[1], (*unknowns,), (*steps,), len(names), near)
+
+
+def _element(block: ElementBlock, upper: int, lower: int, *, whole: bool) -> Array:
+    """Interpolation of an element; whole: to its unknowns in the order of the kernel."""
+    if whole:
+        return Transfer.of(block, lower).whole()
+    kernel = require_product(block)
+    cell, components = CELLS[kernel.cell], len(kernel.unknowns) // kernel.nodes
+    local = cell_of(cell, lower).shape(cell_of(cell, upper).nodes)
+    return np.asarray(np.kron(local, np.eye(components)))
+
+
+def _motions(system: System, names: Sequence[str], nodes: Integers) -> Array:
+    """Shifts of each component, and rotations where the components are displacements."""
+    axes, dimension = [name.rpartition("_")[2] for name in names], system.mesh.dimension
+    places = system.mesh.points[nodes]
+    places = places - places.mean(axis=0)
+    modes = [np.tile(row, len(places)) for row in np.eye(len(names))]
+    if axes == list("xyz"[:dimension]):
+        for i in range(dimension):
+            for k in range(i):
+                turn = np.zeros((len(places), dimension))
+                turn[:, i], turn[:, k] = places[:, k], -places[:, i]
+                modes.append(turn.ravel())
+    return np.stack(modes, axis=1)

@@ -1,0 +1,152 @@
+"""The engine `matrix-free`: conjugate gradients with products, and multigrid in the order.
+
+The tangent of pages is never a matrix. At every Newton step the tangents of elements are evaluated
+once, for its diagonal and for the matrix of the next lower order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.engines.levels import Levels
+from softehl.runtime.engines.tangent import Iteration, Tangent
+from softehl.runtime.fem.assembly import Assembler
+from softehl.runtime.fem.loads import Tie
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.products import NoProductError, require_product, threads
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.share import Share
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.statement.records import StudyError
+from softehl.runtime.system import System
+
+_WHO = 'linear = "matrix-free"'
+
+
+@dataclass(eq=False)
+class MatrixFree:
+    """Settings of the engine.
+
+    tolerance: of the linear solutions, relative to the residual. most: iterations of one. threads:
+    of products; None: $OMP_NUM_THREADS, or all processors. iterations: of every solution so far.
+    """
+
+    tolerance: float = 1e-6
+    most: int = 1000
+    threads: int | None = None
+    iterations: list[int] = field(default_factory=list)
+
+    def spread(self, system: System) -> System:
+        """See `Engine`.  Raises StudyError for what it cannot solve."""
+        try:
+            pages = [system.assembler.block(name) for name in system.blocks]
+            kernels = [require_product(block) for block in pages]
+        except NoProductError as error:
+            raise StudyError(f"{_WHO}: {error}") from None
+        cells = {kernel.cell: CELLS[kernel.cell].order for kernel in kernels}
+        if len(set(cells.values())) > 1:
+            raise StudyError(f"{_WHO}: cells {', '.join(cells)} have several orders; it takes one")
+        fields = {tuple(dict.fromkeys(name for name, _ in kernel.places)) for kernel in kernels}
+        if len(fields) > 1:
+            raise StudyError(f"{_WHO}: pages have different fields; all must have the same")
+        if any(isinstance(b.kernel, Tie) for b in system.assembler.blocks):
+            raise StudyError(f"{_WHO}: it cannot solve for the forces of ties; leave linear out")
+        order = next(iter(cells.values()))
+        levels = Levels.of(system, pages, order, self.threads or threads())
+        iteration = Iteration(self.tolerance, self.most, self.iterations)
+        return replace(system, share=_Alone(levels, iteration))
+
+    def newton(self, given: Newton | None) -> Newton:
+        """See `Engine`."""
+        return replace(given or Newton(), linear=Iterative())
+
+
+@dataclass(frozen=True)
+class Iterative:
+    """The linear solver of such problems."""
+
+    name: str = "matrix-free"
+
+    def factorise(self, K: Any) -> Tangent:
+        """The tangent itself, which can solve."""
+        assert isinstance(K, Tangent)
+        return K
+
+
+class _Alone(Share):
+    """One process, without matrices."""
+
+    def __init__(self, levels: Levels, iteration: Iteration) -> None:
+        self.levels, self.iteration = levels, iteration
+
+    def posed(self, problem: Problem) -> Matrixless:
+        """See `Share`."""
+        return Matrixless(problem, self.levels, self.iteration)
+
+
+@dataclass(frozen=True, eq=False)
+class Matrixless:
+    """A problem as Newton's method sees it, whose tangent is no matrix."""
+
+    problem: Problem
+    levels: Levels
+    iteration: Iteration
+
+    @property
+    def assembler(self) -> Assembler:
+        """See `Problem`."""
+        return self.problem.assembler
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """See `Problem`."""
+        return self.problem.parameters
+
+    def fields(self, name: str, x: Array) -> dict[str, Array]:
+        """See `Problem`."""
+        return self.problem.fields(name, x)
+
+    def at(self, x: Array) -> Matrixless:
+        """See `Problem`: it has no elements that are sought."""
+        return self
+
+    def residual(self, x: Array) -> Array:
+        """See `Problem`."""
+        return self.problem.residual(x)
+
+    def linearise(self, x: Array) -> tuple[Array, Tangent]:
+        """See `Problem`."""
+        problem = self.problem
+        r = problem.assembler.residual(x, problem.parameters)
+        tangent = Tangent.of(problem, self.levels, self.iteration, x)
+        defect = np.zeros_like(r)
+        defect[problem.fixed] = x[problem.fixed] - problem.values
+        if defect.any():
+            r = r - tangent.times(defect)
+        r[problem.fixed] = defect[problem.fixed]
+        return r, tangent
+
+    def norm(self, r: Array) -> float:
+        """Never asked: the problem measures its residuals itself."""
+        raise NotImplementedError
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """See `Problem`."""
+        return self.problem.step_limit(x, dx)
+
+    def measure(self, x: Array, K: Any, *, rounded: bool = False) -> float:
+        """See `Problem`, where |K| is taken for its bound by the diagonal."""
+        return self.problem.measure(x, K, rounded=rounded)
+
+    def name_of(self, number: int) -> str:
+        """See `Problem`."""
+        return self.problem.name_of(number)
+
+    def where_not_finite(self, x: Array) -> str:
+        """See `Problem`."""
+        return self.problem.where_not_finite(x)

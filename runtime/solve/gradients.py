@@ -1,0 +1,78 @@
+"""Krylov methods of matrices that are known by their products."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from softehl.runtime.arrays import Array
+
+_RESTART = 60  # vectors that GMRES keeps
+Apply = Callable[[Array], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Where conjugate gradients ended.
+
+    x: (n,). iterations: that it took. converged: whether the residual is small enough. negative:
+    whether a direction with negative curvature was met; x is then what was found before it.
+    """
+
+    x: Array
+    iterations: int
+    converged: bool
+    negative: bool = False
+
+
+def conjugate_gradients(
+    apply: Apply, precondition: Apply, b: Array, tolerance: float, most: int
+) -> Found:
+    """x of A x = b from zero, until the residual is `tolerance` times b.
+
+    A is symmetric; where it turns out to be indefinite, that is the end.
+    """
+    x, r = np.zeros_like(b), b.copy()
+    target = tolerance * float(np.linalg.norm(b))
+    p, before = np.zeros_like(b), 1.0
+    for k in range(most):
+        if float(np.linalg.norm(r)) <= target:
+            return Found(x, k, converged=True)
+        z = precondition(r)
+        product = float(r @ z)
+        p = z + product / before * p if k else z
+        Ap = apply(p)
+        curvature = float(p @ Ap)
+        if not curvature > 0.0 or not product > 0.0:
+            return Found(x if k else z, k + 1, converged=False, negative=curvature <= 0.0)
+        x, r = x + product / curvature * p, r - product / curvature * Ap
+        before = product
+    return Found(x, most, converged=False)
+
+
+def minimal_residuals(
+    apply: Apply, precondition: Apply, b: Array, tolerance: float, most: int
+) -> Found:
+    """The same for any A, by GMRES."""
+    counts, n = [0], len(b)
+
+    def told(_: float) -> None:
+        counts[0] += 1
+
+    A = LinearOperator((n, n), matvec=apply, dtype=np.float64)
+    M = LinearOperator((n, n), matvec=precondition, dtype=np.float64)
+    restart = min(_RESTART, most)
+    x, failed = gmres(
+        A,
+        b,
+        rtol=tolerance,
+        maxiter=-(-most // restart),
+        M=M,
+        restart=restart,
+        callback=told,
+        callback_type="pr_norm",
+    )
+    return Found(np.asarray(x), counts[0], converged=not failed)
