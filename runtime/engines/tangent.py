@@ -89,6 +89,9 @@ class Tangent:
     def __abs__(self) -> _Bound:
         return _Bound(self)
 
+    def loosest(self) -> None:
+        """See `solve.held.Judging`: iterations that converged show that the matrix is regular."""
+
     def solve(self, r: Array) -> Array:
         """x of K x = r.  Raises SingularMatrix where the iteration does not get there."""
         given, cycle = self.iteration, self._multigrid()

@@ -115,7 +115,7 @@ def test_a_tangent_that_is_not_symmetric() -> None:
 
 def test_what_it_cannot_solve_is_refused() -> None:
     study = block(2, 0.3)
-    with pytest.raises(StudyError, match="linear = 'gamg': allowed is"):
+    with pytest.raises(StudyError, match="linear = 'gamg': allowed are"):
         study.solve(linear="gamg")  # type: ignore[arg-type]
     with pytest.raises(StudyError, match="is an engine by itself: leave engine out"):
         study.solve(linear="matrix-free", engine="serial")
