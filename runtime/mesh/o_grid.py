@@ -20,10 +20,14 @@ LONG, SHORT = 27, 6
 """Segments at density 1: of the arc, and of each side block."""
 
 MOST_LAYERS, STEEPEST_GROWTH = 6, 2.0
-"""Layers at density 1, and the largest ratio of one to the one outside of it at density 2."""
+"""Layers at density 1, and the largest ratio of one to the one outside of it at density 2: 1.5
+changes h* of an O-ring by 0.2 %, 3 by nothing."""
 
 _SIDES = 35.0  # degrees that the side blocks need at least: with 25 their upper corners fold
-_CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0  # of fine grids
+_CORNERS, _TOP, _LAYER_GROWTH, _ROW_GROWTH = (0.965, 0.62), 90.0, 20.0, 5.0
+"""Of fine grids: growths of half or twice that, tops at 80 and 105 degrees and layers of 0.025 to
+0.05 radii change h* of an O-ring by 0.06 % at most. Growths of 8 and 2.4 and tops at 112 degrees
+together doubled the time of one instroke at three shear moduli, density 4."""
 _DENSITY = 2  # for which sizes are chosen; other densities divide or join its segments
 
 

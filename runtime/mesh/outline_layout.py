@@ -28,6 +28,8 @@ DEPTH = 0.035
 SMOOTH = 0.02
 """Normals are means over at least so much of the outline to either side, mm."""
 
+# On an X-ring and a U-cup h* changes by 0.35 % at most with half or twice of DEPTH, _RATE, _TURN
+# and _SLOPE and with 40 to 90 AROUND, by 0.02 % with half or twice of _SHORTEST and _CLEAREST.
 _RATE = 0.5  # growth of the segments outside the film with the distance from it, at density 1
 _TURN = 0.4  # rad, by which the outline turns on a segment
 _SHORTEST = 0.4  # of the film's last segments: no arc makes those beside it shorter

@@ -1,8 +1,8 @@
 """From any mesh of a section to any other: through the cells inside, by place along the boundary.
 
 Nothing gets across a mouth: what a point gets comes from the cell that it lies in, not from what
-happens to be near. What is transferred is where an iteration starts: cubic splines through the
-nodes around each cell saved not one iteration in films of O-rings, X-rings and U-cups.
+happens to be near. What is transferred is where an iteration starts: with cubic splines through the
+nodes around each cell, films of an O-ring, an X-ring and a U-cup took as many iterations.
 """
 
 from __future__ import annotations

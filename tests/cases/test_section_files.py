@@ -288,7 +288,7 @@ def test_an_outline_of_many_points_has_a_mesh() -> None:
 
 @pytest.mark.slow
 def test_an_o_ring_from_a_drawing_has_the_film_of_the_built_in_one(tmp_path: Path) -> None:
-    """Density 2, 800 mm/s: 2.0844 instead of 2.0879 um out, 1.7256 instead of 1.7268 in."""
+    """A drawn circle is a circle: it has the same mesh."""
     given: dict[str, Any] = {"speeds": (800.0,), "error_estimate": False}
     cases = {
         "drawn": ORing(outline=str(draw(DRAWN["round"], tmp_path / "ring.dxf")), **given),
@@ -296,7 +296,7 @@ def test_an_o_ring_from_a_drawing_has_the_film_of_the_built_in_one(tmp_path: Pat
     }
     drawn, built_in = solve_cases(cases, tmp_path / "runs")
     for a, b in zip(drawn.rows, built_in.rows, strict=True):
-        assert a.h_star_um == pytest.approx(b.h_star_um, rel=2e-3)
+        assert a.h_star_um == pytest.approx(b.h_star_um, rel=5e-4)
         assert a.verdict == b.verdict
 
 
