@@ -175,7 +175,7 @@ class _Path:
         self.x = x
         self.histories = self.cell.system.committed(reduced.problem, x, self.histories)
         whole = Point(point.parameter, replace(point.solution, x=x))
-        result = Result(self.cell.system, reduced.problem, whole, self.histories)
+        result = Result(self.cell.system, reduced.problem.at(x), whole, self.histories)
         self.reached = Homogenised(self.cell, F, result)
 
 
@@ -197,12 +197,14 @@ class Reduced:
 
     def residual(self, z: Array) -> Array:
         """See `NonlinearProblem`."""
-        r = self.problem.assembler.residual(self.full(z), self.problem.parameters)
+        x = self.full(z)
+        r = self.problem.at(x).assembler.residual(x, self.problem.parameters)
         return np.asarray(self.basis.T @ r)
 
     def linearise(self, z: Array) -> tuple[Array, csc_array[np.float64]]:
         """See `NonlinearProblem`."""
-        r, K = self.problem.assembler.linearise(self.full(z), self.problem.parameters)
+        x = self.full(z)
+        r, K = self.problem.at(x).assembler.linearise(x, self.problem.parameters)
         return np.asarray(self.basis.T @ r), csc_array(self.basis.T @ K @ self.basis)
 
     def norm(self, r: Array) -> float:
@@ -215,8 +217,9 @@ class Reduced:
 
     def measure(self, z: Array, K: object, *, rounded: bool = False) -> float:
         """Residuals of each field relative to its forces, inf where they are not finite."""
-        given = self.full(z), self.problem.parameters
-        r, forces = self.problem.assembler.residual_and_size(*given)
+        x = self.full(z)
+        assembler = self.problem.at(x).assembler
+        r, forces = assembler.residual_and_size(x, self.problem.parameters)
         if not np.isfinite(r).all():
             return float("inf")
         worst = 0.0
