@@ -53,7 +53,7 @@ def pair(nodes: int, others: int) -> Definition:
     limit = m.define("limit", friction * p)
     stick = m.define("stick", interpolate(at.L, tau) + rho * at.slip(m, _moved(X, old), nodes))
     slides = sp.Piecewise((limit, stick > limit), (-limit, stick < -limit), (stick, True))
-    q = m.define("q", slides, interface=True)
+    q = m.define("q", sp.Piecewise((slides, trial >= 0), (0, True)), interface=True)
     area = m.define("area", at.half * _area(nodes, at.xi, [c[:nodes] for c in X], ring))
     force = [
         m.define(f"force_{c}", area * (p * at.n[k] + q * at.t[k]), interface=True) for k, c in _AXES

@@ -14,6 +14,7 @@ from softehl.runtime.fem.touching import TouchingProblem
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.mesh.thickness import in_chains, inner_radii, thickness
 from softehl.runtime.result import Result
+from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.statement.records import StudyError
 from tests.runtime.touching_bodies import (
     elastic,
@@ -65,6 +66,17 @@ def test_bodies_may_start_apart_or_overlap(apart: float) -> None:
     touching.fix("upper:top", u_x=0, u_y=-0.1)
     expected = force(touching.solve())
     assert force(study.solve()) == pytest.approx(expected, rel=0.15 * abs(apart) / 0.05 + 1e-9)
+
+
+def test_a_body_that_only_contact_could_hold_is_told() -> None:
+    study = stacked(1, 1, apart=0.1)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.fix("upper:left", u_x=0)
+    study.load("upper:top", u_y=-0.2)
+    with pytest.raises(NotConverged, match="nothing prevents a translation along y"):
+        study.solve()
+    study.spring("upper:top", u_y=1e-4)
+    assert force(study.solve(steps=2)) == pytest.approx(0.2, rel=1e-3)
 
 
 def test_bodies_that_stay_apart_do_not_notice_each_other() -> None:
