@@ -55,7 +55,7 @@ def negative_by_factors(problem: Any, K: Any, factors: Any) -> int | None:
     found = pivots()
     if found is None:
         return None
-    natural = concave(problem.layout, K, problem.fixed)
+    natural = concave(problem, K)
     return max(int((found < 0.0).sum()) - int(natural.sum()), 0)
 
 

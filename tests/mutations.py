@@ -306,8 +306,8 @@ FAULTS = (
     ),
     Fault(
         "runtime/fem/averaged.py",
-        "slopes += weight * s * K",
-        "slopes += weight * K",
+        "s = 0.5 * (1.0 + xi)",
+        "s = 0.5 + 0.0 * xi",
         "tests/runtime/test_dynamics.py",
     ),
     Fault(

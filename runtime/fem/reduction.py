@@ -9,7 +9,6 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from softehl.runtime.arrays import Flags, Integers
-from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 
@@ -43,7 +42,7 @@ class Reduction:
         columns = number[group[rows]]
         found = csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, int((~held).sum())))
         saddle = np.zeros(found.shape[1], dtype=bool)
-        saddle[columns] = concave(problem.layout, K, problem.fixed)[rows]
+        saddle[columns] = concave(problem, K)[rows]
         return cls(found, saddle)
 
     def matrix(self, K: csc_array) -> csc_array:
@@ -51,11 +50,13 @@ class Reduction:
         return csc_array(self.map.T @ K @ self.map)
 
 
-def concave(layout: DofLayout, K: csc_array, fixed: Integers) -> Flags:
+def concave(problem: Problem, K: csc_array) -> Flags:
     """Unknowns (n,) of the fields no diagonal entry of which is positive, without fixed ones.
 
-    Only of fields that are coupled to others: one by itself is no multiplier, it is unstable.
+    One that is coupled to no other field is no multiplier, it is unstable, where its pages have
+    energies; the sign of an equation that a page writes down itself says nothing.
     """
+    layout, fixed = problem.layout, problem.fixed
     found: Flags = np.zeros(layout.total, dtype=bool)
     diagonal = K.diagonal()
     diagonal[fixed] = 0.0
@@ -63,10 +64,18 @@ def concave(layout: DofLayout, K: csc_array, fixed: Integers) -> Flags:
         found[part] = bool((diagonal[part] <= 0.0).all())
     found[fixed] = False
     others = abs(K) @ (~found).astype(np.float64)
+    others[_written(problem)] = 1.0
     for part in layout.fields:
         if not others[part].any():
             found[part] = False
     return found
+
+
+def _written(problem: Problem) -> Integers:
+    """Unknowns of pages without an energy."""
+    blocks = problem.assembler.blocks
+    pages = [b for b in blocks if "energy" not in getattr(b.kernel, "tasks", ("energy",))]
+    return np.concatenate([np.empty(0, dtype=np.int64), *(b.dofs.ravel() for b in pages)])
 
 
 def is_symmetric(K: csc_array) -> bool:
