@@ -19,7 +19,7 @@ from softehl.runtime.system import System
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """What all states share: places of elements, and the levels of lower order.
+    """Places of elements and levels of lower order, which all states share.
 
     places: of the elements of a block. transfers: to the first lower order, and lower: unknowns
     (n, k) of the elements there. unknowns: of every level by their numbers in the system; on lower

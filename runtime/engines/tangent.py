@@ -79,7 +79,7 @@ class Tangent:
         return y
 
     def apply(self, v: Array) -> Array:
-        """The same with rows and columns of prescribed unknowns replaced by those of 1."""
+        """K v with rows and columns of prescribed unknowns replaced by those of 1."""
         return np.where(self.free, self.times(np.where(self.free, v, 0.0)), v)
 
     def diagonal(self) -> Array:

@@ -52,10 +52,11 @@ def threads() -> int:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where the elements of a block stand, whatever their state.
+    """Places of the elements of a block, whatever their state.
 
     order: (m,) elements in groups, some twice to fill up a group. index: (m, nodes) numbers of
-    their nodes, x running first; the second of an element is nowhere: a place beside all nodes.
+    their nodes, x running first; an element that stands there twice is nowhere the second time, at
+    a place beside all nodes.
     unknowns: (nodes, components) numbers of unknowns in the system. runs: (first, last) of each
     thread; rest: of what is shared.
     """

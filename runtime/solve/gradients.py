@@ -16,7 +16,7 @@ Apply = Callable[[Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where conjugate gradients ended.
+    """End of an iteration.
 
     x: (n,). iterations: that it took. converged: whether the residual is small enough. negative:
     whether a direction with negative curvature was met; x is then what was found before it.
@@ -56,7 +56,7 @@ def conjugate_gradients(
 def minimal_residuals(
     apply: Apply, precondition: Apply, b: Array, tolerance: float, most: int
 ) -> Found:
-    """The same for any A, by GMRES."""
+    """x of A x = b for any A, by GMRES; otherwise as `conjugate_gradients`."""
     counts, n = [0], len(b)
 
     def told(_: float) -> None:

@@ -57,6 +57,6 @@ def test_deriving_needs_one_extra_more() -> None:
 
 
 def test_there_is_an_extra_for_each_purpose() -> None:
-    wanted = {"benchmarks", "cad", "cluster", "dev", "docs", "fast", "generate", "mpi"}
+    wanted = {"amg", "benchmarks", "cad", "cluster", "dev", "docs", "fast", "generate", "mpi"}
     wanted |= {"hosts", "report"}
     assert set(PROJECT["optional-dependencies"]) == wanted

@@ -77,7 +77,7 @@ def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
 
 
 def _store_by_ranks(out: Lines, layout: Layout, *, symmetric: bool) -> None:
-    """The same for a large tangent: of two mirrored entries that of the lower rank is there."""
+    """Stores of a large tangent: of two mirrored entries that of the lower rank is there."""
     size = len(layout.d.unknowns)
     order = {rank: n for n, rank in enumerate(sorted(ranks(layout)))}
     numbers = ", ".join(str(order[rank]) for rank in ranks(layout))

@@ -39,7 +39,7 @@ from softehl.codegen.language.elements.cells import ELEMENTS
 
 
 def fits(layout: Layout) -> bool:
-    """Whether a page has a product by sum factorisation on its cell."""
+    """True if a page has a product by sum factorisation on its cell."""
     shape, cell = layout.geometry, layout.d.cell
     if shape.line is None or not cell.startswith(("quad", "hex")) or layout.dimension < 2:
         return False
@@ -74,7 +74,7 @@ class Factored:
 
     @property
     def kept(self) -> list[str]:
-        """What is kept at a point: variables of C."""
+        """Variables of C that are kept at a point."""
         D, needs = range(self.layout.dimension), self.frame.needs
         found = [f"I{k}{m}" for k in D for m in D] + ["w"]
         for array, letter in function.ARRAYS.items():
@@ -252,7 +252,7 @@ class Factored:
 
     @property
     def _of_values(self) -> bool:
-        """Whether there are fluxes that belong to values."""
+        """True if there are fluxes that belong to values."""
         return any(q.axis is None for q in self.layout.form.unknowns)
 
     def _points(self, out: Lines, points: int) -> None:
