@@ -9,8 +9,6 @@ it stays held, as friction on the housing would hold it, and the force of that i
 
 from __future__ import annotations
 
-import numpy as np
-
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import ContactLoads
 from softehl.cases.seal.equations.system import BORE, ROD
@@ -98,21 +96,10 @@ def at_air_wall(system: SealSystem, x: Array) -> tuple[Array, float]:
 
     It fulfils the equations, but for those of the wall: rod and housing are cylinders.
     """
-    p, y, (z, r) = system.parameters, x.copy(), system.deformed(x).T
-    shift = float((_air_wall(p, r) - z).min()) + TOUCH * p.section_diameter
+    p, y = system.parameters, x.copy()
+    shift = p.air_wall - float(system.deformed(x)[:, 0].max()) + TOUCH * p.section_diameter
     system.displacements(y)[:, 0] += shift
     return y, shift
-
-
-def _air_wall(p: ORing, r: Array) -> Array:
-    """Where the wall of the air side is at radii (n,), mm: inf in a gap below its rounded edge."""
-    wall = np.full(len(r), p.air_wall)
-    if p.opens:
-        fillet = p.corner_fillet
-        below = np.maximum(0.5 * p.rod_diameter + p.extrusion_gap + fillet - r, 0.0)
-        wall += fillet - np.sqrt(np.maximum(fillet**2 - below**2, 0.0))
-        wall[below > fillet] = np.inf
-    return wall
 
 
 def release_stage(system: SealSystem, x: Array) -> Stage:
