@@ -130,7 +130,7 @@ def curve_plot(runs: Sequence[FinishedRun]) -> Any:
                 _draw(
                     panel, rows, _look(runs, number, stroke), f"{run.name}, {style.STROKES[stroke]}"
                 )
-    panel.legend.location = "top_left"
+    panel.add_layout(panel.legend[0], "above")
     return panel
 
 
@@ -177,7 +177,7 @@ def friction_plot(runs: Sequence[FinishedRun]) -> Any:
                     x, y, line_color=look["color"], line_dash=look["dash"], legend_label=label
                 )
                 panel.scatter(x, y, size=6, color=look["color"])
-    panel.legend.location = "top_left"
+    panel.add_layout(panel.legend[0], "above")
     return panel
 
 
