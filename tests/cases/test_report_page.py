@@ -108,7 +108,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("sweep")
     study = place / "study.toml"
     study.write_text(
-        'case = "oring"\ndensity = 1\nspeeds = 400\nerror_estimate = false\n'
+        'case = "oring"\nmaterial = "neo-hooke"\ndensity = 1\nspeeds = 400\nerror_estimate = false\n'
         "[grid]\nsealed_pressure = [0.5, 1]\nmu = [0.5, 0.9]\n",
         encoding="utf-8",
     )

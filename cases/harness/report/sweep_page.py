@@ -18,6 +18,7 @@ from softehl.cases.harness.responses import titled, titled_value
 from softehl.runtime.io import Cell, read_json
 
 _HEIGHT, _WIDTH, _LEAST = 320, 620, 300  # px
+_COLUMNS = 12  # of a table at most: random points have a value of their own each
 _COLOURS = ("#1b6ca8", "#c8553d", "#4f8a52", "#7a5195", "#b58900", "#444444")
 
 
@@ -85,10 +86,11 @@ def read_sweep(folder: Path, shipped: Mapping[str, str]) -> FinishedSweep:
 
 def sweep_parts(sweep: FinishedSweep) -> list[Part]:
     """Best and worst runs, a table and a plot of each number, every run."""
-    keys = list(sweep.keys)
+    *others, last = sweep.keys
+    few = len({point.values[last] for point in sweep.points}) <= _COLUMNS
     parts = [_best(sweep)]
     for name in sweep.names:
-        tables = [_pivot(sweep, name)] if len(keys) > 1 else []
+        tables = [_pivot(sweep, name)] if others and few else []
         parts.append(Part(name, plots=[_plot(sweep, name)], tables=tables))
     return [*parts, _every(sweep)]
 
@@ -146,7 +148,9 @@ def _pivot(sweep: FinishedSweep, name: str) -> Table:
     for p in sweep.points:
         found.setdefault(sweep.words(p, others), {})[p.values[last]] = p.merit(name)
     header = ("", *(titled_value(_plain(last), value, sweep.keys[last]) for value in columns))
-    rows = [(words, *(cells.get(c, nan) for c in columns)) for words, cells in found.items()]
+    rows: list[Sequence[Cell]] = [
+        (words, *(cells.get(c, nan) for c in columns)) for words, cells in found.items()
+    ]
     return Table(name, header, rows)
 
 
@@ -189,7 +193,7 @@ def _plot(sweep: FinishedSweep, name: str) -> Any:
 def _every(sweep: FinishedSweep) -> Part:
     """Every run with its keys and numbers."""
     heads = (titled(_plain(key), unit) for key, unit in sweep.keys.items())
-    rows = [
+    rows: list[Sequence[Cell]] = [
         (p.number, *p.values.values(), p.status, *(p.merit(name) for name in sweep.names))
         for p in sweep.points
     ]
