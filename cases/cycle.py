@@ -22,10 +22,10 @@ from softehl.cases.seal.gland.headings import CYCLE
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.rubbers.rubber import outside
-from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
 from softehl.cases.seal.gland.trade.said import understood
 from softehl.cases.seal.gland.unused_keys import unused_keys
 from softehl.cases.seal.report.limits import LEFT_OUT
+from softehl.cases.seal.report.title import titled
 from softehl.cases.seal.states.answer import far, leaks
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
@@ -240,7 +240,7 @@ class CycleCase(Case[Cycle, CycleRow]):
 
     def titled(self, parameters: Cycle) -> str:
         """See :class:`Case`."""
-        return self.title.replace(NAMES[ROUND], parameters.named)
+        return titled(self.title, parameters)
 
     def report(self, runs: Sequence[FinishedRun]) -> Sequence[Part]:
         """See :class:`Case`."""

@@ -14,11 +14,11 @@ from softehl.cases.seal.gland.assumed import assumed
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.rubbers.rubber import outside, soft
-from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
 from softehl.cases.seal.gland.trade.said import understood
 from softehl.cases.seal.gland.unused_keys import unused_keys
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
+from softehl.cases.seal.report.title import titled
 from softehl.cases.seal.states import plan
 from softehl.cases.seal.states.answer import answer
 from softehl.cases.seal.states.leakage import net_leakage
@@ -123,7 +123,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def titled(self, parameters: ORing) -> str:
         """See :class:`Case`."""
-        return self.title.replace(NAMES[ROUND], parameters.named)
+        return titled(self.title, parameters)
 
     def foreword(self, parameters: ORing) -> list[str]:
         """See :class:`Case`."""

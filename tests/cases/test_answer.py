@@ -121,7 +121,8 @@ def test_a_report_is_titled_by_its_seal() -> None:
         cycle.CASE.titled(cycle.Cycle(section="u_cup", groove_width=6.0)),
     ]
     for title, name in zip(titles, ("O-ring", "X-ring", "U-cup"), strict=True):
-        assert title.startswith(f"reciprocating {name}, a rod seal")
+        seal = f"{name} 50.39 \N{MULTIPLICATION SIGN} 3.53 mm"
+        assert title.startswith(f"reciprocating {seal}, a rod seal")
 
 
 def test_no_text_of_a_sheet_is_a_formula(tmp_path: Path) -> None:

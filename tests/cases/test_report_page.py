@@ -87,6 +87,69 @@ def test_two_folders_side_by_side(runs: tuple[Path, Path], tmp_path: Path) -> No
     )
 
 
+def test_runs_side_by_side_have_materials_and_leakage(
+    runs: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "both.html"
+    assert main(["report", *map(str, runs), "--out", str(out)]) == 0
+    text = out.read_text(encoding="utf-8")
+    assert "Materials and leakage side by side" in text
+    for folder in runs:
+        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        assert f"<td>{content['parameters']['mu']:.4g}</td>" in text
+        assert f"<td>{100.0 * content['leakage'][0]['net_mm3_per_mm']:.4g}</td>" in text
+    heads = re.findall(r"<th>([^<]*)</th>", text)
+    assert [head for head in heads if re.search(r"_(um|mm|mm_s|MPa|N|percent)\b", head)] == []
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep of two keys of the seal, two values each."""
+    place = tmp_path_factory.mktemp("sweep")
+    study = place / "study.toml"
+    study.write_text(
+        'case = "oring"\nmaterial = "neo-hooke"\ndensity = 1\nspeeds = 400\n'
+        "error_estimate = false\n"
+        "[grid]\nsealed_pressure = [0.5, 1]\nmu = [0.5, 0.9]\n",
+        encoding="utf-8",
+    )
+    assert main(["sweep", str(study), "--out", str(place / "runs"), "--quiet"]) == 0
+    return place / "runs"
+
+
+def test_a_sweep_has_a_pivot_table_and_its_best_and_worst_run(swept: Path) -> None:
+    from openpyxl import load_workbook
+
+    assert main(["report", str(swept), "--xlsx"]) == 0
+    text = (swept / "report.html").read_text(encoding="utf-8")
+    assert "over sealed pressure and mu</h1>" in text
+    book = load_workbook(swept / "report.xlsx")
+    pivot = [[c.value for c in row] for row in book["largest friction N"].iter_rows()]
+    assert pivot[1] == [None, "mu = 0.5 MPa", "mu = 0.9 MPa"]
+    assert [row[0] for row in pivot[2:]] == ["sealed pressure = 0.5 MPa", "sealed pressure = 1 MPa"]
+    friction = {}
+    for number in range(1, 5):
+        content = json.loads((swept / f"runs/{number:05d}/run.json").read_text(encoding="utf-8"))
+        friction[number] = max(abs(state["rod_friction_N"]) for state in content["states"])
+    assert [v for row in pivot[2:] for v in row[1:]] == pytest.approx(list(friction.values()))
+    rows = {row[0].value: [c.value for c in row] for row in book["Best and worst"].iter_rows()}
+    best, worst = (choose(friction, key=friction.__getitem__) for choose in (min, max))
+    _, least, at, most, where = rows["largest friction [N]"]
+    assert (least, most) == pytest.approx((friction[best], friction[worst]))
+    assert f"(run {best})" in str(at)
+    assert f"(run {worst})" in str(where)
+    thin = rows["thinnest film [um]"]
+    assert float(str(thin[1])) > float(str(thin[3]))  # the thicker one is better
+
+
+def test_a_sweep_that_is_damaged_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "run.json").write_text('{"points": [], "case": "oring"}', encoding="utf-8")
+    assert main(["report", str(tmp_path)]) == 2
+    assert "holds no sweep that can be read" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("content", [None, "{}", "nonsense"])
 def test_what_is_no_run_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str | None

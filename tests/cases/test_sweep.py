@@ -265,12 +265,11 @@ def test_a_sweep_is_its_runs(reference: Path) -> None:
     assert content["fixed"] == {"speeds": [400, 200], "segments": 40}
 
 
-def test_a_sweep_is_no_run_to_report(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert softehl.main(["report", str(reference)]) == 2
+def test_a_sweep_is_reported_alone(reference: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert softehl.main(["report", str(reference), str(reference)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "its results are in sweep.csv and response_*.png" in error
-    assert f"as in softehl report {reference}/runs/00001 {reference}/runs/00002" in error
+    assert "holds a sweep; allowed: one sweep alone, or runs" in error
 
 
 def test_a_folder_with_a_sweep(

@@ -51,7 +51,7 @@ def write_page(
 
     title: that of a page on something else than runs.
     """
-    text = render(runs, parts, title or _title(runs))
+    text = render(runs, parts, title)
     write_text(path, text)
     return len(text.encode())
 
@@ -75,7 +75,7 @@ def parts_of(runs: Sequence[FinishedRun]) -> list[Part]:
     return [*parts, _all_rows(runs), _all_keys(runs), _versions(runs)]
 
 
-def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str) -> str:
+def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") -> str:
     """The page, with everything that it needs."""
     try:
         from bokeh.embed import components
@@ -93,7 +93,7 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str) -> st
     page.tests["alarm"] = lambda line: isinstance(line, Alarm)
     page.filters["base64"] = lambda data: base64.b64encode(data).decode()
     return page.get_template("report.html").render(
-        title=title,
+        title=title or _title(runs),
         runs=runs,
         parts=parts,
         resources=resources.render() if plots else "",

@@ -18,6 +18,7 @@ from softehl.cases.harness.responses import titled, titled_value
 from softehl.runtime.io import Cell, read_json
 
 _HEIGHT, _WIDTH, _LEAST = 320, 620, 300  # px
+_COLUMNS = 12  # of a table at most: random points have a value of their own each
 _COLOURS = ("#1b6ca8", "#c8553d", "#4f8a52", "#7a5195", "#b58900", "#444444")
 
 
@@ -52,7 +53,7 @@ class FinishedSweep:
 
     def words(self, point: Point, keys: Sequence[str]) -> str:
         """The values of some keys of a run in words."""
-        return ", ".join(titled_value(k, point.values[k], self.keys[k]) for k in keys)
+        return ", ".join(titled_value(_plain(k), point.values[k], self.keys[k]) for k in keys)
 
 
 def is_sweep(folder: Path) -> bool:
@@ -79,16 +80,17 @@ def read_sweep(folder: Path, shipped: Mapping[str, str]) -> FinishedSweep:
     found = [point.run for point in points if point.run is not None and point.run.rows]
     if not found:
         raise BadInput(f"{folder} has no result yet: nothing to report")
-    names = ", ".join(keys)
+    names = " and ".join(map(_plain, keys))
     return FinishedSweep(case, keys, points, f"{case.titled(found[0].parameters)}; over {names}")
 
 
 def sweep_parts(sweep: FinishedSweep) -> list[Part]:
     """Best and worst runs, a table and a plot of each number, every run."""
-    keys = list(sweep.keys)
+    *others, last = sweep.keys
+    few = len({point.values[last] for point in sweep.points}) <= _COLUMNS
     parts = [_best(sweep)]
     for name in sweep.names:
-        tables = [_pivot(sweep, name)] if len(keys) > 1 else []
+        tables = [_pivot(sweep, name)] if others and few else []
         parts.append(Part(name, plots=[_plot(sweep, name)], tables=tables))
     return [*parts, _every(sweep)]
 
@@ -103,6 +105,11 @@ def _point(
     merits = run.case.merits(run.parameters, run.rows) if run and run.rows else {}
     values = {key: _value(row[key]) for key in keys}
     return Point(number, values, row["status"], run, merits)
+
+
+def _plain(key: str) -> str:
+    """A key for readers."""
+    return key.replace("_", " ")
 
 
 def _value(text: str) -> Cell:
@@ -140,8 +147,10 @@ def _pivot(sweep: FinishedSweep, name: str) -> Table:
     found: dict[str, dict[Cell, float]] = {}
     for p in sweep.points:
         found.setdefault(sweep.words(p, others), {})[p.values[last]] = p.merit(name)
-    header = ("", *(titled_value(last, value, sweep.keys[last]) for value in columns))
-    rows = [(words, *(cells.get(c, nan) for c in columns)) for words, cells in found.items()]
+    header = ("", *(titled_value(_plain(last), value, sweep.keys[last]) for value in columns))
+    rows: list[Sequence[Cell]] = [
+        (words, *(cells.get(c, nan) for c in columns)) for words, cells in found.items()
+    ]
     return Table(name, header, rows)
 
 
@@ -158,7 +167,7 @@ def _plot(sweep: FinishedSweep, name: str) -> Any:
         width_policy="max",
         max_width=_WIDTH,
         min_width=_LEAST,
-        x_axis_label=titled(first, sweep.keys[first]),
+        x_axis_label=titled(_plain(first), sweep.keys[first]),
         y_axis_label=name,
         tools="pan,box_zoom,wheel_zoom,reset,save",
         **size,
@@ -171,10 +180,11 @@ def _plot(sweep: FinishedSweep, name: str) -> Any:
             lines.setdefault(sweep.words(p, others), []).append((at, p.merit(name)))
     for number, (words, points) in enumerate(lines.items()):
         x, y = zip(*(sorted(points) if numbers else points), strict=True)
-        look = {"color": _COLOURS[number % len(_COLOURS)]}
-        label = {"legend_label": words} if words and len(lines) <= len(_COLOURS) else {}
-        panel.line(x, y, **look, **label)
-        panel.scatter(x, y, size=6, **look, **label)
+        look: dict[str, Any] = {"color": _COLOURS[number % len(_COLOURS)]}
+        if words and len(lines) <= len(_COLOURS):
+            look["legend_label"] = words
+        panel.line(x, y, **look)
+        panel.scatter(x, y, size=6, **look)
     if panel.legend:
         panel.add_layout(panel.legend[0], "above")
     return panel
@@ -182,8 +192,8 @@ def _plot(sweep: FinishedSweep, name: str) -> Any:
 
 def _every(sweep: FinishedSweep) -> Part:
     """Every run with its keys and numbers."""
-    heads = (titled(key, unit) for key, unit in sweep.keys.items())
-    rows = [
+    heads = (titled(_plain(key), unit) for key, unit in sweep.keys.items())
+    rows: list[Sequence[Cell]] = [
         (p.number, *p.values.values(), p.status, *(p.merit(name) for name in sweep.names))
         for p in sweep.points
     ]

@@ -130,7 +130,7 @@ def curve_plot(runs: Sequence[FinishedRun]) -> Any:
                 _draw(
                     panel, rows, _look(runs, number, stroke), f"{run.name}, {style.STROKES[stroke]}"
                 )
-    panel.legend.location = "top_left"
+    _place_legend(panel)
     return panel
 
 
@@ -177,8 +177,15 @@ def friction_plot(runs: Sequence[FinishedRun]) -> Any:
                     x, y, line_color=look["color"], line_dash=look["dash"], legend_label=label
                 )
                 panel.scatter(x, y, size=6, color=look["color"])
-    panel.legend.location = "top_left"
+    _place_legend(panel)
     return panel
+
+
+def _place_legend(panel: Any) -> None:
+    """Put the legend where a rising curve leaves room; a narrow one shows through it."""
+    panel.legend.location = "top_left"
+    panel.legend.background_fill_alpha = 0.5
+    panel.legend.label_text_font_size = "11px"
 
 
 def _over_speed(runs: Sequence[FinishedRun], label: str) -> Any:
