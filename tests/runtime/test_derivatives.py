@@ -151,6 +151,38 @@ def test_by_places_of_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.allclose(right, found["nodes", "x"][result.system.mesh.nodes("right")], atol=1e-14)
 
 
+def rings(points: Array) -> Study:
+    study = Study(Mesh.rectangle(2, 1, cells=(2, 2)).map(lambda _: points), "axisymmetric")
+    study.add("body", rubber, mu=0.4, K=0.9, swell=1.05)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_y=lambda x, t: 0.03 * t * x[:, 1])
+    study.pressure("bottom", 0.03)
+    return study
+
+
+def solids(points: Array) -> Study:
+    study = Study(Mesh.box((2, 1, 1), cells=(2, 1, 1)).map(lambda _: points))
+    study.add("body", rubber, mu=0.4, K=0.9, swell=1.05)
+    study.fix("left", u_x=0, u_y=0, u_z=0)
+    study.load("right", u_y=lambda x, t: 0.03 * t * x[:, 1])
+    study.pressure("bottom", 0.03)
+    return study
+
+
+@pytest.mark.parametrize("made", [rings, solids])
+def test_by_places_of_rings_and_solids(made: Callable[[Array], Study]) -> None:
+    mesh = Mesh.rectangle(2, 1, cells=(2, 2)).map(lambda x: x + np.array([0.0, 1.0]))
+    points = mesh.points if made is rings else Mesh.box((2, 1, 1), cells=(2, 1, 1)).points
+    mode = np.cos(5 * points + np.arange(points.shape[1]))
+
+    def value(s: float) -> float:
+        return made(points + s * mode).solve(newton=EXACT).reaction("left")["u_y"]
+
+    result = made(points).solve(newton=EXACT)
+    found = result.sensitivity("u_y", reaction="left", by={"nodes": {"wavy": mode}})
+    assert found["nodes", "wavy"] == pytest.approx(difference(value, 0.0, 1e-3), rel=1e-8)
+
+
 def test_by_a_field_of_an_element_each(monkeypatch: pytest.MonkeyPatch) -> None:
     study = panel()
     found = both_ways(
