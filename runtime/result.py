@@ -215,7 +215,10 @@ class Result:
     def _differentiated(self, by: By) -> tuple[Trail, list[Input]]:
         statement = self.system.everywhere.statement
         if self.trail is None or statement is None:
-            raise StudyError("this result is of no path of a study: it has no derivatives")
+            raise StudyError(
+                "this result has no derivatives: results of solve, follow and march by euler "
+                "or bdf2 have them"
+            )
         self.trail.chain()
         return self.trail, inputs(statement, by)
 

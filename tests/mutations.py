@@ -323,6 +323,18 @@ FAULTS = (
         "tests/runtime/test_bifurcation.py",
     ),
     Fault(
+        "runtime/derivatives/linear.py",
+        "csc_array(self._reduced.T) if turned",
+        "self._reduced if turned",
+        "tests/runtime/test_derivatives.py",
+    ),
+    Fault(
+        "runtime/derivatives/adjoint.py",
+        "found[:, :, k] += (self.mu * after)",
+        "found[:, :, k] -= (self.mu * after)",
+        "tests/runtime/test_derivatives.py",
+    ),
+    Fault(
         "runtime/solve/sensitivity.py",
         "linear.factorise(csc_array(K.T))",
         "linear.factorise(csc_array(K))",

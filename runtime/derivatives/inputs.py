@@ -7,6 +7,7 @@ factor of it, which is 1.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeAlias
 
@@ -263,14 +264,10 @@ class Places:
 
 def varied(statement: Statement, changes: Sequence[tuple[Input, Array]]) -> Statement:
     """A copy of a statement with other values of inputs."""
-    changed = replace(
-        statement,
-        blocks=dict(statement.blocks),
-        conditions=list(statement.conditions),
-        forces=list(statement.forces),
-        start=list(statement.start),
-        contacts=list(statement.contacts),
-    )
+    changed = copy(statement)
+    for name, value in vars(statement).items():
+        if isinstance(value, dict | list):
+            setattr(changed, name, copy(value))
     for item, value in changes:
         item.put(changed, value)
     return changed

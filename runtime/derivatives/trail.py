@@ -44,6 +44,12 @@ class Trail:
             )
         if system.statement is None or system.statement.count != system.written:
             raise StudyError("the study was changed after this result: solve it again")
+        rubbing = any(contact.friction for contact in system.statement.contacts)
+        if rubbing and not np.array_equal(self.step.old, system.at_rest()):
+            raise StudyError(
+                "friction between bodies is not followed through several steps: derivatives need "
+                "solve(steps=1) from rest, or contacts without friction"
+            )
         if not remembers(system):
             return [self]
         steps: list[Trail] = []

@@ -151,6 +151,38 @@ def test_by_places_of_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.allclose(right, found["nodes", "x"][result.system.mesh.nodes("right")], atol=1e-14)
 
 
+def rings(points: Array) -> Study:
+    study = Study(Mesh.rectangle(2, 1, cells=(2, 2)).map(lambda _: points), "axisymmetric")
+    study.add("body", rubber, mu=0.4, K=0.9, swell=1.05)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_y=lambda x, t: 0.03 * t * x[:, 1])
+    study.pressure("bottom", 0.03)
+    return study
+
+
+def solids(points: Array) -> Study:
+    study = Study(Mesh.box((2, 1, 1), cells=(2, 1, 1)).map(lambda _: points))
+    study.add("body", rubber, mu=0.4, K=0.9, swell=1.05)
+    study.fix("left", u_x=0, u_y=0, u_z=0)
+    study.load("right", u_y=lambda x, t: 0.03 * t * x[:, 1])
+    study.pressure("bottom", 0.03)
+    return study
+
+
+@pytest.mark.parametrize("made", [rings, solids])
+def test_by_places_of_rings_and_solids(made: Callable[[Array], Study]) -> None:
+    mesh = Mesh.rectangle(2, 1, cells=(2, 2)).map(lambda x: x + np.array([0.0, 1.0]))
+    points = mesh.points if made is rings else Mesh.box((2, 1, 1), cells=(2, 1, 1)).points
+    mode = np.cos(5 * points + np.arange(points.shape[1]))
+
+    def value(s: float) -> float:
+        return made(points + s * mode).solve(newton=EXACT).reaction("left")["u_y"]
+
+    result = made(points).solve(newton=EXACT)
+    found = result.sensitivity("u_y", reaction="left", by={"nodes": {"wavy": mode}})
+    assert found["nodes", "wavy"] == pytest.approx(difference(value, 0.0, 1e-3), rel=1e-8)
+
+
 def test_by_a_field_of_an_element_each(monkeypatch: pytest.MonkeyPatch) -> None:
     study = panel()
     found = both_ways(
@@ -367,3 +399,33 @@ def test_a_page_with_derivatives_of_its_own_is_refused() -> None:
     study.load((0.0,), u=1.0)
     with pytest.raises(ValueError, match="own: gives derivatives of its own"):
         study.solve().sensitivity("u", at=(0.0,), by={"node": "k"})
+
+
+def touching(mu: float = 0.4, friction: float = 0.0) -> Study:
+    lower = Mesh.rectangle(2, 1, cells=(4, 2))
+    upper = Mesh.rectangle(1, 1, cells=(3, 2)).map(lambda x: x + np.array([0.45, 1.0]))
+    study = Study(Mesh.union(lower=lower, upper=upper))
+    study.add("lower", rubber, cells="lower", mu=mu, K=0.9, swell=1)
+    study.add("upper", rubber, cells="upper", mu=0.8, K=2, swell=1)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.fix("upper:top", u_x=0.02, u_y=-0.1)
+    study.contact("upper:bottom", "lower:top", friction=friction, stiffness=2.0)
+    return study
+
+
+@pytest.mark.parametrize(("friction", "steps"), [(0.0, 2), (0.3, 1)])
+def test_through_contact_of_bodies(friction: float, steps: int) -> None:
+    def value(mu: float) -> float:
+        other = study.varied({("lower", "mu"): mu})  # its contacts stay
+        return other.solve(steps=steps, newton=EXACT).reaction("upper:top")["u_y"]
+
+    study = touching(friction=friction)
+    result = study.solve(steps=steps, newton=EXACT)
+    found = result.sensitivity("u_y", reaction="upper:top", by={"lower": "mu"})
+    assert found["lower", "mu"] == pytest.approx(difference(value, 0.4, 1e-4), rel=1e-7)
+
+
+def test_friction_of_bodies_through_steps_is_refused() -> None:
+    result = touching(friction=0.3).solve(steps=2)
+    with pytest.raises(StudyError, match="friction between bodies is not followed"):
+        result.sensitivity("u_y", reaction="upper:top", by={"lower": "mu"})
