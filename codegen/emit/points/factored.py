@@ -103,6 +103,7 @@ class Factored:
         products(f)
         geometry.write(f)
         Inputs(f).write(direction=False)
+        out.idle("x", "g", "e", "b")
         out.add(f"softehl_wide *const to = (softehl_wide *)R + {count} * q;")
         for k, value in enumerate(self.kept):
             out.add(f"to[{k}] = {value};")
