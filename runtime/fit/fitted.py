@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from typing import Any, Protocol, TypeVar
@@ -19,6 +20,7 @@ from softehl.runtime.fit.squares import Fit, LeastSquares
 from softehl.runtime.fit.trials import Objective, Run, Trials
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.result import Result
+from softehl.runtime.stability import Unstable
 from softehl.runtime.statement.given import finite
 from softehl.runtime.statement.records import Statement
 
@@ -116,9 +118,11 @@ def _runner(study: Solvable, path: Mapping[str, Any]) -> Run:
     def run(changes: Sequence[tuple[Input, Array]]) -> list[Result]:
         other, found = _changed(study, changes), list[Result]()
         given = {"progress": False, "record": True, **path}
-        if "dt" in path:
-            return list(other.march(**given))
-        other.solve(on_step=found.append, **given)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Unstable)  # of values on the way
+            if "dt" in path:
+                return list(other.march(**given))
+            other.solve(on_step=found.append, **given)
         return found
 
     return run

@@ -167,7 +167,7 @@ def test_from_a_ring_to_the_report(browser: Driver, address: str, tmp_path: Path
     hand.until(lambda: drawn(hand, "rod 19.9695 mm"))
     hand.until(lambda: any(words.startswith("squeeze 14.5") for words in hand.texts("li")))
 
-    hand.all("textarea")[0].send_keys(f"density = 1\nerror_estimate = false\nspeeds = {SPEEDS}\t")
+    hand.all("textarea")[0].send_keys(f"density = 4\nerror_estimate = false\nspeeds = {SPEEDS}\t")
     hand.click("button", "Run")
     first = "ISO-3601-20x2.65-20-f7-NBR-70"
     hand.until(lambda: first in hand.states())

@@ -15,9 +15,14 @@ OPTIONAL = {
     **{"distributed": "cluster", "pypardiso": "fast", "petsc4py": "mpi", "mpi4py": "mpi"},
     "ezdxf": "cad",
     **dict.fromkeys(("bokeh", "jinja2", "openpyxl"), "report"),
+    **dict.fromkeys(("panel", "panel_material_ui", "pandas", "tornado"), "app"),
+    "pyamg": "amg",
 }
 DISTRIBUTION = {"PIL": "pillow"}
-BROUGHT = {"petsc4py": "dolfinx-solver-real", "mpi4py": "dolfinx-solver-real"}
+BROUGHT = {
+    **{"petsc4py": "dolfinx-solver-real", "mpi4py": "dolfinx-solver-real"},
+    **{"tornado": "panel", "panel_material_ui": "panel-material-ui"},
+}
 """Packages that come with another one."""
 
 
@@ -58,5 +63,5 @@ def test_deriving_needs_one_extra_more() -> None:
 
 def test_there_is_an_extra_for_each_purpose() -> None:
     wanted = {"amg", "benchmarks", "cad", "cluster", "dev", "docs", "fast", "generate", "mpi"}
-    wanted |= {"hosts", "report"}
+    wanted |= {"app", "hosts", "report"}
     assert set(PROJECT["optional-dependencies"]) == wanted

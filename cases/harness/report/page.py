@@ -79,13 +79,16 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") 
     """The page, with everything that it needs."""
     try:
         from bokeh.embed import components
+        from bokeh.embed.bundle import bundle_for_objs_and_resources
         from bokeh.resources import Resources
         from jinja2 import Environment, FileSystemLoader
     except ImportError as error:
         raise BadInput(f"{_MISSING} ({error})") from None
     plots = {f"{i}-{k}": plot for i, part in enumerate(parts) for k, plot in enumerate(part.plots)}
     script, divs = components(plots) if plots else ("", {})
-    resources = Resources(mode="inline", components=["bokeh", "bokeh-widgets"])
+    # of these plots alone: other packages that were imported register scripts of theirs
+    bundle = bundle_for_objs_and_resources([*plots.values()], Resources(mode="inline"))
+    needed = "".join(bundle) if plots else ""
     page = Environment(
         loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
@@ -96,7 +99,7 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") 
         title=title or _title(runs),
         runs=runs,
         parts=parts,
-        resources=resources.render() if plots else "",
+        resources=needed,
         script=script,
         divs=divs,
     )
