@@ -50,7 +50,8 @@ class Page:
         self.told = pn.pane.Str("", **_WIDE)
         self.links = pn.pane.HTML("", **_WIDE)
         self.answer = pn.Column(**_WIDE)
-        self.curves = pn.FlexBox()
+        self.plots = pn.pane.Bokeh(None), pn.pane.Bokeh(None)
+        self.curves = pn.FlexBox(*self.plots)
         self.chosen: list[str] = []
         self._names: list[str] = []
         self._shown: object = None
@@ -138,8 +139,9 @@ class Page:
         if shown == self._shown:
             return
         self._shown = shown
-        self._list(states, rows)
-        self._show(chosen)
+        with pn.io.hold():  # one message: parts of several may refer to what is gone by then
+            self._list(states, rows)
+            self._show(chosen)
 
     def _list(self, states: Sequence[RunState], rows: Sequence[dict[str, str]]) -> None:
         self._names = [state.name for state in states]
@@ -165,8 +167,9 @@ class Page:
             for run in found
             if (lines := run.case.answer(run.parameters, run.rows))
         ]
-        plots = [curve_plot(found), friction_plot(found)] if found else []
-        self.curves.objects = [pn.pane.Bokeh(plot) for plot in plots]
+        plots = (curve_plot(found), friction_plot(found)) if found else (None, None)
+        for pane, plot in zip(self.plots, plots, strict=True):
+            pane.object = plot
 
 
 _COLUMNS = ("run", "seal", "rubber", "pressure", "status", "states", "answer")

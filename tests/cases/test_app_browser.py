@@ -21,7 +21,7 @@ from urllib.request import Request, urlopen
 import pytest
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-PATIENCE = 120.0
+PATIENCE = 240.0
 SPEEDS = [800, 700, 600, 500, 450, 400, 350, 300, 250, 200, 150, 120, 100, 80]
 ALL = """
 const found = [];
@@ -158,6 +158,7 @@ def reports(hand: Hand, runs: int) -> list[str]:
     return [address for address in found if address.count("run=") == runs]
 
 
+@pytest.mark.slow
 def test_from_a_ring_to_the_report(browser: Driver, address: str, tmp_path: Path) -> None:
     hand = Hand(browser)
     browser.get(address)
