@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.states.state import OSCILLATING
+from softehl.cases.seal.states.state import OSCILLATING, UNDER_RESOLVED
 from tests.cases.gland_matrix import SPEEDS, solved
 from tests.cases.section_matrix import NAMES, drawn
 
@@ -27,7 +27,7 @@ def test_what_is_drawn_fits_its_groove() -> None:
 @pytest.mark.slow
 def test_oil_gets_below_a_lip_that_lies_flat() -> None:
     found = solved(29, 150.0, drawn, stroke="out")  # a U-cup: 3 mm of lip under 0.3 MPa, and a heel
-    assert {s["verdict"] for s in found["states"]} <= {OK, OSCILLATING}
+    assert {s["verdict"] for s in found["states"]} <= {OK, OSCILLATING, UNDER_RESOLVED}
     h = [s["h_star_um"] for s in found["states"]]
     assert h == pytest.approx([9.37, 2.73, 0.833], rel=0.02)
 

@@ -73,6 +73,8 @@ def test_cook_in_plane_strain_takes_35_lines() -> None:
     assert sum(counted("cook")) <= 35
 
 
+# free out of its plane, as deal.II's panel is, where it would buckle
+@pytest.mark.filterwarnings("ignore::softehl.runtime.stability.Unstable")
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "row"), [("hex20", "3-D, `hex20`"), ("hex27", "3-D, `hex27`")])
 def test_cook_with_quadratic_elements(
