@@ -225,6 +225,7 @@ def test_nothing_is_answered_without_the_token(address: str, page: str, token: s
     assert refused.value.code in (400, 403)
 
 
+@pytest.mark.slow
 def test_files_of_a_run(address: str) -> None:
     """Needs the runs of the first test."""
     base, _, token = address.partition("/desk?")

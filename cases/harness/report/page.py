@@ -78,17 +78,17 @@ def parts_of(runs: Sequence[FinishedRun]) -> list[Part]:
 def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") -> str:
     """The page, with everything that it needs."""
     try:
+        from bokeh.core.templates import JS_RESOURCES
         from bokeh.embed import components
-        from bokeh.embed.bundle import bundle_for_objs_and_resources
         from bokeh.resources import Resources
         from jinja2 import Environment, FileSystemLoader
     except ImportError as error:
         raise BadInput(f"{_MISSING} ({error})") from None
     plots = {f"{i}-{k}": plot for i, part in enumerate(parts) for k, plot in enumerate(part.plots)}
     script, divs = components(plots) if plots else ("", {})
-    # of these plots alone: other packages that were imported register scripts of theirs
-    bundle = bundle_for_objs_and_resources([*plots.values()], Resources(mode="inline"))
-    needed = "".join(bundle) if plots else ""
+    # Bokeh's own scripts alone: `render` adds those of any package that was imported beside
+    own = Resources(mode="inline", components=["bokeh", "bokeh-widgets"]).js_raw
+    needed = JS_RESOURCES.render(js_raw=own, js_files=[]) if plots else ""
     page = Environment(
         loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
