@@ -158,6 +158,20 @@ def reports(hand: Hand, runs: int) -> list[str]:
     return [address for address in found if address.count("run=") == runs]
 
 
+def _has_files(address: str) -> None:
+    """Case file and sheet of a run, and of no other folder."""
+    base, _, token = address.partition("/desk?")
+    name = urlencode({"run": "ISO-3601-20x2.65-20-f7-NBR-70"})
+    case = fetch(f"{base}/file/case.toml?{name}&{token}").decode()
+    assert 'ring = "ISO 3601 20x2.65"' in case
+    openpyxl = pytest.importorskip("openpyxl")
+    sheet = fetch(f"{base}/file/report.xlsx?{name}&{token}")
+    assert len(openpyxl.load_workbook(BytesIO(sheet)).sheetnames) > 3
+    with pytest.raises(HTTPError, match="404") as refused:
+        fetch(f"{base}/file/case.toml?run=..%2F..&{token}")
+    refused.value.close()
+
+
 @pytest.mark.slow
 def test_from_a_ring_to_the_report(browser: Driver, address: str, tmp_path: Path) -> None:
     hand = Hand(browser)
@@ -207,6 +221,7 @@ def test_from_a_ring_to_the_report(browser: Driver, address: str, tmp_path: Path
     assert "20" in browser.title
     assert "Side by side" in browser.find_element("tag name", "body").text
     assert [e for e in browser.get_log("browser") if e["level"] == "SEVERE"] == []
+    _has_files(address)
 
 
 def fetch(url: str, **headers: str) -> bytes:
@@ -223,21 +238,6 @@ def test_nothing_is_answered_without_the_token(address: str, page: str, token: s
         fetch(f"{base}{page}{'&' if '?' in page else '?'}{token}")
     refused.value.close()
     assert refused.value.code in (400, 403)
-
-
-@pytest.mark.slow
-def test_files_of_a_run(address: str) -> None:
-    """Needs the runs of the first test."""
-    base, _, token = address.partition("/desk?")
-    name = urlencode({"run": "ISO-3601-20x2.65-20-f7-NBR-70"})
-    case = fetch(f"{base}/file/case.toml?{name}&{token}").decode()
-    assert 'ring = "ISO 3601 20x2.65"' in case
-    openpyxl = pytest.importorskip("openpyxl")
-    sheet = fetch(f"{base}/file/report.xlsx?{name}&{token}")
-    assert len(openpyxl.load_workbook(BytesIO(sheet)).sheetnames) > 3
-    with pytest.raises(HTTPError, match="404") as refused:
-        fetch(f"{base}/file/case.toml?run=..%2F..&{token}")
-    refused.value.close()
 
 
 def test_the_desk_is_on_this_machine_only(address: str) -> None:
