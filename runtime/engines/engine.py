@@ -81,5 +81,5 @@ def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
 
 
 def note_of(engine: Engine) -> Callable[[], str]:
-    """What says which linear solver an engine chose; of others than `Serial` nothing."""
+    """The words on the linear solver that an engine chose; none of others than `Serial`."""
     return engine.note if isinstance(engine, Serial) else str

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.engines.motions import motions
 from softehl.runtime.fem.assembly import ElementBlock
 from softehl.runtime.fem.orders import LOWER, Transfer, cell_of, interpolation
 from softehl.runtime.fem.products import Places, require_product
@@ -62,7 +63,7 @@ class Levels:
             unknowns.append(found)
         places = {b.name: Places.of(b, threads) for b in pages}
         transfers = {b.name: Transfer.of(b, orders[1]) for b in pages}
-        near = _motions(system, names, at)
+        near = motions(system.mesh.points[at], names)
         return cls(places, transfers, dofs[1], (*unknowns,), (*steps,), len(names), near)
 
 
@@ -74,18 +75,3 @@ def _element(block: ElementBlock, upper: int, lower: int, *, whole: bool) -> Arr
     cell, components = CELLS[kernel.cell], len(kernel.unknowns) // kernel.nodes
     local = cell_of(cell, lower).shape(cell_of(cell, upper).nodes)
     return np.asarray(np.kron(local, np.eye(components)))
-
-
-def _motions(system: System, names: Sequence[str], nodes: Integers) -> Array:
-    """Shifts of each component, and rotations where the components are displacements."""
-    axes, dimension = [name.rpartition("_")[2] for name in names], system.mesh.dimension
-    places = system.mesh.points[nodes]
-    places = places - places.mean(axis=0)
-    modes = [np.tile(row, len(places)) for row in np.eye(len(names))]
-    if axes == list("xyz"[:dimension]):
-        for i in range(dimension):
-            for k in range(i):
-                turn = np.zeros((len(places), dimension))
-                turn[:, i], turn[:, k] = places[:, k], -places[:, i]
-                modes.append(turn.ravel())
-    return np.stack(modes, axis=1)

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.engines.motions import is_vector, motions
 from softehl.runtime.names import listed
 from softehl.runtime.solve import amg, pardiso
 from softehl.runtime.solve.amg import Modes, Multigrid, OrFactors
@@ -31,20 +31,20 @@ _PARDISO = 5.0
 
 
 def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callable[[], str]]:
-    """A linear solver of that name, and what says which it is and why where size decides.
+    """A linear solver of that name, and a function that says which and why where size decides.
 
     Raises StudyError for an unknown name or where multigrid cannot be used.
     """
     if linear not in get_args(Linear):
         raise StudyError(f"linear = {linear!r}: allowed are {listed(get_args(Linear))}")
     if linear in ("superlu", "pardiso"):
-        return choose(linear), _nothing
+        return choose(linear), str
     direct = choose("auto")
     dimension, faster = system.mesh.dimension, _PARDISO if pardiso.available() else 1.0
     size = f"{system.size} unknowns in {dimension}-D"
     large = linear == "auto" and system.size > FACTORS_UP_TO[dimension] * faster
     if linear == "direct" or not (large or linear == "amg"):
-        return direct, _nothing
+        return direct, str
     modes = nodal_modes(system)
     if modes is None:
         why = "multigrid needs the components of one vector, or one scalar, as the only unknowns"
@@ -61,38 +61,17 @@ def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callabl
     return direct, lambda: f"factors by {direct.name} in spite of {size}: {why}"
 
 
-def _nothing() -> str:
-    return ""
-
-
 def nodal_modes(system: System) -> Modes | None:
     """Rigid-body motions of displacements, or a constant; None where there is more at the nodes."""
     nodal, layout = system.numbering.nodal, system.numbering.layout
     names = [*layout.names]
     if any(name not in nodal for name in names):
         return None
-    stems = {name.rpartition("_")[0] for name in names}
-    axes = "".join(name.rpartition("_")[2] for name in names)
-    vector = len(stems) == 1 and axes == "xyz"[: system.mesh.dimension]
-    if not vector and len(names) > 1:
+    if len(names) > 1 and not is_vector(names, system.mesh.dimension):
         return None
     numbers = np.stack([nodal[name] for name in names], axis=1)
     there = (numbers >= 0).all(axis=1)
     if numbers[there].size != system.size:
         return None
-    places = system.mesh.points[there]
-    near = _rigid_motions(places) if vector else np.ones((len(places), 1))
+    near = motions(system.mesh.points[there], names)
     return Modes(numbers[there].ravel(), len(names), near)
-
-
-def _rigid_motions(places: Array) -> Array:
-    """Translations and infinitesimal rotations (n dim, k) of places (n, dim), of size 1."""
-    n, dim = places.shape
-    apart = places - places.mean(axis=0)
-    apart /= float(np.abs(apart).max(initial=0.0)) or 1.0
-    pairs = [(i, j) for i in range(dim) for j in range(i)]
-    found = np.zeros((n, dim, dim + len(pairs)))
-    found[:, range(dim), range(dim)] = 1.0
-    for k, (i, j) in enumerate(pairs, start=dim):
-        found[:, i, k], found[:, j, k] = apart[:, j], -apart[:, i]
-    return found.reshape(n * dim, -1)

@@ -10,13 +10,9 @@ from softehl.runtime.solve.linear import Factors, LinearSolver, SparseMatrix
 
 @dataclass(eq=False)
 class Kept:
-    """A linear solver that gives the same factors for the same matrix, to the last bit.
-
-    made: factorisations so far.
-    """
+    """A linear solver that gives the same factors for the same matrix, to the last bit."""
 
     solver: LinearSolver
-    made: int = field(default=0, init=False)
     _last: tuple[bytes, Factors] | None = field(default=None, init=False, repr=False)
 
     @property
@@ -33,6 +29,5 @@ class Kept:
             return self._last[1]
         self._last = None  # never two at a time: they are what memory goes into
         factors = self.solver.factorise(K)
-        self.made += 1
         self._last = mark.digest(), factors
         return factors

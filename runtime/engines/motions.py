@@ -1,0 +1,34 @@
+"""Motions that a free body hardly resists, which multigrid must keep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+
+
+def is_vector(names: Sequence[str], dimension: int) -> bool:
+    """True if names are the components of one vector along all coordinates, in their order."""
+    stems = {name.rpartition("_")[0] for name in names}
+    axes = "".join(name.rpartition("_")[2] for name in names)
+    return len(stems) == 1 and axes == "xyz"[:dimension]
+
+
+def motions(places: Array, names: Sequence[str]) -> Array:
+    """Shifts of each unknown at places (n, dim), and rotations where they are displacements.
+
+    (n len(names), k), node by node, of size 1.
+    """
+    n, dim = places.shape
+    apart = places - places.mean(axis=0)
+    apart /= float(np.abs(apart).max(initial=0.0)) or 1.0
+    turned = is_vector(names, dim)
+    pairs = [(i, j) for i in range(dim) for j in range(i)] if turned else []
+    width = len(names)
+    found = np.zeros((n, width, width + len(pairs)))
+    found[:, range(width), range(width)] = 1.0
+    for k, (i, j) in enumerate(pairs, start=width):
+        found[:, i, k], found[:, j, k] = apart[:, j], -apart[:, i]
+    return found.reshape(n * width, -1)
