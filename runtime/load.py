@@ -15,7 +15,7 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
 from softehl.runtime.solve.arclength import Arclength
-from softehl.runtime.solve.held import FirstStep, Remembering, recorded
+from softehl.runtime.solve.held import FirstStep, Remembering
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
@@ -101,9 +101,9 @@ class LoadSteps:
     def run(self, system: System, start: Beginning, until: float) -> Result:
         """The result at load factor `until`.  Raises NotConverged."""
         begin, x0, histories = start
-        newton, kept = recorded(self.newton) if self.record else (self.newton, None)
+        first_step = FirstStep(self.newton)
+        kept = first_step.memory if self.record else None
         at = _Reached(system, x0, histories, self.on_step, False, kept, self.before)
-        first_step = FirstStep(newton)
 
         def keep(point: Point) -> None:
             first_step.check(at.problem_at(point.parameter), point.solution)

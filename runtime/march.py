@@ -19,7 +19,7 @@ from softehl.runtime.held import require_held
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.share import Share
-from softehl.runtime.solve.held import FirstStep, Remembering, recorded
+from softehl.runtime.solve.held import FirstStep, Remembering
 from softehl.runtime.solve.homotopy import Trial, Way, walk
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.predictor import through
@@ -146,9 +146,9 @@ class March:
         with np.errstate(all="ignore"):
             posed = system.problem(self.posed(system, clock, shortest))
             require_held(system, posed, clock.states[0])
-        newton, kept = recorded(self.newton) if self.record else (self.newton, None)
-        over = ROUNDING * length
-        way = _ByTime(self, FirstStep(newton), system, clock, until, over, kept)
+        first_step, over = FirstStep(self.newton), ROUNDING * length
+        kept = first_step.memory if self.record else None
+        way = _ByTime(self, first_step, system, clock, until, over, kept)
         log = Record("t")
         marks = {} if checkpoint is None else marks_of(system.everywhere)
         for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):

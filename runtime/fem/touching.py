@@ -91,9 +91,7 @@ class Contact:
         tree = cKDTree(far)
         nearest = SLANTED * tree.query(centre)[0]
         reach = radius + size.max() + np.maximum(reach, np.minimum(depth, nearest))
-        found = tree.query_ball_point(centre, reach, return_sorted=True)
-        one = np.repeat(np.arange(len(mine)), [len(row) for row in found])
-        other = np.concatenate([np.empty(0, dtype=np.int64), *found]).astype(np.int64)
+        one, other = within(tree, centre, reach)
         kept = np.einsum("nc,nc->n", along[one], against[other]) < FACING
         kept &= (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
         if self.alone:
@@ -125,6 +123,13 @@ class Contact:
             data,
             check_orientation=False,
         )
+
+
+def within(tree: cKDTree, places: Array, radius: Array) -> tuple[Integers, Integers]:
+    """Pairs of places (n, dim) and points of a tree that are no further apart than radius, (n,)."""
+    found = tree.query_ball_point(places, radius, return_sorted=True)
+    one = np.repeat(np.arange(len(places)), [len(row) for row in found])
+    return one, np.concatenate([np.empty(0, dtype=np.int64), *found]).astype(np.int64)
 
 
 _LIMITS = ("depth", "reach")

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.assembly import ElementBlock
-from softehl.runtime.fem.touching import FACING, SLANTED, Side
+from softehl.runtime.fem.touching import FACING, SLANTED, Side, within
 from softehl.runtime.kernels import Kernel, Rule
 from softehl.runtime.mesh.cells import CELLS, Cell
 
@@ -101,9 +101,7 @@ class FaceContact:
         tree = cKDTree(centre)
         nearest = SLANTED * tree.query(point)[0]
         radius = size.max() + np.maximum(side.reach, np.minimum(side.depth, nearest))
-        found = tree.query_ball_point(point, radius, return_sorted=True)
-        one = np.repeat(np.arange(len(point)), [len(row) for row in found])
-        other = np.concatenate([np.empty(0, dtype=np.int64), *found]).astype(np.int64)
+        one, other = within(tree, point, radius)
         across = np.cross(centre[other] - point[one], normal[one])
         near = np.linalg.norm(across, axis=1) <= size[other]  # else the line misses the face
         one, other = one[near], other[near]

@@ -49,33 +49,30 @@ class Remembering:
         return factors
 
 
-def recorded(newton: Newton) -> tuple[Newton, Remembering]:
-    """Newton's method whose latest factors are kept, and what keeps them."""
-    kept = Remembering(newton.linear)
-    return replace(newton, linear=kept), kept
-
-
 @dataclass
 class FirstStep:
-    """Newton's method of a path whose first step that factorises is looked at once."""
+    """Newton's method of a path whose first step that factorises is looked at once.
+
+    memory: its linear solver, which keeps the last factors.
+    """
 
     newton: Newton
-    _memory: Remembering = field(init=False)
+    memory: Remembering = field(init=False)
     _looked: bool = False
 
     def __post_init__(self) -> None:
         """Let the linear solver remember."""
-        self._memory = Remembering(self.newton.linear)
-        self.newton = replace(self.newton, linear=self._memory)
+        self.memory = Remembering(self.newton.linear)
+        self.newton = replace(self.newton, linear=self.memory)
 
     @property
     def last(self) -> tuple[SparseMatrix, Factors] | None:
         """The last matrix that was factorised, and its factors."""
-        return self._memory.last
+        return self.memory.last
 
     def check(self, problem: NamedProblem, solution: Solution) -> None:
         """Raise NotConverged if nothing held what was solved; ask after each converged step."""
-        memory = self._memory.last
+        memory = self.memory.last
         if memory is None or self._looked:
             return
         self._looked = True
