@@ -1,4 +1,4 @@
-"""What parameters of a seal contradict each other, in the words of their keys."""
+"""Contradictions between parameters of a seal, in the words of their keys."""
 
 from __future__ import annotations
 

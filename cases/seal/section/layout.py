@@ -1,4 +1,4 @@
-"""How the mesh of a section is laid out: everything that knows the shape of a seal.
+"""Layout of the mesh of a section: everything that knows the shape of a seal.
 
 Whatever comes behind asks a `Layout` for its mesh and for where the sealed pressure ends.
 """
@@ -50,7 +50,7 @@ class Layout:
 
     @property
     def flat(self) -> bool:
-        """Whether a contact may have flats, at whose corners pressure peaks."""
+        """True if a contact may have flats, at whose corners pressure peaks."""
         return self.shape.outline.disc is None
 
     @property
@@ -134,7 +134,7 @@ class Layout:
 
 
 def dam(excess: Array, index: int, p_s: float) -> int | None:
-    """Where contact holds back a pressure that is taken to act up to an index, None if just there.
+    """Place where contact holds back a pressure taken to act up to an index, None if just there.
 
     excess: (n,) of contact over the pressure, which is p_s up to there and zero beyond. Where less
     than p_s holds it back it goes on, at most to where contact presses most.

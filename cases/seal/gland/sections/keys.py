@@ -106,12 +106,12 @@ class SectionKeys(_Keys):
 
     @property
     def round(self) -> bool:
-        """Whether the section is a disc, which the O-grid of the paper is laid into."""
+        """True if the section is a disc, which the O-grid of the paper is laid into."""
         return self.section == ROUND and self.outline is None
 
     @property
     def named(self) -> str:
-        """What the seal is called."""
+        """Name of the seal."""
         return NAMES[self.section] if self.outline is None else f"ring of {Path(self.outline).name}"
 
     def free(self, height: float, inner_diameter: float) -> Shape:
@@ -180,7 +180,7 @@ def _mesh_of_file(
 
 
 def is_mesh(outline: str | None) -> bool:
-    """Whether an outline is that of a mesh file."""
+    """True if an outline is that of a mesh file."""
     return outline is not None and Path(outline).suffix.lower() not in (".dxf", ".csv")
 
 
@@ -244,7 +244,7 @@ def capped(shape: Shape, thickness: float) -> Shape:
 
 @lru_cache(maxsize=32)
 def lobes(shape: Shape) -> int:
-    """How many separate parts of its film a section rests on: minima of r with a groove between."""
+    """Number of parts of its film that a section rests on: minima of r with a groove between."""
     first, last = shape.film
     r = shape.outline.at(np.linspace(first, last, _STATIONS))[:, 1]
     deep, found, lowest, highest = _BETWEEN * float(np.ptp(r)), 1, r[0], r[0]
