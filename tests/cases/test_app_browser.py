@@ -22,7 +22,8 @@ import pytest
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 PATIENCE = 240.0
-SPEEDS = [800, 700, 600, 500, 450, 400, 350, 300, 250, 200, 150, 120, 100, 80]
+WHOLE_RUN = 900.0  # s, on a loaded machine
+SPEEDS = [800, 600, 450, 300, 200, 100]
 ALL = """
 const found = [];
 const walk = (root) => { for (const e of root.querySelectorAll('*')) {
@@ -193,24 +194,24 @@ def test_from_a_ring_to_the_report(browser: Driver, address: str, tmp_path: Path
     hand.until(lambda: second in hand.states())
     assert [status for status, _ in hand.states().values()] == ["running", "running"]
 
-    hand.until(lambda: hand.states()[second][1] not in ("", "0 of 28"))
+    hand.until(lambda: hand.states()[second][1] not in ("", "0 of 12"))
     hand.click("button", "Stop")  # of the one that was begun last
     hand.until(lambda: hand.states()[second][0] == "stopped")
     browser.refresh()
     hand.until(lambda: "FKM 80" in hand.fields() and len(hand.states()) == 2)
     kept = hand.states()[second]
     assert kept[0] == "stopped"
-    assert 1 <= int(kept[1].split()[0]) < 28
+    assert 1 <= int(kept[1].split()[0]) < 12
     assert hand.points() == int(kept[1].split()[0])  # its curve has grown so far
-    hand.until(lambda: hand.states()[first] == ("done", "28 of 28"))
+    hand.until(lambda: hand.states()[first] == ("done", "12 of 12"), WHOLE_RUN)
     hand.click("button", "Go on")
-    hand.until(lambda: hand.states()[second] == ("done", "28 of 28"))
-    hand.until(lambda: hand.points() == 28)
+    hand.until(lambda: hand.states()[second] == ("done", "12 of 12"), WHOLE_RUN)
+    hand.until(lambda: hand.points() == 12)
 
     boxes = hand.all(".tabulator-row input[type=checkbox]")
     assert len(boxes) == 2
     next(box for box in boxes if not box.is_selected()).click()
-    hand.until(lambda: hand.points() == 56)
+    hand.until(lambda: hand.points() == 24)
     link = hand.until(lambda: reports(hand, 2))[0]
     browser.get_screenshot_as_file(str(tmp_path / "desk.png"))
     outside = browser.execute_script(
