@@ -56,11 +56,12 @@ def linear_forms(d: Definition) -> Structure | None:
 def quadratic_values(d: Definition, s: Structure) -> Structure:
     """The structure through named quadratic values of the forms: invariants where some suffice.
 
-    In pages of fields of three dimensions no invariants are looked for: this takes ten times as
-    long as all the rest and saves one operation in fourteen.
+    In three dimensions no invariants are looked for in pages of fields, where this takes ten times
+    as long as all the rest and saves one operation in fourteen, and in pages with history, whose
+    local equations hold so many polynomials that the search takes minutes.
     """
     g = d.graph
-    quick = d.point is not None and len(d.coordinates) > 2
+    quick = len(d.coordinates) not in (1, 2) and (d.point is not None or bool(d.point_data))
     reduced = None if quick else through_invariants(g, [s.root], s.forms, s.constant)
     if reduced is not None:
         constant = _left(reduced.images, s.constant)

@@ -59,8 +59,8 @@ def _words(page: Interface) -> dict[str, object]:
         "NAME": page.name.upper(),
         "given": len(page.given),
         "order": ", ".join(map(str, page.by_node())),
-        "arguments": "".join(_arguments(page)),
-        "conditions": "".join(_conditions(page)),
+        "arguments": "".join(arguments(page)),
+        "conditions": "".join(conditions(page, "*jelem")),
         "required": "; ".join(f"{c.name} {c.relation} {c.bound:g}" for c in d.conditions) or "none",
         "outputs": "".join(_outputs(page)),
         "history": "".join(_history(page)),
@@ -76,22 +76,22 @@ def _words(page: Interface) -> dict[str, object]:
     }
 
 
-def _arguments(page: Interface) -> Iterable[str]:
+def arguments(page: Interface) -> Iterable[str]:
     """Lines of C that fill parameters and data."""
     for array, sources in (("p", page.parameters), ("data", page.data)):
         for k, source in enumerate(sources):
             yield f"    {array}[{k}] = {_argument(page, source)};\n"
 
 
-def _conditions(page: Interface) -> Iterable[str]:
-    """Lines of C that refuse arguments which the page does not allow."""
+def conditions(page: Interface, element: str) -> Iterable[str]:
+    """Lines of C that refuse arguments which the page does not allow; element: its number in C."""
     d = page.definition
     rows = (("p", d.parameters), ("data", d.data))
     places = {a.name: f"{array}[{k}]" for array, row in rows for k, a in enumerate(row)}
     for c in d.conditions:
         yield (
             f"    if (!({places[c.name]} {c.relation} {number(c.bound)}))\n"
-            f'        refuse(*jelem, "{c.name} {c.relation} {c.bound:g} is required");\n'
+            f'        refuse({element}, "{c.name} {c.relation} {c.bound:g} is required");\n'
         )
 
 

@@ -70,7 +70,7 @@ def settings_of(page: Interface, s: Sample) -> list[float]:
     return values
 
 
-def _renewed(page: Interface, s: Sample) -> list[float]:
+def _renewed(page: Interface, s: Sample, stored: int | None) -> list[float]:
     """State of all points after a step, then the fields."""
     width = len(page.definition.fields)
     rows = [list(row) for row in s.state.point_data]
@@ -78,13 +78,16 @@ def _renewed(page: Interface, s: Sample) -> list[float]:
         for k, field in enumerate(page.renewed):
             if field is not None:
                 row[k] = s.fields[width * q + field]
-    return [*(v for row in rows for v in row), *s.fields]
+    return [*(v for row in rows for v in row), *s.fields][:stored]
 
 
-def sample_file(page: Interface, found: Sequence[Sample]) -> str:
-    """samples.txt: what the host hands over, and what the element must give back."""
+def sample_file(page: Interface, found: Sequence[Sample], stored: int | None = None) -> str:
+    """samples.txt: what the host hands over, and what the element must give back.
+
+    stored: numbers that the element stores; without it, state and fields.
+    """
     order, size = page.by_node(), len(page.definition.unknowns)
-    after = _renewed(page, found[0])
+    after = _renewed(page, found[0], stored)
     head = [len(found), size, page.definition.nodes, page.dimension]
     lines = [" ".join(map(str, (*head, len(page.given), len(after), len(found[0].fields))))]
     for k, s in enumerate(found):
@@ -97,10 +100,10 @@ def sample_file(page: Interface, found: Sequence[Sample]) -> str:
             [u[i] for i in order],
             [u[i] - before[i] for i in order],
             settings_of(page, s),
-            [*old, *[0.0] * len(s.fields)],
+            [*old, *[0.0] * len(s.fields)][:stored],
             [-s.residual[i] for i in order],
             matrix,
-            _renewed(page, s),
+            _renewed(page, s, stored),
         )
         lines += [" ".join(repr(float(v)) for v in group) for group in groups]
     return "\n".join(lines) + "\n"

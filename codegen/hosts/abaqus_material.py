@@ -18,7 +18,7 @@ def umat(law: Law, states: States) -> dict[str, str]:
     r = checked(r, [replace(s, data=()) for s in states(r.written)])
     texts, _ = api.files(r.page, single=True)
     more, settings = shared.tests(r, states)
-    words = {**shared.words(r), "moduli": _moduli(r), "deformation": _deformation(r)}
+    words = {**shared.words(r, "*noel"), "moduli": _moduli(r), "deformation": _deformation(r)}
     words["density"] = "fields[0]" if r.measure is Measure.SMALL else f"fields[0] / {_VOLUME}"
     texts["umat.c"] = api.filled(api.template("umat.c"), words)
     texts["element.f90"] = api.filled(api.template("umat_element.f90"), words)
@@ -69,6 +69,7 @@ def _deck(r: Response, settings: Sequence[float]) -> str:
         "*MATERIAL, NAME=LAW",
         f"*USER MATERIAL, CONSTANTS={max(len(settings), 1)}{unsymmetric}",
         *shared.constants(list(settings) or [0.0]),
+        *shared.depvar(r),
         f"*STEP, NLGEOM={large}{', UNSYMM=YES' if unsymmetric else ''}",
         *("*STATIC", "0.25, 1.0", "*BOUNDARY", *held),
         *("*NODE PRINT, NSET=ALL", "U", "*EL PRINT, ELSET=CELLS", "S", "*END STEP", ""),

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from softehl.codegen.abi import TargetError
 from softehl.codegen.hosts import api
 from softehl.codegen.hosts import solid as shared
-from softehl.codegen.hosts.material import Measure, Response, checked, response
+from softehl.codegen.hosts.material import Measure, Response, checked, packed, response
 from softehl.codegen.hosts.solid import States
 from softehl.codegen.language.material import Law
 
@@ -16,15 +15,13 @@ from softehl.codegen.language.material import Law
 def library(law: Law, states: States) -> dict[str, str]:
     """Every file of a material of CalculiX.  Raises `TargetError`."""
     r = response(law, Measure.SECOND)
+    found = [replace(s, data=()) for s in states(r.written)]
+    r = checked(r, found)
     if not r.symmetric:
-        raise TargetError(
-            f"{law.name} gives a stress, and its modulus need not be symmetric: target calculix "
-            "stores 21 moduli; give an energy, m.energy(W)"
-        )
-    r = checked(r, [replace(s, data=()) for s in states(r.written)])
+        r = packed(r, found)
     texts, _ = api.files(r.page, single=True)
     more, settings = shared.tests(r, states)
-    words = {**shared.words(r), **_names(law), "deformation": _deformation(r)}
+    words = {**shared.words(r, "*iel"), **_names(law), "deformation": _deformation(r)}
     words["moduli"] = ", ".join(str(r.modulus(i, j)) for j in range(6) for i in range(j + 1))
     texts["calculix.c"] = api.filled(api.template("calculix.c"), words)
     texts["element.f90"] = api.filled(api.template("calculix_element.f90"), words)
@@ -71,6 +68,7 @@ def deck(r: Response, settings: Sequence[float], count: int = 2) -> str:
         f"*MATERIAL, NAME={_names(r.law)['MATERIAL']}",
         f"*USER MATERIAL, CONSTANTS={max(len(settings), 1)}",
         *shared.constants(list(settings) or [0.0]),
+        *shared.depvar(r),
         f"*SOLID SECTION, ELSET=CELLS, MATERIAL={_names(r.law)['MATERIAL']}",
         *(step, "*STATIC", "0.25, 1.0", "*BOUNDARY", *held),
         *("*NODE PRINT, NSET=ALL", "U", "*EL PRINT, ELSET=CELLS", "S", "*END STEP", ""),

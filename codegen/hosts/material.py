@@ -6,10 +6,10 @@ differentiated along them: so the modulus is exact, and no formula converts it a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import cached_property
 from typing import Any
 
 import mpmath
@@ -28,6 +28,7 @@ from softehl.codegen.language.model import Model
 
 VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Order of the components; shears of strains count twice."""
+_BELOW = [(i, j) for i in range(6) for j in range(i)]
 
 
 class Measure(StrEnum):
@@ -43,7 +44,8 @@ class Response:
     """A material in one measure.
 
     Its unknowns are F row by row, or six small strains; its fields are the energy (zero for a law
-    that has none), 6 stresses, and 21 moduli row by row of the upper triangle, or 36.
+    that has none), 6 stresses, 21 moduli row by row of the upper triangle, or 36, then the fields
+    of the law and the new values of its history.
     """
 
     law: Law
@@ -57,10 +59,15 @@ class Response:
         """The response as a page without nodes."""
         return Interface(self.definition)
 
-    @cached_property
-    def parameters(self) -> tuple[Argument, ...]:
-        """Constants of the material."""
-        return self.definition.parameters
+    @property
+    def parameters(self) -> list[Argument]:
+        """Constants of the material: all parameters but the length of the step."""
+        return self.page.given
+
+    @property
+    def own(self) -> int:
+        """Number of the first field that is the law's own."""
+        return 7 + (21 if self.symmetric else 36)
 
     def modulus(self, i: int, j: int) -> int:
         """Number of the field that is the modulus in row i and column j."""
@@ -105,7 +112,7 @@ def response(law: Law, measure: Measure) -> Response:
     m.fields(**{f"skew{i}{j}": stress[i, j] - stress[j, i] for i, j in VOIGT[3:]})
     m.example(F11=1, F22=1, F33=1, **{str(s): 0 for s in steps})
     _close(m, found, list(P), list(F))
-    d = m.finish()
+    d = _ordered(m.finish())
     return Response(law, measure, _at_rest(d), d, found.W is not None)
 
 
@@ -126,6 +133,13 @@ def _named(law: Material, stress: Sequence[Any], moduli: Sequence[Sequence[Any]]
     for i, first in enumerate(start):
         named |= {f"C{i}{j}": moduli[i][j] for j in range(first, 6)}
     return named
+
+
+def _ordered(d: Definition) -> Definition:
+    """The definition with the fields of the law behind those of the host."""
+    ours = re.compile(r"W|s\d|C\d\d|skew\d\d")
+    fields = sorted(d.fields, key=lambda field: ours.fullmatch(field[0]) is None)
+    return replace(d, fields=tuple(fields))
 
 
 def _at_rest(d: Definition) -> Definition:
@@ -150,9 +164,9 @@ def _at_rest(d: Definition) -> Definition:
 def _close(m: Model, law: Material, P: Sequence[Any], F: Sequence[Any]) -> None:
     """Give the page the potential that every page has; no host asks for its residual."""
     if law.W is not None:
-        m.potential(law.W)
+        m.potential(m.integral("stored", law.W))
     else:
-        m.potential(sum(a * b for a, b in zip(P, F, strict=True)), constant=P)
+        m.weak_form(list(zip(P, F, strict=True)))
 
 
 def _small(law: Law, m: Model) -> Response:
@@ -167,26 +181,45 @@ def _small(law: Law, m: Model) -> Response:
     if found.P is not None:
         m.fields(**{f"skew{i}{j}": found.P[i, j] - found.P[j, i] for i, j in VOIGT[3:]})
     _close(m, found, stress, strains)
-    d = m.finish()
+    d = _ordered(m.finish())
     return Response(law, Measure.SMALL, _at_rest(d), d, found.W is not None)
 
 
 def checked(r: Response, states: Sequence[State]) -> Response:
     """The response without its test: raises `TargetError` where its stress is not symmetric."""
     d = r.definition
-    skew = [n for name, n in d.fields if name.startswith("skew")]
-    stress = [n for name, n in d.fields if name[0] == "s" and not name.startswith("skew")]
+    skew = [n for name, n in d.fields if re.fullmatch(r"skew\d\d", name)]
+    stress = [n for _, n in d.fields[1:7]]
     with mpmath.workdps(30):
         for state in states:
             walk = Walk(state, {})
-            size = max(abs(walk.value(n)) for n in stress)
-            if any(abs(walk.value(n)) > size * mpmath.mpf(10) ** -20 for n in skew):
+            size = max(abs(walk.at(n, 0)) for n in stress)
+            if any(abs(walk.at(n, 0)) > size * mpmath.mpf(10) ** -20 for n in skew):
                 raise TargetError(
                     f"the stress of {r.law.name} is not symmetric: its energy must not change "
                     "when the body rotates, write it by F.T * F"
                 )
-    fields = tuple((name, n) for name, n in d.fields if not name.startswith("skew"))
+    fields = tuple((name, n) for name, n in d.fields if not re.fullmatch(r"skew\d\d", name))
     return replace(r, definition=replace(d, fields=fields))
+
+
+def packed(r: Response, states: Sequence[State]) -> Response:
+    """The response of a law that gives a stress with 21 moduli: `TargetError` where 36 differ."""
+    d = r.definition
+    with mpmath.workdps(30):
+        for state in states:
+            walk = Walk(state, {})
+            C = [[walk.at(d.fields[r.modulus(i, j)][1], 0) for j in range(6)] for i in range(6)]
+            size = max(abs(c) for row in C for c in row)
+            if any(abs(C[i][j] - C[j][i]) > size * mpmath.mpf(10) ** -20 for i, j in _BELOW):
+                raise TargetError(
+                    f"the modulus of {r.law.name} is not symmetric at a random state: target "
+                    "calculix stores 21 moduli; give an energy, m.energy(W), or a state that the "
+                    "law can reach, m.example(...)"
+                )
+    away = {r.modulus(i, j) for i, j in _BELOW}
+    fields = tuple(f for k, f in enumerate(d.fields) if k not in away)
+    return replace(r, definition=replace(d, fields=fields), symmetric=True)
 
 
 def point(law: Law) -> Definition:

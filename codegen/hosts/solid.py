@@ -6,13 +6,14 @@ modulus as the program does; it must give the forces and the stiffness of the la
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from softehl.codegen.abi import Task
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import api, patch
+from softehl.codegen.hosts.abaqus import arguments, conditions
 from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.hosts.material import Measure, Response, solid
 from softehl.codegen.hosts.sample import samples
@@ -26,8 +27,10 @@ PULL, TWIST = 0.2, 0.3
 """Stretch of the block in a deck, and its twist by shear."""
 
 
-def words(r: Response) -> dict[str, object]:
-    """Words of the texts of a host."""
+def words(r: Response, element: str) -> dict[str, object]:
+    """Words of the texts of a host; element: C of the number of the element."""
+    page = r.page
+    outputs = _outputs(r)
     small = r.measure is Measure.SMALL
     stress, _, modulus = str(r.measure).partition(" and ")
     rows = [f"| {k + 1} | {a.name}: {a.meaning} |" for k, a in enumerate(r.parameters)]
@@ -35,6 +38,14 @@ def words(r: Response) -> dict[str, object]:
         "name": r.law.name,
         "NAME": r.law.name.upper(),
         "given": len(r.parameters),
+        "arguments": "".join(arguments(page)),
+        "conditions": "".join(conditions(page, element)),
+        "history": "".join(_history(page)),
+        "state": ", ".join(a.name for a in page.state) or "none",
+        "outputs": ", ".join(outputs) or "none",
+        "output": len(outputs),
+        "own": r.own,
+        "depvar": len(page.state) + len(outputs),
         "small": ".true." if small else ".false.",
         "properties": "\n".join(rows) or "| | none |",
         "stress": stress,
@@ -44,18 +55,46 @@ def words(r: Response) -> dict[str, object]:
     }
 
 
+def _outputs(r: Response) -> list[str]:
+    """Fields that the law gives, without its history."""
+    d = r.definition
+    return [name for name, _ in d.fields[r.own : len(d.fields) - len(d.history)]]
+
+
+def _history(page: Interface) -> Iterable[str]:
+    """Lines of C that store the new state."""
+    for k, field in enumerate(page.renewed):
+        value = f"data[{k}]" if field is None else f"fields[{field}]"
+        yield f"    after[{k}] = {value};\n"
+
+
+def depvar(r: Response) -> list[str]:
+    """Lines of a deck with the number of state variables."""
+    return ["*DEPVAR", str(n)] if (n := words(r, "")["depvar"]) else []
+
+
 def tests(r: Response, states: States) -> tuple[dict[str, str], list[float]]:
     """Files of the small host, and values of the constants."""
-    page = Interface(replace(solid(r.law), tasks=(Task.TANGENT,)))
-    found = samples(page, compile_model(page.definition), states(page.definition))
+    d = solid(r.law)
+    page = Interface(replace(d, tasks=(Task.TANGENT, Task.FIELDS)[: 1 + bool(d.fields)]))
+    kernel = compile_model(page.definition)
+    found = samples(page, kernel, host.in_time(page, states(page.definition)))
     settings = host.settings_of(page, found[0])
+    stored = len(page.state) + len(_outputs(r))
     assert page.cell is not None
     return {
         "tetrahedron.f90": api.template("tetrahedron.f90"),
         "host.f90": host.program(page),
-        "samples.txt": host.sample_file(page, found),
-        "patch.txt": host.patch_file(page, patch.patch(page.cell), settings),
+        "samples.txt": host.sample_file(page, found, stored),
+        "patch.txt": host.patch_file(_from_zero(page), patch.patch(page.cell), settings),
     }, settings
+
+
+def _from_zero(page: Interface) -> Interface:
+    """The page with a state that begins as zero, whatever its example is."""
+    state = {a.name for a in page.state}
+    example = tuple(pair for pair in page.definition.example if pair[0] not in state)
+    return Interface(replace(page.definition, example=example))
 
 
 def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:

@@ -43,7 +43,7 @@ class Material:
         self._green: Any = None
         self.parameters, self.require = model.parameters, model.require
         self.point_data, self.history, self.fields = model.point_data, model.history, model.fields
-        self.norm, self.derivative = model.norm, model.derivative
+        self.norm, self.derivative, self.example = model.norm, model.derivative, model.example
 
     @property
     def F(self) -> Any:

@@ -7,7 +7,13 @@
 
 #include "@name@.h"
 
-enum { GIVEN = @NAME@_PARAMETERS, FIELDS = @NAME@_FIELDS };
+enum {
+    GIVEN = @given@,
+    STATE = @NAME@_POINT_DATA,
+    OUTPUT = @output@, /* fields of the law, from the field OWN on */
+    OWN = @own@,
+    FIELDS = @NAME@_FIELDS
+};
 
 /* Field of the page for each of the 21 moduli: columns of the upper triangle. */
 static const int modulus[21] = {@moduli@};
@@ -29,21 +35,31 @@ void @FUNCTION@(const char *amat, const int *iel, const int *iint, const int *ko
     const int *iorien, const double *pgauss, const double *orab, double *pnewdt,
     const int *ipkon, int length)
 {
-    double u[@NAME@_UNKNOWNS], fields[FIELDS];
-    (void)amat, (void)iint, (void)strain0, (void)F0, (void)voj, (void)F1, (void)vj;
+    double u[@NAME@_UNKNOWNS], p[@NAME@_PARAMETERS + 1], data[STATE + 1], fields[FIELDS];
+    /* of all points and elements */
+    const size_t place = (size_t)*nstatv * (size_t)(*iint - 1 + *mi * (*iel - 1));
+    const double *const before = statev0 + place;
+    double *const after = statev1 + place;
+    (void)amat, (void)before, (void)props, (void)strain0, (void)F0, (void)voj, (void)F1, (void)vj;
     (void)ithermal, (void)temperature, (void)dtime, (void)time, (void)ttime, (void)ielas;
-    (void)mi, (void)nstatv, (void)statev0, (void)statev1, (void)pgauss, (void)orab;
+    (void)pgauss, (void)orab;
     (void)ipkon, (void)length;
 
     if (-*kode - 100 < GIVEN)
         refuse(*iel, "*USER MATERIAL needs CONSTANTS=@given@");
     if (*iorien > 0)
         refuse(*iel, "takes no *ORIENTATION");
-@deformation@    @name@_fields(1, NULL, u, NULL, props, fields);
+    if (*nstatv < STATE)
+        refuse(*iel, "*DEPVAR needs @depvar@");
+@arguments@@conditions@    for (int k = 0; k < STATE; ++k)
+        data[k] = before[k];
+@deformation@    @name@_fields(1, NULL, u, data, p, fields);
     if (!finite_numbers(u, @NAME@_UNKNOWNS) || !finite_numbers(fields, FIELDS)) {
         *pnewdt = 0.25; /* CalculiX begins the increment again, with this part of its length */
         return;
     }
+@history@    if (*nstatv >= STATE + OUTPUT)
+        memcpy(after + STATE, fields + OWN, sizeof(double) * OUTPUT);
     for (int i = 0; i < 6; ++i)
         stress[i] = fields[1 + i] - beta[i];
     if (*icmd != 3) /* otherwise stress alone is wanted */

@@ -23,7 +23,7 @@ subroutine uel(rhs, amatrx, svars, energy, ndofel, nrhs, nsvars, props, nprops, 
   call green(f, strain)
   if (small) f = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
   cut = 1
-  call material(strain, f, stress, modulus, props, nprops, time, dtime, cut)
+  call material(strain, f, stress, modulus, props, nprops, svars, nsvars, time, dtime, cut)
   pnewdt = min(pnewdt, cut)
   if (cut < 1) return
   do n = 1, 4
@@ -64,12 +64,12 @@ contains
   end subroutine
 
   ! The call of the library, whose 21 moduli are columns of the upper triangle.
-  subroutine material(strain, f, stress, modulus, props, nprops, time, dtime, pnewdt)
-    integer, intent(in) :: nprops
+  subroutine material(strain, f, stress, modulus, props, nprops, statev, nstatv, time, dtime, pnewdt)
+    integer, intent(in) :: nprops, nstatv
     real(real8), intent(in) :: strain(6), f(3, 3), props(nprops), time(2), dtime
     real(real8), intent(out) :: stress(6), modulus(6, 6)
-    real(real8), intent(inout) :: pnewdt
-    real(real8) :: none(9), packed(21)
+    real(real8), intent(inout) :: pnewdt, statev(nstatv)
+    real(real8) :: none(9), packed(21), states(nstatv, 2, 2), after(nstatv, 2, 2)
     integer :: zero(2), i, j, n
     character(80) :: name
     interface
@@ -88,8 +88,10 @@ contains
       end subroutine
     end interface
     none = 0; zero = 0; stress = 0; packed = 7; name = '@FUNCTION@'; modulus = 0
-    call law(name, 1, 1, -100 - nprops, props, strain, none, none, f, 1d0, f, 1d0, zero, 0d0, dtime, &
-      time(1), 0d0, 0, 0, zero, 0, none, none, stress, packed, 0, none, none, pnewdt, zero, 80)
+    states = 7; states(:, 2, 2) = statev; after = states ! those of point 2 of element 2
+    call law(name, 2, 2, -100 - nprops, props, strain, none, none, f, 1d0, f, 1d0, zero, 0d0, dtime, &
+      time(1), 0d0, 0, 0, [2], nstatv, states, after, stress, packed, 0, none, none, pnewdt, zero, 80)
+    statev = after(:, 2, 2)
     n = 0
     do j = 1, 6
       do i = 1, j

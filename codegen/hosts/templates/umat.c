@@ -12,7 +12,13 @@
 
 void xit_(void); /* Abaqus ends the analysis */
 
-enum { GIVEN = @NAME@_PARAMETERS, FIELDS = @NAME@_FIELDS };
+enum {
+    GIVEN = @given@,
+    STATE = @NAME@_POINT_DATA,
+    OUTPUT = @output@, /* fields of the law, from the field OWN on */
+    OWN = @own@,
+    FIELDS = @NAME@_FIELDS
+};
 
 /* Field of the page that is the modulus in each row and column: 11, 22, 33, 12, 13, 23. */
 static const int modulus[6][6] = {
@@ -36,10 +42,11 @@ void umat_(double *stress, double *statev, double *ddsdde, double *sse, double *
     const int *npt, const int *layer, const int *kspt, const int *kstep, const int *kinc,
     size_t length)
 {
-    double u[@NAME@_UNKNOWNS], fields[FIELDS];
-    (void)statev, (void)spd, (void)scd, (void)rpl, (void)ddsddt, (void)drplde, (void)drpldt;
-    (void)stran, (void)dstran, (void)time, (void)dtime, (void)temp, (void)dtemp, (void)predef;
-    (void)dpred, (void)cmname, (void)nshr, (void)nstatv, (void)coords, (void)drot, (void)celent;
+    double u[@NAME@_UNKNOWNS], p[@NAME@_PARAMETERS + 1], data[STATE + 1], fields[FIELDS];
+    double *const after = statev;
+    (void)after, (void)props, (void)dtime, (void)spd, (void)scd, (void)rpl, (void)ddsddt, (void)drplde, (void)drpldt;
+    (void)stran, (void)dstran, (void)time, (void)temp, (void)dtemp, (void)predef;
+    (void)dpred, (void)cmname, (void)nshr, (void)coords, (void)drot, (void)celent;
     (void)dfgrd0, (void)dfgrd1, (void)npt, (void)layer, (void)kspt, (void)kstep, (void)kinc;
     (void)length;
 
@@ -47,7 +54,11 @@ void umat_(double *stress, double *statev, double *ddsdde, double *sse, double *
         refuse(*noel, "needs three direct stresses: no plane stress, shells or beams");
     if (*nprops < GIVEN)
         refuse(*noel, "*USER MATERIAL needs CONSTANTS=@given@");
-@deformation@    @name@_fields(1, NULL, u, NULL, props, fields);
+    if (*nstatv < STATE)
+        refuse(*noel, "*DEPVAR needs @depvar@");
+@arguments@@conditions@    for (int k = 0; k < STATE; ++k)
+        data[k] = statev[k];
+@deformation@    @name@_fields(1, NULL, u, data, p, fields);
     if (!finite_numbers(u, @NAME@_UNKNOWNS) || !finite_numbers(fields, FIELDS)) {
         *pnewdt = 0.25; /* Abaqus begins the increment again, with this part of its length */
         memset(ddsdde, 0, sizeof(double) * (size_t)(*ntens * *ntens));
@@ -55,6 +66,8 @@ void umat_(double *stress, double *statev, double *ddsdde, double *sse, double *
             ddsdde[i + *ntens * i] = 1.0;
         return;
     }
+@history@    if (*nstatv >= STATE + OUTPUT)
+        memcpy(statev + STATE, fields + OWN, sizeof(double) * OUTPUT);
     *sse = @density@;
     for (int i = 0; i < *ntens; ++i) {
         stress[i] = fields[1 + i];

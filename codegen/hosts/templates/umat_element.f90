@@ -23,7 +23,7 @@ subroutine uel(rhs, amatrx, svars, energy, ndofel, nrhs, nsvars, props, nprops, 
   strain = [f(1, 1) - 1, f(2, 2) - 1, f(3, 3) - 1, f(1, 2) + f(2, 1), f(1, 3) + f(3, 1), &
     f(2, 3) + f(3, 2)]
   cut = 1
-  call material(strain, f, stress, modulus, props, nprops, time, dtime, cut)
+  call material(strain, f, stress, modulus, props, nprops, svars, nsvars, time, dtime, cut)
   pnewdt = min(pnewdt, cut)
   if (cut < 1) return
   volume = 1
@@ -75,17 +75,17 @@ contains
   end subroutine
 
   ! The call of UMAT.
-  subroutine material(strain, f, stress, modulus, props, nprops, time, dtime, pnewdt)
-    integer, intent(in) :: nprops
+  subroutine material(strain, f, stress, modulus, props, nprops, statev, nstatv, time, dtime, pnewdt)
+    integer, intent(in) :: nprops, nstatv
     real(real8), intent(in) :: strain(6), f(3, 3), props(nprops), time(2), dtime
     real(real8), intent(out) :: stress(6), modulus(6, 6)
-    real(real8), intent(inout) :: pnewdt
+    real(real8), intent(inout) :: pnewdt, statev(nstatv)
     real(real8) :: none(9), one(3, 3), before(6)
     character(80) :: name
     external :: umat
     none = 0; one = 0; before = 0; stress = 0; modulus = 7; name = '@NAME@'
-    call umat(stress, none, modulus, none(1), none(2), none(3), none(4), none, none, none(5), &
-      before, strain, time, dtime, 0d0, 0d0, none, none, name, 3, 3, 6, 0, props, nprops, none, &
+    call umat(stress, statev, modulus, none(1), none(2), none(3), none(4), none, none, none(5), &
+      before, strain, time, dtime, 0d0, 0d0, none, none, name, 3, 3, 6, nstatv, props, nprops, none, &
       one, pnewdt, 1d0, one, f, 1, 1, 1, 1, 1, 1)
   end subroutine
 end subroutine

@@ -45,6 +45,31 @@ def hooke(m: Material) -> None:
 
 
 @softehl.material
+def j2(m: Material) -> None:
+    """Von Mises plasticity with isotropic hardening, small strains: radial return."""
+    G, K = m.parameters(G="shear modulus [MPa]", K="bulk modulus [MPa]")
+    sy, H = m.parameters(sy="yield stress [MPa]", H="hardening modulus [MPa]")
+    names = ("xx", "yy", "xy", "xz", "yz")
+    old = m.point_data(**{f"p_{name}": "plastic strain" for name in names})
+    (alpha,) = m.point_data(alpha="equivalent plastic strain")
+    m.example(G=80, K=170, sy=0.5, H=10, alpha=0.01, **{f"p_{name}": 0.005 for name in names})
+    xx, yy, xy, xz, yz = old
+    p = sp.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, -xx - yy]])
+    volume = m.strain.trace()
+    s = m.define("s", 2 * G * (m.strain - volume / 3 * sp.eye(3) - p))
+    q = m.define("q", sp.sqrt(sp.Rational(3, 2)) * m.norm(s))
+    excess = m.define("excess", q - sy - H * alpha)
+    dg = m.define("dg", sp.Piecewise((excess / (3 * G + H), excess > 0), (0, True)))
+    flow = m.define("flow", sp.Piecewise((3 * dg / (2 * q), excess > 0), (0, True)))
+    m.stress(K * volume * sp.eye(3) + (1 - 2 * G * flow) * s)
+    m.fields(mises=q - 3 * G * dg)
+    new = p + flow * s
+    places = ((0, 0), (1, 1), (0, 1), (0, 2), (1, 2))
+    m.history(alpha=alpha + dg)
+    m.history(**{f"p_{name}": new[k] for name, k in zip(names, places, strict=True)})
+
+
+@softehl.material
 def turned(m: Material) -> None:
     """An energy that changes when the body rotates."""
     (k,) = m.parameters(k="stiffness [MPa]")
