@@ -133,6 +133,7 @@ def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
         conditions=tuple((n, r, b, w) for n, r, b, w in entry["conditions"]),
         places=tuple((n, a) for n, a in entry.get("places", ())),
         history=tuple(entry.get("history", ())),
+        internal=tuple(entry.get("internal", ())),
         cell=entry.get("cell", ""),
         kept=entry.get("kept", 0),
     )

@@ -103,6 +103,8 @@ class Definition:
     """Of every unknown its name without number, and its node or None."""
     history: tuple[str, ...] = ()
     """Point data that the last fields are the new values of."""
+    internal: tuple[str, ...] = ()
+    """Unknowns of one element alone, which a study condenses."""
     point_rates: bool = False
     """Whether the second half of the point data says how the first moves along a variation."""
     cell: str = ""

@@ -31,6 +31,13 @@ AXES = "xyz"
 _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or m.weak"
 
 
+class NeedsElement(ModelError):
+    """What a page says is known in whole elements only."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
+
+
 @dataclass(frozen=True)
 class Traced:
     """Value of a component at the point, and its slopes along the axes."""
@@ -87,6 +94,24 @@ class Fields(Model):
     def scalar(self, name: str, *, order: int | None = None) -> Any:
         """A scalar field; its value at the point is a symbol. order: as in `vector`."""
         return self._declared_fields([name], order, given=False)[0]
+
+    def _internal_unknowns(self, names: Sequence[str]) -> list[sp.Symbol]:
+        self._internal += names
+        return self._declared_fields(names, 0, given=False)
+
+    @property
+    def parent(self) -> Any:
+        """Parent coordinates of the point, (dimension of the cell, 1)."""
+        raise NeedsElement("m.parent")
+
+    @property
+    def jacobian(self) -> Any:
+        """Slopes of the reference coordinates (rows) along the parent ones (columns)."""
+        raise NeedsElement("m.jacobian")
+
+    def centroid(self, value: Any) -> Any:
+        """What a scalar, list or matrix is at the centroid of the parent cell."""
+        raise NeedsElement(f"m.centroid({value})")
 
     def previous(self, field: Any) -> Any:
         """A field at the beginning of the step; it has gradients, too."""

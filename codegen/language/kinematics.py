@@ -22,12 +22,13 @@ from softehl.codegen.language.model import Model
 class Isoparametric:
     """Shape function gradients by the reference coordinates, [node][component], and Jacobian.
 
-    inverse: of the Jacobian matrix, (parent coordinate, reference coordinate).
+    inverse: of the Jacobian `matrix`, (parent coordinate, reference coordinate).
     """
 
     dN: list[list[Any]]
     detJ: Any
     inverse: Any
+    matrix: Any
 
 
 def isoparametric(m: Model, X: Any, parent: Any) -> Isoparametric:
@@ -47,7 +48,7 @@ def isoparametric(m: Model, X: Any, parent: Any) -> Isoparametric:
     rows = (
         Listed(row, f"dN[{a}], the gradient of a shape function") for a, row in enumerate(slopes)
     )
-    return Isoparametric(Listed(rows, "dN, one row for each node"), detJ, inverse)
+    return Isoparametric(Listed(rows, "dN, one row for each node"), detJ, inverse, J)
 
 
 def _require_parent(m: Model, size: int, parent: Any) -> None:

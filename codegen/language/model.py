@@ -92,6 +92,7 @@ class Model:
         self._nodal: list[tuple[int, int]] = []
         self._places: list[tuple[str, int | None]] = []
         self._history: list[tuple[str, Node]] = []
+        self._internal: list[str] = []
         self._arguments: dict[str, list[Argument]] = {
             "parameters": [],
             "data": [],
@@ -158,6 +159,22 @@ class Model:
         self._places.append((name, None))
         self._directions.append(self._bound[symbol])
         return symbol
+
+    def internal(self, name: str, count: int | None = None) -> Any:
+        """One unknown of an element, or a list of so many, called name_0, name_1, ...
+
+        No other element knows them. A study condenses them from its equations exactly, keeps their values with the element, and
+        has them in `result.fields`.
+        """
+        if count is None:
+            return self._internal_unknowns([name])[0]
+        if not (isinstance(count, int) and count > 0):
+            raise ModelError(f"internal {name}: count = {count!r} must be an integer > 0")
+        return self._internal_unknowns([f"{name}_{k}" for k in range(count)])
+
+    def _internal_unknowns(self, names: Sequence[str]) -> list[sp.Symbol]:
+        self._internal += names
+        return Listed([self.unknown(name) for name in names], "the internal unknowns")
 
     def interpolated(self, name: str) -> tuple[sp.Symbol, sp.Symbol]:
         """Value and xi-derivative of a field with any number of element unknowns (`modes`).
@@ -566,6 +583,7 @@ class Model:
             components=self._components or 2,
             places=tuple(self._places),
             history=tuple(name for name, _ in self._history),
+            internal=tuple(self._internal),
             record=self._record,
         )
 

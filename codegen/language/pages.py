@@ -11,7 +11,14 @@ from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.cells import Element, element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import applied
-from softehl.codegen.language.fields import AXISYMMETRIC, GEOMETRIES, SOLID, Fields, order_of
+from softehl.codegen.language.fields import (
+    AXISYMMETRIC,
+    GEOMETRIES,
+    SOLID,
+    Fields,
+    NeedsElement,
+    order_of,
+)
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.side import Side
 from softehl.codegen.language.site import Site
@@ -76,7 +83,12 @@ class Page:
             side = Side(name, kind, chosen, rule_of(kind, degree), self.doc)
             applied(self.name, self.write, side)
             return side.finish()
-        point = self._at_point(name, kind, chosen)
+        try:
+            point = self._at_point(name, kind, chosen)
+        except NeedsElement:
+            if self.form == "point":
+                raise
+            point = None
         whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
         applied(self.name, self.write, whole)
         unroll = False if self.form == "point" else None
@@ -107,12 +119,12 @@ class Page:
         applied(self.name, self.write, site)
         return site.form()
 
-    def rule(self, cell: Element, form: PointForm) -> QuadratureRule:
-        """The quadrature on a cell."""
+    def rule(self, cell: Element, form: PointForm | None) -> QuadratureRule:
+        """The quadrature on a cell; form: at a point, None if it is not known there."""
         if self.degree is not None:
             return rule_of(cell, self.degree)
         order = order_of(cell)
-        values = any(q.axis is None and q.component.order == order for q in form.unknowns)
+        values = form is None or any(q.axis is None and q.component.order == order for q in form.unknowns)
         short = cell.name.startswith(("line", "tri", "tet"))
         return rule_of(cell, 2 * order) if values and short else cell.rule
 

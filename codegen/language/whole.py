@@ -12,6 +12,7 @@ from softehl.codegen.language.definition import Component
 from softehl.codegen.language.elements.cells import Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.elements.shapes import interpolate
+from softehl.codegen.language.entries import Entries
 from softehl.codegen.language.fields import AXISYMMETRIC
 from softehl.codegen.language.nodal import Nodal
 
@@ -24,7 +25,32 @@ class Whole(Nodal):
     ) -> None:
         super().__init__(name, cell, geometry, rule, doc, dimension=cell.dimension)
         self._map = kinematics.isoparametric(self, self._X, self._parent(self.order)[1])
+        self._centroids = 0
         self._slopes_by_order = {self.order: self._map.dN}
+
+    @property
+    def parent(self) -> Any:
+        """Parent coordinates of the point, (dimension, 1)."""
+        return sp.Matrix(self._at)
+
+    @property
+    def jacobian(self) -> Any:
+        """Slopes of the reference coordinates (rows) along the parent ones (columns)."""
+        return self._map.matrix
+
+    def centroid(self, value: Any) -> Any:
+        """What a scalar, list or matrix is at the centroid of the parent cell."""
+        linear = self._element(1) if self.order > 1 else self.cell
+        middle = [sum(x) / sp.Integer(len(linear.nodes)) for x in zip(*linear.nodes, strict=True)]
+        there = dict(zip(self._at, middle, strict=True))
+        self._centroids += 1
+        label, entries = f"centroid_{self._centroids}", Entries.of(value)
+        moved = [sp.sympify(v).xreplace(there) for v in entries.values]
+        named = [
+            self.define(label + suffix, v)
+            for suffix, v in zip(entries.suffixes, moved, strict=True)
+        ]
+        return entries.arrange(named)
 
     def _of_cell(self, order: int) -> list[list[Any]]:
         """Gradients of the shape functions of an order."""

@@ -61,6 +61,7 @@ def _manifest(kernel: KernelSource) -> dict[str, Any]:
         "point_data": {a.name: a.meaning for a in d.point_data},
         "places": [list(place) for place in d.places],
         "history": list(d.history),
+        **({"internal": list(d.internal)} if d.internal else {}),
         **({"cell": d.cell} if d.cell else {}),
         **({"kept": kernel.kept} if kernel.kept else {}),
         "conditions": [[c.name, c.relation, c.bound, c.where] for c in d.conditions],

@@ -7,11 +7,13 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
+from softehl.runtime.arrays import Flags, Integers
 from softehl.runtime.engines.motions import is_vector, motions
 from softehl.runtime.names import listed
 from softehl.runtime.solve import amg, pardiso
 from softehl.runtime.solve.amg import Modes, Multigrid, OrFactors
 from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.internal import Condensing
 from softehl.runtime.solve.linear import LinearSolver
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
@@ -33,16 +35,29 @@ _PARDISO = 5.0
 def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callable[[], str]]:
     """A linear solver of that name, and a function that says which and why where size decides.
 
-    Raises StudyError for an unknown name or where multigrid cannot be used.
+    It condenses internal unknowns of elements. Raises StudyError for an unknown name or where multigrid cannot be used.
     """
+    groups = internal(system)
+    found, note = _of_rest(system, linear, system.size - sum(g.size for g in groups))
+    return (Condensing(found, groups, system.size) if groups else found), note
+
+
+def internal(system: System) -> tuple[Integers, ...]:
+    """Numbers (n, k) of the internal unknowns of each block that has some."""
+    found = [b.internal.values() for b in system.assembler.blocks if b.internal]
+    return tuple(np.stack(list(numbers), axis=1) for numbers in found)
+
+
+def _of_rest(system: System, linear: Linear, count: int) -> tuple[LinearSolver, Callable[[], str]]:
+    """A linear solver of so many unknowns, all but the internal ones."""
     if linear not in get_args(Linear):
         raise StudyError(f"linear = {linear!r}: allowed are {listed(get_args(Linear))}")
     if linear in ("superlu", "pardiso"):
         return choose(linear), str
     direct = choose("auto")
     dimension, faster = system.mesh.dimension, _PARDISO if pardiso.available() else 1.0
-    size = f"{system.size} unknowns in {dimension}-D"
-    large = linear == "auto" and system.size > FACTORS_UP_TO[dimension] * faster
+    size = f"{count} unknowns in {dimension}-D"
+    large = linear == "auto" and count > FACTORS_UP_TO[dimension] * faster
     if linear == "direct" or not (large or linear == "amg"):
         return direct, str
     modes = nodal_modes(system)
@@ -53,7 +68,7 @@ def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callabl
     elif linear == "amg":
         return Multigrid(modes), lambda: f"multigrid, {size}"
     else:
-        borne = system.size <= FALL_BACK_UP_TO[dimension] * faster
+        borne = count <= FALL_BACK_UP_TO[dimension] * faster
         both = OrFactors(Multigrid(modes), direct if borne else None)
         return both, lambda: f"{both.name}, because of {size}"
     if linear == "amg":
@@ -62,16 +77,24 @@ def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callabl
 
 
 def nodal_modes(system: System) -> Modes | None:
-    """Rigid-body motions of displacements, or a constant; None where there is more at the nodes."""
+    """Rigid-body motions of displacements, or a constant; None where there is more at the nodes.
+
+    Internal unknowns of elements do not count.
+    """
     nodal, layout = system.numbering.nodal, system.numbering.layout
-    names = [*layout.names]
+    inner = {name for b in system.assembler.blocks for name in b.internal}
+    names = [name for name in layout.names if name not in inner]
     if any(name not in nodal for name in names):
         return None
     if len(names) > 1 and not is_vector(names, system.mesh.dimension):
         return None
+    kept: Flags = np.ones(system.size, dtype=bool)
+    for name in inner:
+        kept[layout.part(name)] = False
+    rank = np.cumsum(kept) - 1
     numbers = np.stack([nodal[name] for name in names], axis=1)
     there = (numbers >= 0).all(axis=1)
-    if numbers[there].size != system.size:
+    if numbers[there].size != kept.sum():
         return None
     near = motions(system.mesh.points[there], names)
-    return Modes(numbers[there].ravel(), len(names), near)
+    return Modes(rank[numbers[there]].ravel(), len(names), near)

@@ -177,9 +177,33 @@ class ElementBlock:
         return given if self.point_data is None else {**given, "point_data": self.point_data}
 
     def fields(self, x: Array, parameters: Array) -> dict[str, Array]:
-        """Fields of the kernel at its quadrature points, name -> (n, points)."""
-        values = self.kernel.fields_at(self.coordinates, x[self.dofs], **self._given(parameters))
-        return {name: values[:, :, i] for i, name in enumerate(self.kernel.fields)}
+        """Fields of the kernel at its quadrature points, name -> (n, points); with them its
+        internal unknowns, the same at all points of an element.
+        """
+        internal = self.internal
+        if internal and not self.kernel.fields:
+            values = np.empty((len(self.dofs), len(self._rule.weights), 0))
+        else:
+            given = self._given(parameters)
+            values = self.kernel.fields_at(self.coordinates, x[self.dofs], **given)
+        found = {name: values[:, :, i] for i, name in enumerate(self.kernel.fields)}
+        for name, numbers in internal.items():
+            found.setdefault(name, np.repeat(x[numbers][:, None], values.shape[1], axis=1))
+        return found
+
+    @property
+    def internal(self) -> dict[str, Integers]:
+        """Numbers (n,) of the unknowns that each element has for itself, by name."""
+        names = getattr(self.kernel, "internal", ())
+        unknowns = getattr(self.kernel, "unknowns", ())
+        return {name: self.dofs[:, unknowns.index(name)] for name in names}
+
+    @property
+    def _rule(self) -> Rule:
+        if self.rule is not None:
+            return self.rule
+        assert isinstance(self.kernel, Kernel)
+        return self.kernel.default_rule
 
 
 @dataclass(eq=False)

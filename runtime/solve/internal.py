@@ -1,0 +1,140 @@
+"""Condensation of unknowns that elements have for themselves, before the rest is factorised.
+
+With K = [[K_EE, K_EI], [K_IE, K_II]], where the block K_II of internal unknowns falls into a small
+one for each element, what is solved is S = K_EE - K_EI K_II^-1 K_IE; the internal unknowns follow
+from the others, K_II^-1 (r_I - K_IE x_E). This is exact: a step is that of the whole matrix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import bsr_array, csc_array, csr_array
+
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.solve.held import Judging
+from softehl.runtime.solve.linear import Factors, LinearSolver, SingularMatrix, SparseMatrix
+
+_SYMMETRIC = 1e-8  # of the largest entry
+
+
+@dataclass(frozen=True, eq=False)
+class Condensing:
+    """A linear solver of what is left when internal unknowns are eliminated.
+
+    groups: (n, k) numbers of the internal unknowns of n like elements. size: of all unknowns.
+    """
+
+    solver: LinearSolver
+    groups: tuple[Integers, ...]
+    size: int
+
+    @property
+    def name(self) -> str:
+        """See `LinearSolver`."""
+        return self.solver.name
+
+    @cached_property
+    def external(self) -> Integers:
+        """All other unknowns, rising."""
+        kept: Flags = np.ones(self.size, dtype=bool)
+        for group in self.groups:
+            kept[group] = False
+        return np.flatnonzero(kept)
+
+    def factorise(self, K: SparseMatrix) -> Eliminated:
+        """Factors of K, (n, n); raises SingularMatrix, also where internal unknowns are loose."""
+        rows, parts, E = csr_array(K), [], self.external
+        S = rows[E][:, E]
+        for group in self.groups:
+            inner = group.ravel()
+            inverse, signs = inverted(rows[inner][:, inner], group)
+            out, back = rows[inner][:, E], rows[E][:, inner]
+            S = S - back @ (inverse @ out)
+            parts.append(_Group(inner, inverse, csr_array(out), csr_array(back), signs))
+        if not np.isfinite(S.data).all():
+            raise SingularMatrix("the matrix has entries that are not finite")
+        return Eliminated(E, tuple(parts), self.solver.factorise(csc_array(S)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Like elements: numbers of internal unknowns (m,), K_II^-1, K_IE, K_EI, and the eigenvalues
+    of K_II where it is symmetric, else None.
+    """
+
+    inner: Integers
+    inverse: bsr_array
+    out: csr_array
+    back: csr_array
+    signs: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """Factors of a matrix by those of what is left of it; `external` are the unknowns there."""
+
+    external: Integers
+    parts: tuple[_Group, ...]
+    rest: Factors
+
+    def solve(self, b: Array) -> Array:
+        """x of K x = b, (n,)."""
+        x, right = np.empty(len(b)), b[self.external]
+        for part in self.parts:
+            right = right - part.back @ (part.inverse @ b[part.inner])
+        x[self.external] = found = self.rest.solve(right)
+        for part in self.parts:
+            x[part.inner] = part.inverse @ (b[part.inner] - part.out @ found)
+        return x
+
+    def pivots(self) -> Array | None:
+        """Numbers (n,) with the signs of the eigenvalues; None where not known."""
+        known = getattr(self.rest, "pivots", None)
+        found = None if known is None else known()
+        if found is None or any(part.signs is None for part in self.parts):
+            return None
+        return np.concatenate([found, *(p.signs for p in self.parts if p.signs is not None)])
+
+    def loosest(self) -> int | None:
+        """See `solve.held.Judging`: what K_II admits is regular, so the rest decides."""
+        if isinstance(self.rest, Judging):
+            number = self.rest.loosest()
+        else:
+            number = self._loose()
+        return None if number is None else int(self.external[number])
+
+    def _loose(self) -> int | None:
+        from softehl.runtime.solve.held import loosest
+
+        matrix = getattr(self.rest, "matrix", None)
+        return None if matrix is None else loosest(matrix, self.rest)
+
+
+def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, Array | None]:
+    """Inverse of a matrix of one block for each of n elements, and its eigenvalues if symmetric.
+
+    Raises SingularMatrix.
+    """
+    n, k = group.shape
+    blocks, entries = np.zeros((n, k, k)), K.tocoo()
+    element = entries.row // k
+    if (element != entries.col // k).any():
+        raise SingularMatrix("internal unknowns of two elements know each other")
+    np.add.at(blocks, (element, entries.row % k, entries.col % k), entries.data)
+    sizes = np.abs(blocks).max(axis=(1, 2), initial=0.0)
+    try:
+        inverse = np.linalg.inv(blocks)
+    except np.linalg.LinAlgError:
+        inverse = np.full_like(blocks, np.nan)
+    if not np.isfinite(inverse).all():
+        bad = int(np.argmin(np.abs(np.linalg.det(blocks / np.maximum(sizes, 1e-300)[:, None, None]))))
+        row = int(group[bad, 0])
+        raise SingularMatrix(f"internal unknowns of element {bad} cannot be eliminated", row)
+    uneven = np.abs(blocks - np.swapaxes(blocks, 1, 2)).max(initial=0.0)
+    even = uneven <= _SYMMETRIC * sizes.max(initial=0.0)
+    signs = np.linalg.eigvalsh(blocks).ravel() if even else None
+    where = np.arange(n)
+    return bsr_array((inverse, where, np.arange(n + 1)), shape=(n * k, n * k)), signs
