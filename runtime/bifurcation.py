@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -20,6 +21,10 @@ from softehl.runtime.system import System
 _SEARCHES = 20
 _LOCATED = 1e-9
 """Of the load factor: a bifurcation is located where the next step is shorter."""
+
+
+class Blind(RuntimeWarning):
+    """Bifurcations are looked for where they cannot be seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +53,7 @@ class Bifurcation:
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class Place:
     """A point near a bifurcation: the eigenvalue next to zero, and its vector (n,)."""
 
     t: float
@@ -61,7 +66,8 @@ class _Place:
 class Detector:
     """Looks at a path after each of its points.
 
-    skip: the first point is on a bifurcation itself. folds: limit points that were met.
+    skip: the first point is on a bifurcation itself. folds: limit points that were met. blind: it
+    was told that a step cannot be judged.
     """
 
     system: System
@@ -69,6 +75,7 @@ class Detector:
     skip: bool = False
     found: list[Bifurcation] = field(default_factory=list)
     folds: int = 0
+    blind: bool = False
 
     def look(self, results: Sequence[Result], branch: Branch) -> None:
         """Look for a bifurcation between the last two results."""
@@ -77,6 +84,14 @@ class Detector:
         if self.skip and len(results) == 2:
             return
         if before.unstable is None or after.unstable is None:
+            if not self.blind:
+                self.blind = True
+                warnings.warn(
+                    f"no symmetric, regular tangent at load factor {after.t:.4g} (friction, contact, "
+                    "follower loads): bifurcations of such a path are not seen",
+                    Blind,
+                    stacklevel=2,
+                )
             return
         change = after.unstable - before.unstable
         if change and not (folds == 1 and abs(change) == 1):
@@ -84,8 +99,8 @@ class Detector:
 
     def _locate(self, before: Result, after: Result, directions: int) -> Bifurcation:
         """By the secant of the eigenvalue next to zero, over the load factor (Illinois)."""
-        a, b = (self._place(r.problem, r.t, r.point.solution.x) for r in (before, after))
-        near, located = min(a, b, key=lambda place: abs(place.value)), False
+        a, b = (place(r.problem, r.t, r.point.solution.x) for r in (before, after))
+        near, located = min(a, b, key=lambda end: abs(end.value)), False
         low, high = a.value, b.value
         for _ in range(_SEARCHES):
             if low * high >= 0.0 or a.t == b.t:
@@ -99,7 +114,7 @@ class Detector:
             if not solution.converged:
                 break
             moved = abs(t - near.t)
-            near = self._place(problem, t, solution.x)
+            near = place(problem, t, solution.x)
             located = moved <= _LOCATED * max(abs(t), abs(after.t - before.t))
             if located or near.value == 0.0:
                 located = True
@@ -111,19 +126,22 @@ class Detector:
             b, high = near, near.value
         return self._told(before, near, directions, located=located)
 
-    def _told(self, before: Result, near: _Place, directions: int, *, located: bool) -> Bifurcation:
+    def _told(self, before: Result, near: Place, directions: int, *, located: bool) -> Bifurcation:
         old, histories = before.point.solution.x, before.histories
-        problem = self.system.problem(self.system.still(near.t, old, histories))
+        problem = self.system.problem(self.system.still(near.t, old, histories)).at(near.x)
         solution = replace(before.point.solution, x=near.x)
         state = Result(self.system, problem, Point(near.t, solution), before.histories)
         mode = near.mode / np.abs(displacements(self.system, near.mode)).max()
         return Bifurcation(state, Shape.of(state, mode), directions, located)
 
-    def _place(self, problem: Problem, t: float, x: Array) -> _Place:
-        K = problem.assembler.linearise(x, problem.parameters)[1]
-        free = Reduction.of(problem, K)
-        value, mode = nearest_zero(symmetric(free.matrix(K)))
-        return _Place(t, x, value, free.map @ mode)
+
+def place(problem: Problem, t: float, x: Array) -> Place:
+    """Of a problem at unknowns x, (n,), with the contacts that it has there."""
+    here = problem.at(x)
+    K = here.assembler.linearise(x, here.parameters)[1]
+    free = Reduction.of(here, K)
+    value, mode = nearest_zero(symmetric(free.matrix(K)))
+    return Place(t, x, value, free.map @ mode)
 
 
 def displacements(system: System, x: Array) -> Array:

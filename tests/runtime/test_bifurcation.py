@@ -12,9 +12,11 @@ from scipy.special import ellipe, ellipk
 
 import softehl
 from softehl import Definition, Model, quadrature
+from softehl.runtime.bifurcation import Blind, place
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study, StudyError
 from tests.runtime.test_follow import shallow
+from tests.runtime.touching_bodies import elastic
 
 K = 3.0
 
@@ -65,6 +67,31 @@ def test_a_link_buckles_to_both_sides() -> None:
         np.testing.assert_allclose(t, K * q / np.sin(q), rtol=1e-9)
         assert path.results[-1].unstable == 0
     assert straight.results[-1].unstable == 1
+
+
+def resting() -> Study:
+    """A block that lies on another one, which nothing else holds."""
+    lower = Mesh.rectangle(1, 1, cells=(2, 2))
+    study = Study(Mesh.union(lower=lower, upper=lower.map(lambda x: np.add(x, [0, 1]))))
+    study.add("body", elastic, mu=1.0, K=5.0)
+    study.contact("upper:bottom", "lower:top", friction=0.3)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.load("upper:top", u_y=-0.05)
+    return study
+
+
+def test_what_is_nearly_singular_is_looked_for_with_contact() -> None:
+    result = resting().solve()
+    sought = result.system.problem(result.system.still(1.0, result.x, {}))
+    found = place(sought, 1.0, result.x)
+    assert abs(found.value) > 1e-3  # without contact the block is free
+    assert found.value == pytest.approx(place(sought.at(result.x), 1.0, result.x).value)
+
+
+def test_a_path_that_cannot_see_bifurcations_says_so() -> None:
+    with pytest.warns(Blind, match="no symmetric, regular tangent at load factor"):
+        path = resting().follow(step=0.5, until=lambda r: r.t > 1.0, detect="bifurcation")
+    assert path.results[-1].unstable is None
 
 
 def test_a_limit_point_is_no_bifurcation() -> None:
