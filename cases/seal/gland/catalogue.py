@@ -86,7 +86,7 @@ def fill(a: Ring, rod_diameter: float, housing_diameter: float, width: float) ->
 def warnings(
     a: Ring, rod_diameter: float, housing_diameter: float, width: float
 ) -> tuple[str, ...]:
-    """What handbooks advise against in a ring and its gland, a line each."""
+    """Warnings of handbooks about a ring and its gland, a line each."""
     filled = fill(a, rod_diameter, housing_diameter, width)
     stretched = stretch(a.inner_diameter, rod_diameter)
     found = []

@@ -7,7 +7,7 @@ from typing import Any, TypeGuard
 
 
 def number(value: object) -> TypeGuard[float]:
-    """Whether a value is a number; True and False are none."""
+    """True if a value is a number; True and False are none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

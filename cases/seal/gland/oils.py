@@ -62,12 +62,12 @@ class Walther:
 
 
 def is_grade(text: str) -> bool:
-    """Whether an oil is given by its ISO grade, which says its viscosity to +-10 %."""
+    """True if an oil is given by its ISO grade, which says its viscosity to +-10 %."""
     return read_oil_name(text).grade is not None
 
 
 def is_improved(text: str) -> bool:
-    """Whether a name says that an oil has a viscosity improver, but not its index."""
+    """True if a name says that an oil has a viscosity improver, but not its index."""
     return read_oil_name(text).improved
 
 

@@ -25,7 +25,7 @@ _MOVE = """
 for (const [source, states] of pairs) source.data = states[cb_obj.value];
 cb_obj.title = titles[cb_obj.value];
 """
-"""What the slider does: every line shows its state at the speed of that number."""
+"""Script of the slider: every line shows its state at the speed of that number."""
 
 Profiles = dict[str, list[dict[str, list[float]]]]
 

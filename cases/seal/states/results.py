@@ -1,4 +1,4 @@
-"""What a converged film of a seal means: h*, pressure, friction, leakage, limits."""
+"""Results of a converged film of a seal: h*, pressure, friction, leakage, limits."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def metering(at: Mapping[str, Array], parts: Sequence[slice], stroke: Stroke) ->
 
 
 def _lifted(at: Mapping[str, Array], part: slice, stroke: Stroke) -> bool:
-    """Whether pressure rises all the way through a part of the film, where the oil goes."""
+    """True if pressure rises all the way through a part of the film, where the oil goes."""
     last: int = part.stop - 1 if stroke == "out" else part.start
     return _top(at, part) == last
 
@@ -203,7 +203,7 @@ def filled_ratio(at: Mapping[str, Array], film: FilmLoads) -> float:
 
 
 def rough_numbers(system: SealSystem, at: Mapping[str, Array]) -> dict[str, float]:
-    """What asperities carry of load and friction, and how far they are apart: see FilmNumbers.
+    """Share of asperities in load and friction, and the mean gap: see FilmNumbers.
 
     at: fields of the film. Nothing is known between smooth surfaces.
     """

@@ -36,7 +36,7 @@ NAMES = {
     "trapezoid": "trapezoidal ring",
     "u_cup": "U-cup",
 }
-"""What seals of these sections are called."""
+"""Names of seals of these sections."""
 
 _RENAMED = {"width": "section_width"}  # what a page calls a dimension -> its key
 _STATIONS = 2000
