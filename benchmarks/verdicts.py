@@ -191,14 +191,13 @@ def main() -> None:
     parser.add_argument("--page", type=Path, help="page of the documentation to renew")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    numbers = options.only or range(options.count)
-    for number in numbers:
-        solved(drawn(number), options.folder / f"run_{number}.json", options.limit)
-    for kind, times in FINER.items():
-        for number in numbers:
-            given = reference(drawn(number), times)
-            if times == 2 or given["density"] <= FINEST:
-                solved(given, options.folder / f"{kind}_{number}.json", options.limit)
+    for number in options.only or range(options.count):
+        given, path = drawn(number), options.folder / f"run_{number}.json"
+        solved(given, path, options.limit)
+        for kind, times in FINER.items() if states(path) else ():
+            if times == 2 or times * given["density"] <= FINEST:
+                path = options.folder / f"{kind}_{number}.json"
+                solved(reference(given, times), path, options.limit)
     text = tables(options.folder, options.count)
     if options.page is None:
         print(text)
