@@ -30,7 +30,8 @@ DENSITY = 870.0
 EXPANSION = 0.65
 """Fall of the density of a mineral oil, kg/m^3 for each degC."""
 
-_KELVIN, _SAME = 273.15, 1e-6
+_KELVIN = 273.15
+_SAME = 1e-6  # relative: two ways to a viscosity differ by less through rounding
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import ORing
 
 MOST = 6.0
-"""Largest p_s / mu that is not refused: above it runs take minutes to states that are `uncertain`."""
+"""Largest p_s / mu that is not refused: runs above it take minutes to `uncertain` states."""
 
 _SURE, _TRIED = 3.0, 5.4
 """p_s / mu up to which every film of an O-ring was right, and the largest that was tried."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 _METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"
-_LEVELS = 14
+_LEVELS = 14  # colours of the stress
 _NEEDED = {"contact_pressure", *(f"sigma_{name}" for name in ("zz", "rr", "tt", "zr"))}
 # in section diameters
 _BAND = 0.26

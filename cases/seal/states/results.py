@@ -15,7 +15,7 @@ from softehl.cases.seal.equations.system import (
     FACET,
     FILM,
 )
-from softehl.cases.seal.gland.surfaces import regime
+from softehl.cases.seal.gland.surfaces import MICROMETRE, regime
 from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, groups
 from softehl.cases.seal.states.entrance import built_up, wedge, wedge_friction
 from softehl.cases.seal.states.film_signs import (
@@ -39,8 +39,6 @@ from softehl.runtime.fem.postprocess import (
 )
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.rules import trace_rule
-
-MICROMETRE = 1e-3  # mm
 
 _TORN = 1e-6  # void fraction of a film that has ruptured
 

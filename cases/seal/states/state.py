@@ -243,16 +243,6 @@ class Outcome(harness.Outcome):
     states: tuple[FilmState, ...]
     stages: tuple[StageRecord, ...] = ()
 
-    @property
-    def unknowns_total(self) -> int:
-        """Number of all unknowns."""
-        return self.unknowns["total"]
-
-    @property
-    def unknowns_pressure(self) -> int:
-        """Number of those that are film pressures."""
-        return self.unknowns["pressure"]
-
 
 class Observer(Protocol):
     """The listener a run of a seal reports to.  Calls come in order, from one thread."""

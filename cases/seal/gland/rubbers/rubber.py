@@ -26,7 +26,7 @@ from softehl.cases.seal.gland.trade.text import refused
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
 
-_PAPER = {"mu_1": 3.04, "mu_2": 0.62}
+_PAPER = {"mu_1": 3.04, "mu_2": 0.62}  # MPa, Table 1 of the paper
 
 
 def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
