@@ -47,7 +47,7 @@ def measure(parameters: ORing) -> dict[str, Any]:
     marks = [*observer.marks, time.process_time()]
     return {
         "converged": outcome.converged,
-        "unknowns": outcome.unknowns_total,
+        "unknowns": outcome.unknowns["total"],
         "linear": outcome.solvers["linear"],
         "wall": time.perf_counter() - wall,
         "cpu": marks[-1] - cpu,

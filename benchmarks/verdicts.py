@@ -1,11 +1,13 @@
 """Errors of states that a run calls `ok`, in settings drawn at random, against finer meshes.
 
-    python -m benchmarks.verdicts FOLDER [--count 24] [--limit 150] [--only N ...]
+    python -m benchmarks.verdicts FOLDER [--count 20] [--limit 150] [--only N ...] [--page FILE]
 
-Each setting is run as a user would, then on a mesh of at least twice its density (and at least 4)
-with pressures of at least order 4. FOLDER keeps the results, one JSON file a run. References
-are never run twice; delete the `run_*` files to try another program. A run that ends in an error,
-or takes more than the limit (in seconds of CPU), is left out and named.
+Each setting is run as a user would, then on meshes of twice and, up to density 2, of four times its
+density, with continuous pressures of at least order 4. A state counts against the finest mesh that
+has it without a doubt. FOLDER keeps the states, one file of JSON lines a run; a run that FOLDER has
+is not repeated. Delete the `run_*` files to try another program with the same references. A run is
+stopped at the limit (seconds of CPU); what it had found by then counts. `--page` writes the tables
+between the marks of a page of the documentation.
 """
 
 from __future__ import annotations
@@ -14,21 +16,24 @@ import argparse
 import json
 import multiprocessing as mp
 import resource
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softehl.cases.seal.gland.parameters import ORing
-from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.reach import ratio
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.states.state import Silent
+from softehl.cases.seal.states.state import FilmState, Silent
 
-SEED = 32
-QUANTITIES = ("h_star_um", "rod_friction_N", "leak_rate_mm3_s")
+SEED = 33
+QUANTITIES = {"h_star_um": "h\\*", "rod_friction_N": "friction", "leak_rate_mm3_s": "leakage"}
+ALLOWED = 2.0  # %, what `ok` promises
 MODULUS = 3.66  # MPa, of the default rubber
+DENSITIES = (2, 1, 2, 4)
+FINER = {"twice": 2, "four": 4}
+FINEST = 8  # density of the most expensive reference
 
 SHAPES: dict[str, dict[str, Any]] = {
     "round": {},
@@ -38,22 +43,30 @@ SHAPES: dict[str, dict[str, Any]] = {
     "trapezoid": {"groove_width": 5.2},
     "u_cup": {"groove_width": 6.0},
 }
-"""What a section needs besides its name on the default rod, with its default height."""
+"""Keys of a section besides its name, on the default rod with its default height."""
+
+Keys = dict[str, Any]
+States = dict[float, dict[str, Any]]
+Line = tuple[int, Keys, dict[str, Any], list[float]]
+"""A state beside its reference: number and keys of its setting, its row, its errors in per cent."""
 
 
-def drawn(number: int) -> dict[str, Any]:
-    """The keys of a number; settings that contradict each other are drawn again."""
+def drawn(number: int) -> Keys:
+    """The keys of a number; settings that contradict each other are drawn again.
+
+    Sections and densities take turns, so that 24 settings have each pair.
+    """
     rng = np.random.default_rng([SEED, number])
     while True:
-        section = list(SECTIONS)[number % len(SECTIONS)]
-        speeds = np.exp(rng.uniform(np.log(25.0), np.log(1600.0), 2))
-        given: dict[str, Any] = {
+        section = list(SHAPES)[number % len(SHAPES)]
+        speeds = np.exp(rng.uniform(np.log(25.0), np.log(1600.0), 3))
+        given: Keys = {
             **({} if section == "round" else {"section": section}),
             **({"groove_width": 4.3} | SHAPES[section] if section != "round" else {}),
-            "density": int(rng.choice([1, 2, 4])),
+            "density": DENSITIES[(number + number // len(SHAPES)) % len(DENSITIES)],
             "reynolds": str(rng.choice(["fe", "dg"])),
             "pressure_order": int(rng.integers(1, 7)),
-            "sealed_pressure": round(float(rng.uniform(0.0, 3.0)) * MODULUS, 2),
+            "sealed_pressure": round(float(rng.uniform(0.0, 4.0)) * MODULUS, 2),
             "stroke": str(rng.choice(["out", "in"])),
             "speeds": tuple(sorted((float(f"{u:.2g}") for u in speeds), reverse=True)),
         }
@@ -64,100 +77,134 @@ def drawn(number: int) -> dict[str, Any]:
         return given
 
 
-def reference(given: dict[str, Any]) -> dict[str, Any]:
+def reference(given: Keys, times: int) -> Keys:
     """The setting on a finer mesh, with the continuous film of at least order 4."""
-    order, density = max(given["pressure_order"], 4), max(2 * given["density"], 4)
+    order, density = max(given["pressure_order"], 4), times * given["density"]
     same = {"reynolds": "fe", "error_estimate": False}
     return {**given, **same, "pressure_order": order, "density": density}
 
 
-def _solved(given: dict[str, Any], path: str, limit: int) -> None:
+class Keeper(Silent):
+    """Writes each state to a file as soon as it is found."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def film_state(self, state: FilmState) -> None:
+        """See :class:`Observer`."""
+        names = (*QUANTITIES, "verdict", "h_star_error_percent", "rod_friction_error_percent")
+        row = {"U": state.rod_speed_mm_s, **{name: getattr(state, name) for name in names}}
+        with self.path.open("a", encoding="utf-8") as lines:
+            lines.write(json.dumps(row) + "\n")
+
+
+def _solve(given: Keys, path: Path, limit: int) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-    begun = time.process_time()
-    states = run(ORing(**given), Silent()).states
-    names = (*QUANTITIES, "h_star_error_percent", "rod_friction_error_percent")
-    rows = [
-        {"U": s.rod_speed_mm_s, "verdict": s.verdict, **{n: getattr(s, n) for n in names}}
-        for s in states
-    ]
-    found = {"given": given, "rows": rows, "cpu_s": time.process_time() - begun}
-    Path(path).write_text(json.dumps(found), encoding="utf-8")
+    run(ORing(**given), Keeper(path))
 
 
-def solved(given: dict[str, Any], path: Path, limit: float) -> list[dict[str, Any]] | None:
-    """The states of a run, kept in a file; None where it takes too long or ends in an error."""
+def solved(given: Keys, path: Path, limit: float) -> None:
+    """Write the states of a run to a file, unless it is there."""
+    if path.exists():
+        return
+    path.touch()
+    process = mp.get_context("spawn").Process(target=_solve, args=(given, path, int(limit)))
+    process.start()
+    process.join()
+
+
+def states(path: Path) -> States:
+    """The states in a file by speed; none without the file."""
     if not path.exists():
-        arguments = given, str(path), int(limit)
-        process = mp.get_context("spawn").Process(target=_solved, args=arguments)
-        process.start()
-        process.join()
-        if not path.exists():
-            path.write_text(json.dumps({"given": given, "rows": None}), encoding="utf-8")
-    rows: list[dict[str, Any]] | None = json.loads(path.read_text(encoding="utf-8"))["rows"]
-    return rows
+        return {}
+    rows = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+    return {row["U"]: row for row in rows}
+
+
+def references(folder: Path, number: int) -> States:
+    """The states of the finest mesh that has each without a doubt."""
+    found: States = {}
+    for kind in FINER:
+        fine = states(folder / f"{kind}_{number}.json")
+        found |= {u: row for u, row in fine.items() if row["verdict"] == "ok"}
+    return found
 
 
 def errors(row: dict[str, Any], right: dict[str, Any]) -> list[float]:
-    """Of h*, friction and leakage, %."""
+    """Errors of h*, friction and leakage, %."""
     return [100.0 * (row[name] / right[name] - 1.0) for name in QUANTITIES]
 
 
-def compared(
-    rows: Sequence[dict[str, Any]], references: Sequence[dict[str, Any]]
-) -> Iterator[tuple[dict[str, Any], list[float]]]:
-    """The states that both runs have, each with its errors; the reference must not be doubtful."""
-    right = {row["U"]: row for row in references if row["verdict"] == "ok"}
-    for row in rows:
-        if row["U"] in right:
-            yield row, errors(row, right[row["U"]])
+def compared(folder: Path, number: int) -> Iterator[Line]:
+    """The states of a setting that have a reference."""
+    right = references(folder, number)
+    for u, row in states(folder / f"run_{number}.json").items():
+        if u in right:
+            yield number, drawn(number), row, errors(row, right[u])
 
 
-def told(number: int, given: dict[str, Any]) -> str:
-    """A setting in a few words."""
-    words = (given.get("section", "round"), f"d={given['density']}", given["reynolds"])
-    order, p_s = given["pressure_order"], given["sealed_pressure"]
-    return f"{number:3d} {' '.join(words)} m={order} p_s={p_s:g}"
+def told(line: Line) -> str:
+    """A line of the second table."""
+    number, given, row, off = line
+    u, order = row["U"], given["pressure_order"]
+    numerics = f"{given['density']}, {given['reynolds']} {order}"
+    shown = " | ".join(f"{value:+.2f}" for value in off)
+    estimates = row["h_star_error_percent"], row["rod_friction_error_percent"]
+    said = ", ".join("-" if np.isnan(value) else f"{value:+.2f}" for value in estimates)
+    p_s = ratio(ORing(**given), given["sealed_pressure"])
+    where = f"{number} | {given.get('section', 'round')} | {numerics} | {p_s:.1f} | {u:+g}"
+    return f"| {where} | {shown} | {said} | {row['verdict']} |"
+
+
+def tables(folder: Path, count: int) -> str:
+    """What is `ok` and how far it is off at most, then all states that have a reference."""
+    tried = [n for n in range(count) if (folder / f"run_{n}.json").exists()]
+    lines = [line for number in tried for line in compared(folder, number)]
+    asked = sum(len(drawn(number)["speeds"]) for number in tried)
+    reached = sum(len(states(folder / f"run_{number}.json")) for number in tried)
+    ok = [line for line in lines if line[2]["verdict"] == "ok"]
+    wrong = [line for line in ok if max(map(abs, line[3])) > ALLOWED]
+    worst = np.abs([line[3] for line in ok]).max(axis=0) if ok else np.full(3, np.nan)
+    counts = len(tried), asked, reached, len(lines), len(ok), len(wrong)
+    most = " | ".join(f"{value:.2f}" for value in worst)
+    names = ", % | ".join(QUANTITIES.values())
+    return "\n".join([
+        f"| settings | states | reached | with a reference | `ok` of these | `ok` and off by more "
+        f"than {ALLOWED:g} % | largest errors of `ok` states: {names}, % |",
+        "|---" * 9 + "|",
+        f"| {' | '.join(map(str, counts))} | {most} |",
+        "",
+        f"| | section | density, scheme, order | p_s / mu | U, mm/s | {names}, % | "
+        "estimates of h\\*, friction, % | verdict |",
+        "|---" * 10 + "|",
+        *map(told, lines),
+    ])  # fmt: skip
 
 
 def main() -> None:
-    """Print a line for each state, and the largest errors of those that are `ok`."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Run what is missing, print or write the tables."""
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--count", type=int, default=24)
-    parser.add_argument("--limit", type=float, default=150.0)
-    parser.add_argument("--only", type=int, nargs="*")
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--limit", type=float, default=150.0, help="seconds of CPU of a run")
+    parser.add_argument("--only", type=int, nargs="*", help="numbers of settings to run")
+    parser.add_argument("--page", type=Path, help="page of the documentation to renew")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    worst, ok, others = [0.0, 0.0, 0.0], 0, 0
     for number in options.only or range(options.count):
-        given = drawn(number)
-        paths = (options.folder / f"{kind}_{number}.json" for kind in ("reference", "run"))
-        right, rows = (
-            solved(keys, path, options.limit)
-            for keys, path in zip((reference(given), given), paths, strict=True)
-        )
-        if right is None or rows is None:
-            print(
-                f"{told(number, given)}: no state of the run or of its reference within the limit",
-                flush=True,
-            )
-            continue
-        for row, off in compared(rows, right):
-            shown = " ".join(f"{value:+6.2f}" for value in off)
-            estimates = row["h_star_error_percent"], row["rod_friction_error_percent"]
-            said = " ".join(f"{value:+6.2f}" for value in estimates)
-            print(
-                f"{told(number, given)} U={row['U']:+g}: {shown} % (estimates {said}) "
-                f"{row['verdict']}",
-                flush=True,
-            )
-            if row["verdict"] == "ok":
-                ok += 1
-                worst = [max(a, abs(b)) for a, b in zip(worst, off, strict=True)]
-            else:
-                others += 1
-    figures = ", ".join(f"{n} {v:.2f} %" for n, v in zip(QUANTITIES, worst, strict=True))
-    print(f"{ok} states ok, {others} others; largest errors of those that are ok: {figures}")
+        given, path = drawn(number), options.folder / f"run_{number}.json"
+        solved(given, path, options.limit)
+        for kind, times in FINER.items() if states(path) else ():
+            if times == 2 or times * given["density"] <= FINEST:
+                path = options.folder / f"{kind}_{number}.json"
+                solved(reference(given, times), path, options.limit)
+    text = tables(options.folder, options.count)
+    if options.page is None:
+        print(text)
+        return
+    before, _, rest = options.page.read_text(encoding="utf-8").partition("<!-- verdicts -->\n")
+    _, _, after = rest.partition("<!-- end -->")
+    options.page.write_text(f"{before}<!-- verdicts -->\n{text}\n<!-- end -->{after}", "utf-8")
 
 
 if __name__ == "__main__":

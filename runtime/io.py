@@ -145,7 +145,7 @@ def _plain(value: object) -> object:
 
 
 _KINDS = {2: "line", 4: "quad"}
-"""What meshio calls a cell of so many nodes."""
+"""Names in meshio of cells of so many nodes."""
 
 
 def write_vtu(

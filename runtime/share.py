@@ -18,7 +18,7 @@ class Share:
     """All unknowns and elements on one process; every method is called by all processes alike."""
 
     first = True
-    """Whether this process writes what is one file for all, and speaks."""
+    """True if this process writes what is one file for all, and speaks."""
     pieces: tuple[int, int] = (0, 1)
     """Number of this process, and of all."""
 

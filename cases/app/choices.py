@@ -26,7 +26,7 @@ SPEEDS = (10, 20, 50, 100, 200, 400, 800, 1600)
 """Rod speeds that are offered, mm/s."""
 
 USUAL_SPEEDS = (100, 400)
-"""Those that a new desk begins with."""
+"""Choices that a new desk begins with."""
 
 DENSITIES = {"coarse, seconds": 1, "usual": 2, "fine": 4, "very fine, minutes": 8}
 """Meshes in words -> the key `density`."""

@@ -20,7 +20,7 @@ from softehl.runtime.io import read_csv, read_json
 from softehl.runtime.library import GENERATED, manifest
 
 Existing: TypeAlias = Literal["refuse", "resume", "overwrite"]
-"""What to do with an earlier run in a folder."""
+"""Treatments of an earlier run in a folder."""
 
 
 def existing_of(*, resume: bool, overwrite: bool) -> Existing:

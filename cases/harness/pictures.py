@@ -15,7 +15,7 @@ KINDS = ("png", "svg")
 """Of the files of a picture."""
 
 CHOICES = {"png": ("png",), "svg": ("svg",), "both": KINDS, "none": ()}
-"""What a run may be asked for: every kind is a drawing of its own."""
+"""Kinds of pictures of a run: each is a drawing of its own."""
 
 _HOW: Mapping[str, Mapping[str, Any]] = {
     "png": {"pil_kwargs": {"compress_level": 3}},  # a fifth larger than what takes 3 times as long

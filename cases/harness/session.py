@@ -129,7 +129,7 @@ class Reporter(Observer):
 
 
 _OF_THE_USER = (MissingKernelsError, StaleKernelsError, MissingBackend, MeshError)
-"""What a run may end in that is no fault of the program."""
+"""Errors that end a run and are no fault of the program."""
 
 
 @contextmanager

@@ -15,7 +15,7 @@ VISIBLE = 0.05
 """Oscillation index that can be seen in a diagram: a zigzag of 1.25 % of h."""
 
 RIPPLE = 0.02
-"""The same for a ripple, which includes the surroundings of the dip: 2 % of h*."""
+"""Limit for a ripple, which includes the surroundings of the dip: 2 % of h*."""
 
 MILD = 0.5
 """Oscillation index of a mild oscillation: a zigzag of an eighth of h."""

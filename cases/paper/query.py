@@ -63,7 +63,7 @@ class Query:
 
 
 Measure = Callable[[Query], Finding]
-"""How a statement is measured.  Raises ValueError where a state that it needs was not reached."""
+"""Measure of a statement.  Raises ValueError where a state that it needs was not reached."""
 
 
 def all_hold(tests: Sequence[tuple[float, float]]) -> tuple[int, int]:

@@ -9,7 +9,7 @@ from softehl.cases.paper.item import Item, Product, Scope, Table
 from softehl.cases.paper.states import Request, Store
 
 WORDS = {True: "yes", False: "no", None: "-"}
-"""Whether a statement holds; None where a number that it takes was not reached."""
+"""True if a statement holds; None where a number that it takes was not reached."""
 
 _SOURCES: Sequence[Item] = (
     *tables.ITEMS,

@@ -28,7 +28,7 @@ SPEEDS = (1600.0, 800.0, 400.0, 200.0, 100.0, 50.0, 25.0)
 """The rod speeds |U| of Table 1, halved from the fastest to the slowest, mm/s."""
 
 ENDED = ("converged", "not converged")
-"""What run.json says of a run that came to its end; of another one the rest is still to be run."""
+"""Endings in run.json of a run that is complete; the rest of any other run is still missing."""
 
 PAPER: dict[str, Any] = {
     "mesh": "uniform",
@@ -38,10 +38,10 @@ PAPER: dict[str, Any] = {
     "arc_start": -34.0,
     "arc_end": 43.0,
 }
-"""What the paper does where a run by itself would do better."""
+"""Keys of the paper's scheme where a run by itself would do better."""
 
 STABILISED: dict[str, Any] = {"mesh": "graded", "upwinding": 1.0, "error_estimate": True}
-"""What `softehl run` does by itself, on the arc of the paper."""
+"""Keys of `softehl run` by itself, on the arc of the paper."""
 
 _IN_NAME = ("density", "sealed_pressure")
 

@@ -178,7 +178,7 @@ class Solver:
 
     @property
     def direct(self) -> bool:
-        """Whether a further right-hand side costs no iterations."""
+        """True if a further right-hand side costs no iterations."""
         return self._ksp is not None and self._ksp.getType() == "preonly"
 
     def reset(self) -> None:

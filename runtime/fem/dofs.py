@@ -12,7 +12,7 @@ import numpy as np
 from softehl.runtime.arrays import Integers
 
 AXES = ("x", "y", "z", "r")
-"""What follows the underscore in the name of a component of a vector."""
+"""Suffixes of the names of the components of a vector."""
 
 
 @dataclass(frozen=True)

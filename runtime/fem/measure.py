@@ -18,8 +18,8 @@ import numpy as np
 from softehl.runtime.arrays import Array, Flags, Integers
 
 ROUNDING = 8.0 * np.finfo(np.float64).eps
-"""What the residual of an element may be off by, relative to the stiffness times the largest number
-that its kernel adds: a few roundings."""
+"""Error of the residual of an element by rounding, relative to the stiffness times the largest
+number that its kernel adds."""
 
 _LEAST = ROUNDING / 1e-9
 """A field whose forces are smaller than this share of its terms is measured by that: residuals that

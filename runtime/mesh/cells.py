@@ -131,7 +131,7 @@ class Cell:
         return tuple(found)
 
     def holds(self, at: Array, margin: float) -> bool:
-        """Whether a parent point (dim,) lies in the parent element, or no further out than that."""
+        """True if a parent point (dim,) lies in the parent element, or no further out than that."""
         if self.corners == 2**self.dimension:
             return bool(np.abs(at).max(initial=0.0) <= 1.0 + margin)
         flat = at if self.corners == self.dimension + 1 else at[:2]

@@ -1,4 +1,4 @@
-"""What is wrong with a mesh: cells that are turned inside out, cells or faces that stand twice."""
+"""Faults of a mesh: cells that are turned inside out, cells or faces that stand twice."""
 
 from __future__ import annotations
 

@@ -34,12 +34,12 @@ Group = tuple[int, int]
 
 
 class GmshError(ValueError):
-    """What is wrong with a file."""
+    """Error about a file."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """What a file holds: points (n, 3); kind -> cells (m, k), each once; name -> kind -> numbers of
+    """Content of a file: points (n, 3); kind -> cells (m, k), each once; name -> kind -> numbers of
     cells of that kind, rising.
     """
 
@@ -106,7 +106,7 @@ class _Source:
 
 @dataclass
 class _Parts:
-    """What is read so far.
+    """State of reading.
 
     tags, points: of the nodes. rows: kind -> lists of node tags. groups: kind -> for each list the
     groups that all its cells are in. names: of groups. entities: their groups.

@@ -1,4 +1,4 @@
-"""Where points lie in a mesh of quadrilaterals: the cell of each, and its place in the cell."""
+"""Places of points in a mesh of quadrilaterals: the cell of each, and its place in the cell."""
 
 from __future__ import annotations
 

@@ -201,7 +201,7 @@ class Mesh:
         }
 
     def outer_faces(self, where: str | Predicate) -> Faces:
-        """The same, of one dimension less than the mesh.  Raises MeshError for a face that is not
+        """Faces of one dimension less than the mesh.  Raises MeshError for a face that is not
         that of one cell alone, which has no outside; those of shells are as they were given.
         """
         found = self.faces(where)

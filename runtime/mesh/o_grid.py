@@ -103,7 +103,7 @@ def disc_mesh(disc: Disc, density: int | Fraction) -> SectionMesh:
 
 
 def fine_disc(disc: Disc, depth: float, first: float = inf) -> Disc:
-    """The same with layers as a film needs them.
+    """O-grid with layers as a film needs them.
 
     depth: of the outermost layer on the arc, mm, at most, as far as their number allows. first:
     size of the segment beyond the air end of the arc, mm, at most.
@@ -125,7 +125,7 @@ def fine_disc(disc: Disc, depth: float, first: float = inf) -> Disc:
 
 
 def _layers(first: float) -> tuple[int, float]:
-    """How many layers there are at density 1, and their growth; the first is this part of all."""
+    """Number of layers at density 1, and their growth; the first is this part of all."""
     for layers in range(LAYERS, MOST_LAYERS + 1, LAYERS):
         growth = _growth_to(first, layers * _DENSITY, _LAYER_GROWTH)
         if growth <= STEEPEST_GROWTH ** (layers * _DENSITY):

@@ -283,7 +283,7 @@ def _lowest_of(piece: Piece) -> float:
 
 
 def _reach(outline: Outline, at: float, steepest: float, way: int) -> float:
-    """How far from a place, forwards (1) or backwards (-1), the outline stays that gentle."""
+    """Length from a place, forwards (1) or backwards (-1), on which the outline is that gentle."""
     count = len(outline.pieces)
     k = int(np.searchsorted(outline.starts, at, side="right")) - 1 if way > 0 else (
         int(np.searchsorted(outline.starts, at, side="left")) - 1

@@ -1,4 +1,4 @@
-"""What makes an outline that of a section: closed, simple, without pieces of no length."""
+"""Checks of the outline of a section: closed, simple, without pieces of no length."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the nodes along an outline lie, and how thick the strip of layers along it may be.
+"""Nodes along an outline, and the largest thickness of the strip of layers along it.
 
 Both follow from the largest ball that touches the outline at a place, inside and outside: segments
 and strip are small where the section or a mouth is narrow.
@@ -42,7 +42,7 @@ _STEPS = 27 * 64  # of the table of a spacing
 
 @dataclass(frozen=True, eq=False)
 class BoundaryLayout:
-    """Where the nodes of the boundary lie, for every density.
+    """Nodes of the boundary for every density.
 
     parts: begin and end of each part of the outline, rising from the start of the film on, its
     spacing and number of segments at density 1; the film is the first. reach: (stations,) radius

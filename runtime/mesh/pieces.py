@@ -54,7 +54,7 @@ class Line:
         return np.asarray(np.clip((points - np.array(self.start)) @ way, 0.0, self.length))
 
     def reversed(self) -> Line:
-        """The same piece from its end to its start."""
+        """Piece from its end to its start."""
         return Line(self.end, self.start)
 
     def part(self, begin: float, end: float) -> Line:
@@ -134,7 +134,7 @@ class Arc:
         )
 
     def reversed(self) -> Arc:
-        """The same piece from its end to its start."""
+        """Piece from its end to its start."""
         return Arc(self.end, self.start, self.centre, not self.ccw)
 
     def part(self, begin: float, end: float) -> Arc:
@@ -211,7 +211,7 @@ def rounded(points: Sequence[Point], radii: Sequence[float] | float) -> list[Pie
 def _fillet(
     before: Point, at: Point, after: Point, radius: float
 ) -> tuple[float, Arc | None, Point]:
-    """What a fillet takes of both sides of a corner, the fillet, and where it ends."""
+    """Shortened sides of a corner with a fillet, the fillet, and its end."""
     if radius == 0.0:
         return 0.0, None, at
     a, b = np.subtract(at, before), np.subtract(after, at)

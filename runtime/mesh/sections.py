@@ -70,7 +70,7 @@ def corner_jacobians(mesh: SectionMesh) -> Array:
 
 
 def corner_shares(x: Array) -> Array:
-    """The same of quadrilaterals with corners x (Q, 4, 2)."""
+    """Quality of quadrilaterals with corners x (Q, 4, 2)."""
     forward, backward = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
     cross = forward[..., 0] * backward[..., 1] - forward[..., 1] * backward[..., 0]
     return np.asarray(cross / (0.5 * np.abs(cross.sum(axis=1, keepdims=True)) * 0.5))

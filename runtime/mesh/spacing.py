@@ -1,4 +1,4 @@
-"""Where the nodes of a line lie: a size function, and the map of index space that obeys it.
+"""Nodes of a line: a size function, and the map of index space that obeys it.
 
 A line of length L is to have `count` segments whose size at s is
 
@@ -102,5 +102,5 @@ def graded(
 
 
 def _growth(beyond: Array, before: float, behind: float) -> Array:
-    """What a size grows by at signed distances (n,) from a place, at these rates."""
+    """Growth of a size at signed distances (n,) from a place, at these rates."""
     return np.where(beyond < 0.0, -before * beyond, behind * beyond)

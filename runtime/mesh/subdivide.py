@@ -42,7 +42,7 @@ def subdivided(
 
 
 def _rows(table: Integers, rows: Integers) -> Integers:
-    """Where rows (m, 2) stand in a sorted table (e, 2) that holds them."""
+    """Places of rows (m, 2) in a sorted table (e, 2) that holds them."""
     base = int(table.max()) + 1
     return np.searchsorted(table[:, 0] * base + table[:, 1], rows[:, 0] * base + rows[:, 1])
 

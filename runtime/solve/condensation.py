@@ -23,7 +23,7 @@ _RIGHT_SIDES = 64  # at a time; all at once would need much memory
 _LAST = 1e-12  # factor on the rows of the boundary, so that none is a pivot of the interior
 
 SparseFactors: TypeAlias = Any
-"""What scipy's splu gives: solve, L, U, perm_r, perm_c."""
+"""Result of scipy's splu: solve, L, U, perm_r, perm_c."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,14 +79,14 @@ class ModifiedNewton:
             norms.append(residual_size(problem, history.latest.r))
 
     def _exhausted(self, before: float, norm: float) -> bool:
-        """Whether nothing but rounding is left."""
+        """True if nothing but rounding is left."""
         return 0.5 * before < norm <= self.stagnation * self.tolerance
 
     def _target(self, norm: float) -> float:
         return max(0.1 * self.tolerance, self.inner_gain * norm)
 
     def _status(self, norms: list[float]) -> Status | None:
-        """How the solve ends at these norms, None if it goes on."""
+        """End of the solve at these norms, None if it goes on."""
         if norms[-1] <= self.tolerance:
             return Status.CONVERGED
         if len(norms) > 4 and self._exhausted(min(norms[1:-2]), min(norms[-2:])):

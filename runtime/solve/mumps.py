@@ -169,7 +169,7 @@ def _team() -> Team:
 
 @contextmanager
 def leading() -> Iterator[bool]:
-    """Whether this process is in the lead; the others serve, until it leaves the context."""
+    """True if this process is in the lead; the others serve, until it leaves the context."""
     comm = world()
     if comm.rank:
         _serve(comm)

@@ -106,11 +106,11 @@ class NamedProblem(NonlinearProblem, Protocol):
     """A problem that knows names for messages."""
 
     def name_of(self, number: int) -> str:
-        """What an unknown is."""
+        """Name of an unknown."""
         ...
 
     def where_not_finite(self, x: Array) -> str:
-        """Where the equations are not finite at x, (n,); empty if they are."""
+        """Places where the equations are not finite at x, (n,); empty if they are."""
         ...
 
 
@@ -254,13 +254,13 @@ class Newton:
         return state
 
     def _is_rounding(self, problem: NonlinearProblem, x: Array, K: SparseMatrix) -> bool:
-        """Whether nothing is left of the residual at x but what rounding may have caused."""
+        """True if nothing is left of the residual at x but what rounding may have caused."""
         return isinstance(problem, MeasuredProblem) and (
             problem.measure(x, K, rounded=True) <= self.tolerance
         )
 
     def _is_exact(self, problem: NonlinearProblem, state: NewtonState, K: SparseMatrix) -> bool:
-        """Whether the last digits of x make all that is left of a residual near the tolerance."""
+        """True if the last digits of x make all that is left of a residual near the tolerance."""
         if not self.tolerance < state.norms[-1] <= min(_FEW, self.stagnation) * self.tolerance:
             return False
         if not isinstance(problem, RoundedProblem):
@@ -269,7 +269,7 @@ class Newton:
         return problem.beyond_rounding(r, state.x, K) <= self.tolerance
 
     def _merit(self, problem: NonlinearProblem, x: Array, norm: float) -> float:
-        """What a line search looks at."""
+        """Problem of a line search."""
         if self.line_search and isinstance(problem, SearchedProblem):
             return problem.merit(x)
         return norm
@@ -289,7 +289,7 @@ def norm_at(problem: NonlinearProblem, x: Array, K: SparseMatrix | None = None) 
 
 
 def _where(problem: NonlinearProblem, x: Array) -> str:
-    """Where the equations are not finite at x, for messages."""
+    """Words for places where the equations are not finite at x."""
     found = problem.where_not_finite(x) if isinstance(problem, NamedProblem) else ""
     return f": {found}" if found else ""
 

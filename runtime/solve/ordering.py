@@ -26,7 +26,7 @@ NOTHING: Integers = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """How rows and columns of a pattern are arranged before they are factorised.
+    """Order of rows and columns of a pattern before it is factorised.
 
     given: indptr and indices of the pattern, csc. boundary: (m,) unknowns that come last, in this
     order. unknowns: (n,) all of them as they come. indptr, indices: the arranged pattern, csc.
@@ -56,7 +56,7 @@ class Order:
         )
 
     def fits(self, K: SparseMatrix, boundary: Integers) -> bool:
-        """Whether K has this pattern, and the boundary is the same."""
+        """True if K has this pattern, and the boundary is the same."""
         return (
             _same(self.given[0], K.indptr)
             and _same(self.given[1], K.indices)
@@ -77,7 +77,7 @@ class Orders:
     known: list[Order] = field(default_factory=list)
 
     def find(self, K: SparseMatrix, boundary: Integers = NOTHING) -> Order | None:
-        """That of K, (n, n), with a boundary (m,); None if it is not known."""
+        """Order of K, (n, n), with a boundary (m,); None if it is not known."""
         return next((order for order in self.known if order.fits(K, boundary)), None)
 
     def add(self, order: Order) -> Order:

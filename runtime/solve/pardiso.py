@@ -88,7 +88,7 @@ class _Structure:
         )
 
     def fits(self, K: SparseMatrix, boundary: Integers) -> bool:
-        """Whether K has this pattern, and the boundary is the same."""
+        """True if K has this pattern, and the boundary is the same."""
         return (
             np.array_equal(self.csc[0], K.indptr)
             and np.array_equal(self.csc[1], K.indices)

@@ -14,7 +14,7 @@ from softehl.runtime.solve.solution import Point
 
 Predictor: TypeAlias = Literal["secant", "parabola", "previous"]
 POINTS: dict[Predictor, int] = {"previous": 1, "secant": 2, "parabola": 3}
-"""How many known points a predictor uses."""
+"""Number of known points that a predictor uses."""
 
 Guess: TypeAlias = Callable[[Point, float], Array]
 """Change (n,) from a known point to a parameter, by whoever knows better than its neighbours."""

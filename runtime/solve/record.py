@@ -13,7 +13,7 @@ from softehl.runtime.solve.solution import Branch, LimitPoint, Point, Solution, 
 
 OnPoint: TypeAlias = Callable[[Point], object]
 End: TypeAlias = tuple[Status, str]
-"""How a path ended, in code and in words."""
+"""End of a path, in code and in words."""
 
 _NEAR, _STEEPER = 2.0, 2.0
 """A turning point is believed that is foreseen within so many lengths of the step that failed, or
@@ -26,7 +26,7 @@ _WORDS_OF_THEIR_OWN = {*_BARRED, Status.SINGULAR}
 
 @dataclass
 class Record:
-    """What has been met on a path so far: grows with every solve, and ends as a frozen Branch.
+    """Record of a path so far: grows with every solve, and ends as a frozen Branch.
 
     slopes: change of x with the parameter over each of the last two steps, and where.
     """

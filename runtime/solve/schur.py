@@ -133,7 +133,7 @@ class SchurCorrector:
         return replace(solution, factorisations=made, iterations=spent + solution.iterations)
 
     def _limited_by_rounding(self, solution: Solution) -> bool:
-        """Whether a failed iteration ended so near to rounding that Newton can finish it."""
+        """True if a failed iteration ended so near to rounding that Newton can finish it."""
         iteration = self.iteration
         failed = solution.status in (Status.MAX_ITERATIONS, Status.DIVERGED)
         rounding = iteration.stagnation > 1.0 and self.finish is not None

@@ -17,7 +17,7 @@ from softehl.runtime.arrays import Array
 
 
 class Status(enum.Enum):
-    """How a solver or a path ended; `advice` says what to try next."""
+    """End of a solver or of a path; `advice` says what to try next."""
 
     CONVERGED = "converged"
     MAX_ITERATIONS = "too many iterations"
@@ -115,7 +115,7 @@ class Solution:
         return self.x if self.best is None else self.best
 
     def forget(self) -> Solution:
-        """The same summary without the solution vector, which a long branch cannot afford."""
+        """Summary without the solution vector, which a long branch cannot afford."""
         return replace(self, x=np.empty(0), best=None)
 
     def raise_for_status(self) -> Solution:

@@ -203,7 +203,7 @@ def test_discontinuous_pressures_give_the_film_of_continuous_ones(
     default: tuple[Outcome, Recorder], discontinuous: Outcome
 ) -> None:
     assert discontinuous.converged, discontinuous.message
-    assert discontinuous.unknowns_pressure == 5 * 54
+    assert discontinuous.unknowns["pressure"] == 5 * 54
     continuous = {s.rod_speed: s for s in default[0].states}
     for state, limit in zip(discontinuous.states, (0.0005, 0.0015, 0.006), strict=True):
         other = continuous[state.rod_speed]

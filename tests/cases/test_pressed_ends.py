@@ -52,8 +52,8 @@ def ending_at(lip: float | None, crown: float | None) -> State:
     """The state on the mesh of the usual one, its pressure ending at other angles, degrees."""
     system, x = usual()
     layout = system.section.layout
-    dams = place(lip), place(crown)
-    new = build_system(P, replace(layout, dams=dams))
+    pressure_boundaries = place(lip), place(crown)
+    new = build_system(P, replace(layout, pressure_boundaries=pressure_boundaries))
     return new, elsewhere(system, x, new)
 
 
@@ -66,7 +66,7 @@ def corrected(system: SealSystem, x: Array) -> Layout:
 def test_where_in_the_contact_pressure_ends_does_not_matter() -> None:
     system, x = usual()
     assert unsealed(system, x) == ""
-    assert corrected(system, x).dams == (None, None)
+    assert corrected(system, x).pressure_boundaries == (None, None)
     other, y = ending_at(12.0, -170.0)
     assert unsealed(other, y) == ""
     assert other.section.pressed_ends != system.section.pressed_ends
@@ -88,7 +88,7 @@ def test_pressure_that_ends_outside_the_contact_is_led_to_it(
     system, x = ending_at(lip, crown)
     assert where in unsealed(system, x)
     layout = corrected(system, x)
-    assert layout.dams != system.section.layout.dams
+    assert layout.pressure_boundaries != system.section.layout.pressure_boundaries
     new = build_system(P, layout)
     y = elsewhere(system, x, new)
     assert unsealed(new, y) == ""
@@ -106,13 +106,15 @@ def test_meshes_are_made_until_the_pressure_ends_in_the_contact() -> None:
     system, x = found
     assert unsealed(system, x) == ""
     layout = placed_layout(*start, P)
-    assert layout.dams[0] is not None
-    assert system.section.layout.dams[0] == layout.dams[0]
+    assert layout.pressure_boundaries[0] is not None
+    assert system.section.layout.pressure_boundaries[0] == layout.pressure_boundaries[0]
 
 
 def test_places_are_measured_round_the_circle() -> None:
     shape = Shape.facing(Outline.circle((0.0, 10.0), 1.0), (0.0, 11.0), "ring")
-    layout = Layout(shape, shape.film, Sizes(), dams=(np.radians(-20.0), np.radians(-179.5)))
+    layout = Layout(
+        shape, shape.film, Sizes(), pressure_boundaries=(np.radians(-20.0), np.radians(-179.5))
+    )
     mesh = layout.mesh(2)
     z, r = (mesh.points[mesh.arc_nodes[layout.lowest(mesh)]] - [0.0, 10.0]).T
     assert np.degrees(np.arctan2(z, -r)) == pytest.approx(-20.0, abs=2.0)

@@ -14,7 +14,7 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.section.layout import dam
+from softehl.cases.seal.section.layout import pressure_boundary
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
@@ -147,10 +147,10 @@ def test_a_lobe_that_oil_lifts_does_not_meter_it() -> None:
 
 def test_a_pressure_goes_on_to_where_contact_holds_it_back() -> None:
     excess = np.array([0.0, 0.0, 0.3, 0.5, 1.4, 1.1, 0.2, 0.0])
-    assert dam(excess, 4, 1.0) is None  # held back there
-    assert dam(excess, 2, 1.0) == 4  # less than 1 MPa: the fluid goes on
-    assert dam(excess, 7, 1.0) in (4, 5)  # nothing touches there
-    assert dam(np.zeros(8), 2, 1.0) is None
+    assert pressure_boundary(excess, 4, 1.0) is None  # held back there
+    assert pressure_boundary(excess, 2, 1.0) == 4  # less than 1 MPa: the fluid goes on
+    assert pressure_boundary(excess, 7, 1.0) in (4, 5)  # nothing touches there
+    assert pressure_boundary(np.zeros(8), 2, 1.0) is None
 
 
 def test_an_outline_that_runs_into_itself_is_seen() -> None:

@@ -63,8 +63,8 @@ def test_pressures_of_the_film_add_up_to_the_force_of_the_contact(
 ) -> None:
     system, x = dry.system, dry.x.copy()
     z, _ = system.arc_film(x)
-    z0 = z[system.dam]  # half of a segment beyond which there is no sealed pressure
-    low = 0.5 * (z[system.dam - 1] + z0) + 0.5 * (z0 - z[system.dam - 1])
+    before, z0 = z[system.pressure_boundary - 1 :][:2]
+    low = 0.5 * (before + z0) + 0.5 * (z0 - before)  # half of a segment beyond has no pressure
     pressing = -float((system.rod_multipliers(x) * system.rod_areas).sum())
     r = system.rod_radius + OFFSET
     force = pressing + 3.0 * 2.0 * np.pi * r * (low - z[0])

@@ -1,4 +1,4 @@
-"""How a rod moves and the sealed pressure changes: tables over time that repeat."""
+"""Motion of a rod and sealed pressure: tables over time that repeat."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _constant(value: float, period: float) -> Table:
 
 @dataclass
 class RodFilm:
-    """What an outstroke leaves on the rod, for the instroke that brings it back.
+    """Film that an outstroke leaves on the rod, for the instroke that brings it back.
 
     places: of the rod, mm, where it passed the air side; films: thickness there, as h* of (16), mm.
     """

@@ -15,7 +15,7 @@ STEP = "next_step_s"
 
 
 def packed(march: March) -> dict[str, Array]:
-    """What the next step starts from: a column for each of the last instants, newest first.
+    """Start of the next step: a column for each of the last instants, newest first.
 
     A column holds the time, what the film holds, fluxes and volumes at both ends, the content of
     the segments and the unknowns, (n,) in all.

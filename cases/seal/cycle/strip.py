@@ -58,7 +58,7 @@ class Strip:
 
     @property
     def places(self) -> Array:
-        """Where pressures and void fractions stand, (unknowns,), mm."""
+        """Places of pressures and void fractions, (unknowns,), mm."""
         share = 0.5 * (1.0 + rules.pressure_nodes(self.order)[:-1])
         inner = self.x[:, :1] + share * np.diff(self.x, axis=1)
         return np.append(inner.ravel(), self.x[-1, 1])
@@ -152,7 +152,7 @@ def missing(supply: float, outer: float, inner: float, order: int) -> float:
 
 
 def fronts(x: Array, p: Array, v: Array, p_c: float) -> tuple[float, float]:
-    """Where a film first ruptures and where it first forms again, along its flow; nan if nowhere.
+    """Places where a film first ruptures and first forms again, along its flow; nan if none.
 
     x, p, v: (n,) at the nodes of subcells, downstream. Behind its rupture v grows from zero, before
     its end p grows from p_c: both are drawn on to zero, linearly, within a subcell or two.
@@ -183,7 +183,7 @@ def _reformation(x: Array, p: Array, j: int) -> float:
 
 
 def beyond_front(x: Array, p: Array, front: float) -> float:
-    """What linear pressures p (n,) at x (n,), over p_c, have too much before a reformation."""
+    """Excess of linear pressures p (n,) at x (n,), over p_c, before a reformation."""
     if not np.isfinite(front):
         return 0.0
     j = int(np.searchsorted(x, front, side="left"))

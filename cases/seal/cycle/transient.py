@@ -204,7 +204,7 @@ class March(Way):
         return f"no step from t = {now:.6g} s on, U = {speed:.4g} mm/s: {self._advice()}"
 
     def _advice(self) -> str:
-        """What may help where a step was not found."""
+        """Advice where a step was not found."""
         least = 1e3 * float(self.system.arc_film(self.behind[0].x)[1].min())
         if not self.system.parameters.rough and least < _TOUCHING:
             return (

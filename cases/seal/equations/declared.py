@@ -92,7 +92,7 @@ class Unknowns:
 
 
 def number_unknowns(field: Field, p: ORing, section: SealSection) -> Unknowns:
-    """Where the unknowns of a field stand.
+    """Places of the unknowns of a field.
 
     Pressures: m_p a segment and one more where they are continuous, m_p + 1 a segment in (22).
     """
@@ -135,7 +135,7 @@ class Numbering:
         return np.asarray(self.unknowns[field].rows[elements] + self.layout.part(field).start)
 
     def columns(self, block: Block, field: str) -> slice:
-        """Where the unknowns of a field stand in the dof map of a block."""
+        """Columns of the unknowns of a field in the dof map of a block."""
         widths = [self.unknowns[f].rows[block.elements].shape[1] for f in block.fields]
         position = block.fields.index(field)
         first = sum(widths[:position])

@@ -108,7 +108,7 @@ class SealSystem(SealUnknowns):
         return replace(system, problem=system._at_rest())
 
     @property
-    def dam(self) -> int:
+    def pressure_boundary(self) -> int:
         """Index of the arc node at which the sealed pressure of the contact ends."""
         return self.section.lowest
 
@@ -143,7 +143,7 @@ class SealSystem(SealUnknowns):
         return float(self.pressing(name, x) @ areas)
 
     def columns(self, block: str, field: str) -> slice:
-        """Where the unknowns of a field stand in the dof map of a block."""
+        """Columns of the unknowns of a field in the dof map of a block."""
         return self.numbering.columns(self._block(block), field)
 
     # --- loads ------------------------------------------------------------------------------------
@@ -226,12 +226,12 @@ class SealSystem(SealUnknowns):
         return {block.name: self._chosen(block, values) for block in self._film_blocks}
 
     def _present(self, values: Mapping[str, Values | None]) -> dict[str, Values | None]:
-        """Those of the values by block whose block there is."""
+        """Values by block, of the blocks that there are."""
         names = {block.name for block in self.blocks}
         return {name: value for name, value in values.items() if name in names}
 
     def _chosen(self, block: Block, values: Values) -> Values:
-        """Those of the values that the kernel of a block asks for."""
+        """Values that the kernel of a block asks for."""
         names = self.problem.assembler.block(block.name).kernel.parameters
         missing = [name for name in names if name not in values]
         if missing:

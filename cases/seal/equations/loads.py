@@ -1,4 +1,4 @@
-"""What acts on a seal: the loads of the contact problem and those of the film problem."""
+"""Loads of a seal: of the contact problem and of the film problem."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def film_flux(speed: float) -> float:
 
 
 def largest_flux(p: ORing) -> float:
-    """That of the highest speed of a case."""
+    """Flux of the highest speed of a case."""
     return film_flux(max(p.speeds))
 
 

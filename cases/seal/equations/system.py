@@ -171,7 +171,7 @@ def obstacles_of(p: ORing) -> dict[str, Obstacle]:
 
 
 def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | None:
-    """What a block of the unloaded contact problem may ask for; None where it is switched off."""
+    """Parameters of a block of the unloaded contact problem; None where it is switched off."""
     if block.group == "solid":
         return p.rubber(block.region).rubber_values
     if block.group == "load":
@@ -190,7 +190,7 @@ def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | Non
 
 
 def contact_values(loads: ContactLoads) -> dict[str, Values | None]:
-    """What the loads of contact change, by block.
+    """Changes by the loads of contact, by block.
 
     The sealed pressure also acts on the arc up to its lowest node, as the film will carry it there;
     the rod multipliers of that part are the contact pressure in excess of it.
@@ -205,12 +205,12 @@ def contact_values(loads: ContactLoads) -> dict[str, Values | None]:
 
 
 def without_contact() -> dict[str, Values | None]:
-    """What is left of the forces on the arc where a film bears them, by block."""
+    """Forces on the arc that remain where a film bears it, by block."""
     return {ROD: None, "sealed_arc": {"pressure": 0.0}}
 
 
 def film_values(p: ORing, film: FilmLoads) -> Values:
-    """What a term of the film may ask for."""
+    """Parameters of the terms of the film."""
     return {
         "rod_radius": 0.5 * p.rod_diameter,
         "rod_speed": film.rod_speed,

@@ -1,4 +1,4 @@
-"""What a vector of unknowns of a seal holds."""
+"""Parts of a vector of unknowns of a seal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a seal is taken to be where its keys were not given, in words."""
+"""Values assumed where keys of a seal were not given, in words."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _RUBBER = {"fit", "shore_A"}.union(*(m.keys for m in materials.MATERIALS.values(
 
 
 def assumed(p: ORing, given: Collection[str]) -> list[str]:
-    """What results hang on and nobody said.  given: the keys that were."""
+    """Important values that were not given.  given: the keys that were."""
     said = frozenset(given)
     return [*_ring(p, said), *_gland(p, said), *_fluids(p, said)]
 

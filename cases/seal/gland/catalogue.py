@@ -50,11 +50,6 @@ class Ring:
         middle = 0.5 * (self.inner_diameter + self.section_diameter)
         return 2.0 * pi**2 * middle * (0.5 * self.section_diameter) ** 2
 
-    @property
-    def outer_diameter(self) -> float:
-        """Inside diameter and twice the section, mm."""
-        return self.inner_diameter + 2.0 * self.section_diameter
-
 
 def ring(name: str) -> Ring:
     """The ring of a name (trade.ring_names), of a round section or an X-ring.
@@ -86,7 +81,7 @@ def fill(a: Ring, rod_diameter: float, housing_diameter: float, width: float) ->
 def warnings(
     a: Ring, rod_diameter: float, housing_diameter: float, width: float
 ) -> tuple[str, ...]:
-    """What handbooks advise against in a ring and its gland, a line each."""
+    """Warnings of handbooks about a ring and its gland, a line each."""
     filled = fill(a, rod_diameter, housing_diameter, width)
     stretched = stretch(a.inner_diameter, rod_diameter)
     found = []

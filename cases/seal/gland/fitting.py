@@ -18,7 +18,6 @@ from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import bands
 
-_SAME = 1e-9
 _GLAND = ("squeeze", "groove_depth", "fill")
 
 UCUP = parts_of(UCup)
@@ -128,4 +127,4 @@ def _filled(values: Mapping[str, Any], section: float, rod: float) -> float:
 
 def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None:
     """`put` of a length that follows from another key."""
-    put(values, key, value, f"{source} = {values[source]}", _SAME)
+    put(values, key, value, f"{source} = {values[source]}")

@@ -7,12 +7,12 @@ from typing import Any, TypeGuard
 
 
 def number(value: object) -> TypeGuard[float]:
-    """Whether a value is a number; True and False are none."""
+    """True if a value is a number; True and False are none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def put(values: dict[str, Any], key: str, value: Any, source: str, same: float = 1e-6) -> None:
-    """Set a key, or see that what was given agrees, within `same` relative to it.
+def put(values: dict[str, Any], key: str, value: Any, source: str) -> None:
+    """Set a key, or see that what was given agrees to 1e-6, less than tables and units round.
 
     value: a number or several. source: what it follows from, in words. What was given as another
     type stays, to be refused with its key. Raises ValueError for a contradiction.
@@ -21,11 +21,11 @@ def put(values: dict[str, Any], key: str, value: Any, source: str, same: float =
     if before is None:
         values[key] = value
         return
-    given, wanted = _numbers(before), _numbers(value)
+    given, expected = _numbers(before), _numbers(value)
     if not all(map(number, given)):
         return
-    if len(given) != len(wanted) or not all(
-        isclose(a, b, rel_tol=same, abs_tol=1e-12) for a, b in zip(given, wanted, strict=True)
+    if len(given) != len(expected) or not all(
+        isclose(a, b, rel_tol=1e-6, abs_tol=1e-12) for a, b in zip(given, expected, strict=True)
     ):
         raise ValueError(
             f"{key} = {shown(before)} and {source} contradict: the latter gives {shown(value)}; "

@@ -65,7 +65,7 @@ CYCLE = {
     ),
     "numerics": (*SEAL["numerics"], "time_order", "time_tolerance", "animation"),
 }
-"""The same of a cycle."""
+"""Headings of a cycle."""
 
 SLIDER = {
     "gap": (
@@ -78,4 +78,4 @@ SLIDER = {
     "mesh": ("segments",),
     "numerics": ("pressure_order", "reynolds"),
 }
-"""Those of the slider."""
+"""Headings of the slider."""

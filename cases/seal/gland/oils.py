@@ -30,7 +30,8 @@ DENSITY = 870.0
 EXPANSION = 0.65
 """Fall of the density of a mineral oil, kg/m^3 for each degC."""
 
-_KELVIN, _SAME = 273.15, 1e-6
+_KELVIN = 273.15
+_SAME = 1e-6  # relative: two ways to a viscosity differ by less through rounding
 
 
 @dataclass(frozen=True)
@@ -62,12 +63,12 @@ class Walther:
 
 
 def is_grade(text: str) -> bool:
-    """Whether an oil is given by its ISO grade, which says its viscosity to +-10 %."""
+    """True if an oil is given by its ISO grade, which says its viscosity to +-10 %."""
     return read_oil_name(text).grade is not None
 
 
 def is_improved(text: str) -> bool:
-    """Whether a name says that an oil has a viscosity improver, but not its index."""
+    """True if a name says that an oil has a viscosity improver, but not its index."""
     return read_oil_name(text).improved
 
 

@@ -323,7 +323,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
 
     @property
     def axial_width(self) -> float:
-        """That of the free section, mm."""
+        """Height of the free section, mm."""
         if self.round:
             return self.section_diameter
         left, _, right, _ = self.free_section.outline.box
@@ -336,7 +336,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
 
     @property
     def lobes(self) -> int:
-        """How many contacts with the rod the section is made for."""
+        """Number of contacts with the rod that the section is made for."""
         return 1 if self.round else lobes(self.free_section)
 
     @property
@@ -347,17 +347,17 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
 
     @property
     def rubs(self) -> bool:
-        """Whether housing and walls have friction, which then holds the section by itself."""
+        """True if housing and walls have friction, which then holds the section by itself."""
         return self.housing_friction > 0.0
 
     @property
     def rough(self) -> bool:
-        """Whether the film knows roughness."""
+        """True if the film knows roughness."""
         return any(self.roughness)
 
     @property
     def conserving(self) -> bool:
-        """Whether the film conserves mass where it ruptures."""
+        """True if the film conserves mass where it ruptures."""
         if self.cavitation is None:
             return self.rough or self.lobes > 1 or self.cavitation_pressure < 0.0
         return self.cavitation == "mass-conserving"
@@ -370,7 +370,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
 
     @property
     def opens(self) -> bool:
-        """Whether there is a gap between rod and housing on the air side."""
+        """True if there is a gap between rod and housing on the air side."""
         return self.extrusion_gap > 0.0
 
     @property
@@ -388,7 +388,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
 
     @property
     def has_body(self) -> bool:
-        """Whether a part of the section has no material of its own."""
+        """True if a part of the section has no material of its own."""
         if self.mesh != "file" or not self.materials:
             return True
         mesh = self.file_mesh
@@ -405,7 +405,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
         return Path(self.outline or "")
 
     def rubber(self, region: str) -> RubberKeys:
-        """What a region of the section is made of; "" where it has no material of its own."""
+        """Rubber of a region of the section; "" names the section itself."""
         return self.materials[region] if region else self
 
     @field_validator("density", mode="before")

@@ -92,7 +92,7 @@ class Slider(ThinningKeys):
 
     @property
     def conserving(self) -> bool:
-        """Whether the film conserves mass where it ruptures."""
+        """True if the film conserves mass where it ruptures."""
         if self.cavitation is None:
             return self._beyond_penalty
         return self.cavitation == "mass-conserving"
@@ -104,7 +104,7 @@ class Slider(ThinningKeys):
 
     @property
     def pocket(self) -> tuple[float, float]:
-        """Where the pocket starts and ends."""
+        """Start and end of the pocket."""
         third = (self.end - self.start) / 3.0
         first, last = self.pocket_start, self.pocket_end
         return (

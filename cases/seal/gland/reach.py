@@ -1,7 +1,7 @@
-"""Up to which sealed pressure films are known to be found, told before a run.
+"""Sealed pressure up to which films are known to be found, told before a run.
 
-What counts is the sealed pressure over the shear modulus. The numbers are those of docs/limits.md,
-of a random sample of 300 glands of O-rings and one of other sections.
+The ratio of the sealed pressure to the shear modulus decides. The numbers are those of
+docs/limits.md, of a random sample of 300 glands of O-rings and one of other sections.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import ORing
 
 MOST = 6.0
-"""The largest that is not refused: above it a run takes minutes to states that are `uncertain`."""
+"""Largest p_s / mu that is not refused: runs above it take minutes to `uncertain` states."""
 
 _SURE, _TRIED = 3.0, 5.4
 """p_s / mu up to which every film of an O-ring was right, and the largest that was tried."""
 
 _OTHER = 2.0
-"""The largest that other sections were tried at."""
+"""Largest p_s / mu at which other sections were tried."""
 
 _ROUND_WORDS = (
     f"every film of a sample of O-rings was right up to {_SURE:g}, 98 % up to 4, 89 % from 4 to 5, "
@@ -35,7 +35,7 @@ def ratio(p: ORing, pressure: float) -> float:
 
 
 def reach(p: ORing, pressure: float) -> list[str]:
-    """What the ratio is and what it means, in a line; nothing without a pressure."""
+    """Line about the ratio and its meaning; nothing without a pressure."""
     found = ratio(p, pressure)
     if not found or _beyond(p, found):
         return []
@@ -43,7 +43,7 @@ def reach(p: ORing, pressure: float) -> list[str]:
 
 
 def beyond_reach(p: ORing, pressure: float) -> list[str]:
-    """The same with what to do, where the ratio is above what is known to run."""
+    """Line with advice where the ratio is above what is known to run."""
     found = ratio(p, pressure)
     if not _beyond(p, found):
         return []

@@ -24,7 +24,7 @@ NUMBERS = tuple(name for names in _OF_LAW.values() for name in names)
 
 
 class ThinningKeys(Parameters):
-    """How an oil thins under shear."""
+    """Keys of an oil that thins under shear."""
 
     shear_thinning: Literal["eyring", "carreau"] | None = key(
         None,
@@ -65,7 +65,7 @@ class ThinningKeys(Parameters):
         return self.shear_thinning or next(given, "")
 
     def thinning_values(self, viscosity: float) -> Mapping[str, float]:
-        """What the kernels of films that thin ask for; viscosity: at rest and zero pressure."""
+        """Parameters of the kernels of films that thin; viscosity: at rest and zero pressure."""
         rate = self.carreau_rate or 0.0
         stress = self.eyring_stress or self.carreau_stress or viscosity * rate
         if not stress:
@@ -78,7 +78,7 @@ class ThinningKeys(Parameters):
 
     @property
     def film_suffix(self) -> str:
-        """What the names of the kernels of smooth films have more than those of Newtonian ones."""
+        """Suffix of the names of kernels of smooth films; empty for Newtonian oils."""
         return f"_{self.thins}" if self.thins else ""
 
     def require_smooth_film(self, *, dg: bool, rough: bool) -> None:

@@ -1,4 +1,4 @@
-"""What the surfaces are like: roughness, asperities, cavitation, for films of every case.
+"""Surfaces of a film: roughness, asperities, cavitation, for every case.
 
 Roughnesses are rms heights in micrometres where a user gives them, in mm in kernels.
 """
@@ -86,7 +86,7 @@ class Surfaces:
         return hypot(self.moving, self.resting)
 
     def values(self) -> Mapping[str, float]:
-        """What the kernels of rough films ask for."""
+        """Parameters of the kernels of rough films."""
         if not self.sigma:
             return {}
         return {
@@ -99,7 +99,7 @@ class Surfaces:
 
 
 def void_values(cavitation_pressure: float) -> Mapping[str, float]:
-    """What the condition of cavitation asks for."""
+    """Parameters of the condition of cavitation."""
     return {
         "cavitation_pressure": cavitation_pressure,
         "pressure_scale": PRESSURE_SCALE,

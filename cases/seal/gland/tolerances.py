@@ -1,4 +1,4 @@
-"""What tolerances of ring, gland, rubber and oil do to a film, by its sensitivities.
+"""Effect of tolerances of ring, gland, rubber and oil on a film, by its sensitivities.
 
 Linear: a parameter that is off by t % moves a quantity by S t %, S its log derivative. Tolerances
 add up in the worst case, and in quadrature where they are independent.
@@ -141,7 +141,7 @@ def _of_ring(name: str | None) -> list[str]:
 def band(
     place: tuple[float, float], quantity: str, slopes: Mapping[str, float], shares: Shares
 ) -> ToleranceRow:
-    """What tolerances do to one quantity; place: p_s and U; slopes: its log derivatives."""
+    """Effect of tolerances on one quantity; place: p_s and U; slopes: its log derivatives."""
     parts = {
         name: 100.0 * abs(sum(slopes.get(key, 0.0) for key in keys)) * share
         for name, (share, keys) in shares.items()

@@ -27,7 +27,10 @@ _H = (
 """From a viscosity at 100 degC on: H = d Y^2 + e Y + f, of the standard's annex."""
 
 _LEAST, _MOST = 2.0, 40.0
+"""Viscosities at 100 degC of the oils of the industry, cSt; the table goes on to 70."""
+
 _INDICES = (100.0, 400.0)
+"""Indices of procedure B that are read; polyglycols have up to 280."""
 
 
 def at_40_of_100(at_100: float) -> float:

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
     from softehl.cases.seal.gland.parameters import ORing
 
-_ABOVE, _BESIDE, _ROOM = 1.2, 1.2, 1.7
-_BESIDE_MARK = {"out": (-5, 4), "in": (5, -9)}
-_PLAIN = ((1.0,), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0))
-_ENOUGH, _MANY = 3, 7
+_BESIDE, _ROOM = 1.2, 1.7  # factors of logarithmic axes: free space, and that of the legend
+_BESIDE_MARK = {"out": (-5, 4), "in": (5, -9)}  # points from a mark to its word
+_PLAIN = ((1.0,), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0))  # digits of ticks
+_ENOUGH, _MANY = 3, 7  # ticks of an axis
 
 
 def curve_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()) -> Figure:
@@ -146,7 +146,7 @@ def _draw_slope(axes: Axes, rows: Sequence[FilmRow]) -> None:
     if exponent is None:
         return
     speed, film, _ = _columns(rows)
-    above = _ABOVE * float((film / speed**exponent).max())
+    above = _BESIDE * float((film / speed**exponent).max())
     ends = speed[[0, -1]]
     label = f"slope {exponent:.3f} (fitted)"
     line = above * ends**exponent

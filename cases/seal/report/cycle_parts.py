@@ -1,4 +1,4 @@
-"""What a report says of runs of cycles, part by part."""
+"""Parts of the report of cycles."""
 
 from __future__ import annotations
 

@@ -10,22 +10,21 @@ import numpy as np
 from softehl.cases.harness.report.part import FinishedRun
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.report import style
+from softehl.cases.seal.report.profiles import places, thicknesses
 from softehl.cases.seal.states.observer_adapter import read_profile
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 
-_WIDTH, _HEIGHT = 460, 300
-_LEAST = 300  # px of a plot
+_WIDTH, _HEIGHT, _LEAST = 460, 300, 300  # px of a plot; least width
 _WRAP = ":host { flex-wrap: wrap; }"
 _POINTS = 400  # of a profile at most
-_SPEED, _FILM = "rod speed |U| [mm/s]", "film thickness h* [µm]"
 _DASHES = {"out": "solid", "in": "dashed"}
 _COLOURS = ("#1b6ca8", "#c8553d", "#4f8a52", "#7a5195", "#b58900", "#444444")
 _MOVE = """
 for (const [source, states] of pairs) source.data = states[cb_obj.value];
 cb_obj.title = titles[cb_obj.value];
 """
-"""What the slider does: every line shows its state at the speed of that number."""
+"""Script of the slider: every line shows its state at the speed of that number."""
 
 Profiles = dict[str, list[dict[str, list[float]]]]
 
@@ -40,7 +39,7 @@ def film_plot(run: FinishedRun) -> Any:
     states, limits = profiles_of(run, speeds)
     panels = [
         _panel(style_label, limits, log=log)
-        for style_label, log in (("pressure p [MPa]", False), ("film thickness h [µm]", True))
+        for style_label, log in ((style.PRESSURE, False), (style.FILM, True))
     ]
     pairs = []
     for stroke, found in states.items():
@@ -70,18 +69,10 @@ def profiles_of(run: FinishedRun, speeds: Sequence[float]) -> tuple[Profiles, di
         some = [rows.get(sign * speed) for speed in speeds]
         if any(some):
             found[stroke] = [_line(run, row) for row in some]
-    known = [row for row in rows.values() if np.isfinite(row.contact_start_mm)]
-    start, end = (
-        (min(r.contact_start_mm for r in known) - 0.3, max(r.contact_end_mm for r in known) + 0.3)
-        if known
-        else (-1.0, 1.0)
-    )
-    thickest = max(row.h_star_um for row in rows.values())
-    thinnest = min(row.h_min_um for row in rows.values())
-    top = max(row.p_max_MPa for row in rows.values())
+    top = max(row.p_max_MPa for row in run.rows)
     limits = {
-        "x": (start, end),
-        "h": (0.7 * thinnest, 20.0 * thickest),
+        "x": places(run.rows),
+        "h": thicknesses(run.rows),
         "p": (-0.05 * top, 1.1 * top),
     }
     return found, limits
@@ -112,7 +103,7 @@ def _panel(label: str, limits: dict[str, Any], *, log: bool) -> Any:
         x_range=limits["x"],
         y_range=limits["h" if log else "p"],
         y_axis_type="log" if log else "linear",
-        x_axis_label="x [mm]   (sealed side left, air side right)",
+        x_axis_label=style.POSITION,
         y_axis_label=label,
         tools="pan,box_zoom,wheel_zoom,reset,save",
     )
@@ -122,7 +113,7 @@ def _panel(label: str, limits: dict[str, Any], *, log: bool) -> Any:
 
 def curve_plot(runs: Sequence[FinishedRun]) -> Any:
     """h* over speed with error bars; what is not plainly `ok` is a hollow mark."""
-    panel = _over_speed(runs, _FILM)
+    panel = _over_speed(runs, style.H_STAR)
     for number, run in enumerate(runs):
         for stroke in style.STROKES:
             rows = _stroke(run, stroke)
@@ -197,12 +188,12 @@ def _over_speed(runs: Sequence[FinishedRun], label: str) -> Any:
         height=int(1.2 * _HEIGHT),
         x_axis_type="log",
         y_axis_type="log",
-        x_axis_label=_SPEED,
+        x_axis_label=style.SPEED,
         y_axis_label=label,
         tools="pan,box_zoom,wheel_zoom,reset,save",
     )
     tips = [("|U|", "@x{0.###} mm/s"), (label, "@y{0.####}")]
-    if label == _FILM:
+    if label == style.H_STAR:
         tips += [("error", "@error{0.##} %"), ("verdict", "@verdict")]
     panel.add_tools(HoverTool(tooltips=tips))
     panel.toolbar.logo = None

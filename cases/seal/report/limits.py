@@ -1,4 +1,4 @@
-"""What the model of a seal leaves out, in words for a reader of results."""
+"""Limits of the model of a seal, in words for a reader of results."""
 
 LEFT_OUT = (
     "Time: every speed is a steady state; no start, no stop, no dwell.",

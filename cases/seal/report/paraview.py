@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FILES = ("gland.vtu", "section_out.pvd", "section_in.pvd")
 
 PARTS = ("rod", "groove", "housing")
-"""What `part` counts in gland.vtu, from 0."""
+"""Names of the values of `part` in gland.vtu, from 0."""
 
 _FILLET = np.linspace(0.0, 0.5 * pi, 17)
 

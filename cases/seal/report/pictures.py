@@ -23,7 +23,7 @@ PICTURES = ("curve", "profiles", "section")
 """Names of the files, each .png or .svg or both, of every run."""
 
 SOME = ("fit", "stribeck")
-"""Those where the rubber was fitted to tests, and where surfaces are rough."""
+"""Pictures of rubbers that were fitted to tests, and of rough surfaces."""
 
 
 def write_plots(

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 Results = Sequence[tuple[FilmRow, Profile]]
 Colour = tuple[float, float, float, float]
 
-_MARGIN_MM = 0.3
-_SHOWN = 20.0
+_MARGIN = 0.3  # mm beside the contacts
+_LEAST, _MOST = 0.7, 20.0  # of the least h and of the largest h*
 
 
 def profiles_figure(p: ORing, results: Results) -> Figure:
@@ -66,16 +66,25 @@ def _show_contact(film: Axes, rows: Sequence[FilmRow]) -> None:
     """Show the contact and the thin film only: beside it h is a hundred times larger."""
     from matplotlib.ticker import MaxNLocator, NullLocator
 
-    start = min(row.contact_start_mm for row in rows)
-    end = max(row.contact_end_mm for row in rows)
-    if np.isfinite(start) and np.isfinite(end):
-        film.set_xlim(start - _MARGIN_MM, end + _MARGIN_MM)
+    film.set_xlim(places(rows))
     film.xaxis.set_major_locator(MaxNLocator(5))
     film.set_yscale("log")
-    low = min(row.h_min_um for row in rows)
-    high = max(row.h_star_um for row in rows)
+    low, high = thicknesses(rows)
     if 0 < low < high:
-        film.set_ylim(0.7 * low, _SHOWN * high)
+        film.set_ylim(low, high)
     film.yaxis.set_ticks(plain_ticks(*film.get_ylim()))
     film.yaxis.set_major_formatter("{x:g}")
     film.yaxis.set_minor_locator(NullLocator())
+
+
+def places(rows: Sequence[FilmRow]) -> tuple[float, float]:
+    """Range of x around the contacts of all states, mm."""
+    known = [row for row in rows if np.isfinite(row.contact_start_mm)]
+    start = min((row.contact_start_mm for row in known), default=-1.0)
+    end = max((row.contact_end_mm for row in known), default=1.0)
+    return start - _MARGIN, end + _MARGIN
+
+
+def thicknesses(rows: Sequence[FilmRow]) -> tuple[float, float]:
+    """Range of h that shows the thin part of all films, um."""
+    return _LEAST * min(row.h_min_um for row in rows), _MOST * max(row.h_star_um for row in rows)

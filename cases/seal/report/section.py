@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 _METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"
-_LEVELS = 14
+_LEVELS = 14  # colours of the stress
 _NEEDED = {"contact_pressure", *(f"sigma_{name}" for name in ("zz", "rr", "tt", "zr"))}
 # in section diameters
 _BAND = 0.26
@@ -30,7 +30,7 @@ _BAND = 0.26
 _CLEARANCE = 0.06
 """Between a wall and the rod: the walls of the model are planes without an end."""
 _AROUND = (0.33, 0.44, 0.4)
-"""What is shown beside, below and above the gland."""
+"""Margins of the picture beside, below and above the gland."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ def boundary_edges(cells: Integers) -> Integers:
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """What colours and bands mean.  levels: of stress, MPa; height: of a band, mm for 1 MPa."""
+    """Legend of colours and bands.  levels: of stress, MPa; height: of a band, mm for 1 MPa."""
 
     levels: Array
     height: float

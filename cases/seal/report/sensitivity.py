@@ -22,7 +22,7 @@ PANELS = {"h_star": "film thickness $h^*$", "friction": "friction", "leakage": "
 """Quantities of the picture, and what they are called in it."""
 
 _SHOWN = 10  # parameters
-_TICKS = (-10.0, -1.0, 0.0, 1.0, 10.0)
+_TICKS = (-10.0, -1.0, 0.0, 1.0, 10.0)  # % for 1 %, on an axis that is linear within 0.1
 Table = dict[float, dict[str, dict[str, float]]]
 
 

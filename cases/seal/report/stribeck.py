@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _HERSEY = "$\\eta_0 |U| / p_{\\mathrm{dry}}$ [µm]   ($p_{\\mathrm{dry}}$ largest dry pressure)"
 _REGIMES = {MIXED: "boundary | mixed", FULL: "mixed | full"}
-_PANELS = (2.2, 1.0)
+_PANELS = (2.2, 1.0)  # heights of friction and of shares of asperities
 
 
 def hersey_um(p: ORing, row: FilmRow) -> float:

@@ -27,15 +27,16 @@ _LEVEL, _LOOKED_AT = 1e-6, 4001  # of the height: what is level; places of a fil
 class Layout:
     """A section in its reference configuration and how a mesh is laid into it; lengths in mm.
 
-    film: ends (s0, s1) of the lubricated part of the outline, the arc. dams: places on the outline
-    at which the sealed pressure ends on the rod and on the housing; None: where the shape has
-    them. base: the mesh of a file at density 1, every element of which the density divides.
+    film: ends (s0, s1) of the lubricated part of the outline, the arc. pressure_boundaries: places
+    on the outline at which the sealed pressure ends on the rod and on the housing; None: where the
+    shape has them. base: the mesh of a file at density 1, every element of which the density
+    divides.
     """
 
     shape: Shape
     film: tuple[float, float]
     sizes: Sizes
-    dams: tuple[float | None, float | None] = (None, None)
+    pressure_boundaries: tuple[float | None, float | None] = (None, None)
     base: SectionMesh | None = None
 
     @property
@@ -45,7 +46,7 @@ class Layout:
 
     @property
     def spacing(self) -> Spacing | None:
-        """That of the nodes along the arc, None where they are equally spaced."""
+        """Spacing of the nodes along the arc, None where they are equally spaced."""
         return self.sizes.spacing
 
     @property
@@ -68,7 +69,7 @@ class Layout:
 
     def pressed(self, mesh: SectionMesh) -> int:
         """The first outer segment that the sealed pressure acts on, which it does up to the arc."""
-        begin, crown = mesh.places[0], self.dams[1]
+        begin, crown = mesh.places[0], self.pressure_boundaries[1]
         crown = self.shape.pressure[0] if crown is None else crown
         crown = begin + (crown - begin) % mesh.length
         return int(np.argmin(np.abs(mesh.places[mesh.arc :] - crown)))
@@ -80,7 +81,8 @@ class Layout:
         outline, not of the mesh: nodes stand elsewhere on each of two lobes, so that one mesh would
         have the pressure in the groove and the next one not.
         """
-        place = self._last_lobe if self.dams[0] is None else self.dams[0]
+        place = self.pressure_boundaries[0]
+        place = self._last_lobe if place is None else place
         return int(np.argmin(np.abs(mesh.arc_places - (place - self.film[0]))))
 
     @cached_property
@@ -93,18 +95,19 @@ class Layout:
         return float(places[flat[len(flat) // 2]])
 
     def held(self, mesh: SectionMesh, rod: Array, housing: Array, p_s: float) -> Layout:
-        """The same with the sealed pressure ending where contact holds it back.
+        """Layout whose sealed pressure ends where contact holds it back.
 
         rod, housing: pressures in excess of it, (arc nodes,) and (outer nodes,) of this mesh, MPa.
         """
         last = len(housing) - 1  # the pressure comes from there, round the sealed side
-        lip = dam(rod, self.lowest(mesh), p_s)
-        crown = dam(housing[::-1], last - self.pressed(mesh), p_s)
-        dams = (
-            self.dams[0] if lip is None else float(mesh.places[lip]),
-            self.dams[1] if crown is None else float(mesh.places[self._outer(mesh, last - crown)]),
-        )
-        return replace(self, dams=dams)
+        lip = pressure_boundary(rod, self.lowest(mesh), p_s)
+        crown = pressure_boundary(housing[::-1], last - self.pressed(mesh), p_s)
+        on_rod, on_housing = self.pressure_boundaries
+        if lip is not None:
+            on_rod = float(mesh.places[lip])
+        if crown is not None:
+            on_housing = float(mesh.places[self._outer(mesh, last - crown)])
+        return replace(self, pressure_boundaries=(on_rod, on_housing))
 
     @staticmethod
     def _outer(mesh: SectionMesh, index: int) -> int:
@@ -121,19 +124,19 @@ class Layout:
         return begin - old.film[0], end - old.film[0]
 
     def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
-        """The same with the dams of another one, and, unless its mesh is that of a file, its arc
-        between these places on the arc of that one.
+        """Layout with the pressure boundaries of another one, and its arc between these places on
+        the arc of that one, unless its mesh is that of a file.
         """
         begin, end = (old.film[0] + place for place in ends)
         film = (begin, end) if self.base is None else self.film
-        return replace(self, film=film, dams=old.dams)
+        return replace(self, film=film, pressure_boundaries=old.pressure_boundaries)
 
     def graded(self, spacing: Spacing, long: int, depth: float = inf, first: float = inf) -> Layout:
         """With these segments on the arc; see `Sizes` for the others."""
         return replace(self, sizes=Sizes(long, spacing, depth, first))
 
 
-def dam(excess: Array, index: int, p_s: float) -> int | None:
+def pressure_boundary(excess: Array, index: int, p_s: float) -> int | None:
     """Place where contact holds back a pressure taken to act up to an index, None if just there.
 
     excess: (n,) of contact over the pressure, which is p_s up to there and zero beyond. Where less

@@ -11,17 +11,18 @@ from softehl.runtime.mesh.section_mesh import Sizes
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 
 EDGE_ANGLES = range(27, 70, 3)
-"""Where a section meets the edge of the gap under pressure, degrees from the bottom."""
+"""Places where a section may meet the edge of the gap under pressure, degrees from the bottom."""
 
 LONG_PLACED = 33
 """Segments at density 1 of an arc that the contact has placed: 27 or 42 change h* of an O-ring by
 0.03 %."""
 
 LONG_OPEN = 42
-"""The same where the edge of an open gap is to be resolved too."""
+"""Segments where the edge of an open gap is to be resolved too."""
 
 BEYOND = 0.3
-"""How far beyond a film as drawn contact is looked for on the air side, in heights of a section."""
+"""Length beyond a film as drawn in which contact is looked for on the air side, in heights of a
+section."""
 
 
 def uniform_layout(p: ORing) -> Layout:

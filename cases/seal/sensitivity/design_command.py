@@ -33,7 +33,7 @@ INSTEAD = {
     "oil": "viscosity and pressure_viscosity make it",
     "temperature": "viscosity follows from it",
 }
-"""What cannot be chosen freely: what to do."""
+"""Keys that cannot be chosen freely: what to do instead."""
 
 
 def design_case(p: ORing, target: str, key: str) -> int:

@@ -123,7 +123,7 @@ Moved = Mapping[str, Mapping[str, Array]]
 def fields_along(
     problem: Problem, x: Array, rate: Inputs, of: Iterable[Quantity]
 ) -> dict[str, dict[str, Array]]:
-    """How fields that these quantities are made of change with a parameter, the unknowns held.
+    """Change of the fields of these quantities with a parameter, the unknowns held.
 
     rate: that of the inputs, see `FilmCase.rate`.
     """

@@ -79,7 +79,7 @@ def sensitivities(
 
 
 def differentiation(p: ORing) -> Differentiate | None:
-    """What differentiates the films of a run; None where a case does not ask for it.
+    """Function that differentiates the films of a run; None where a case does not ask for it.
 
     Rates are kept for the films of the mesh that was last in use.
     """

@@ -52,7 +52,7 @@ class FilmCase:
         return FilmCase(frozen(self.system, p.model_copy(update={**held, name: value})), film)
 
     def inputs(self) -> Inputs:
-        """What its equations are given."""
+        """Input of its equations."""
         return Inputs.of(self.system.film_problem(self.film))
 
     def rate(self, name: str) -> Inputs:
@@ -68,7 +68,7 @@ class FilmCase:
 
 
 def _varies(value: Any) -> bool:
-    """Whether a value is a number, or numbers, other than zero."""
+    """True if a value is a number, or numbers, other than zero."""
     numbers = value if isinstance(value, tuple) else (value,)
     return any(number(v) and v for v in numbers)
 
@@ -90,6 +90,6 @@ def frozen(system: SealSystem, p: ORing) -> SealSystem:
         new,
         film=(float(film[0]), float(film[1])),
         sizes=old.sizes,
-        dams=(float(ends[0]), float(ends[1])),
+        pressure_boundaries=(float(ends[0]), float(ends[1])),
     )
     return system.moved(p, replace(section, layout=layout, mesh=mesh))

@@ -19,7 +19,7 @@ _Strokes = Mapping[str, FilmRow]
 
 
 def answer(rows: Sequence[FilmRow], travel: float) -> list[str]:
-    """Whether the seal leaks, and a line for each sealed pressure and speed |U|, fast ones first.
+    """Answer if the seal leaks, and a line for each sealed pressure and speed |U|, fast ones first.
 
     travel: way of the rod from end to end, mm. A line with a film that is thinner than surfaces are
     rough is an Alarm.
@@ -42,7 +42,7 @@ def answer(rows: Sequence[FilmRow], travel: float) -> list[str]:
 
 
 def leaks(volume: float) -> str:
-    """Whether a seal leaks; volume: net, mm3 in a cycle, + = to the air side."""
+    """Words for a leaking or a returning seal; volume: net, mm3 in a cycle, + = to the air side."""
     return f"leaks {volume:.3g} mm3" if volume > 0.0 else RETURNS
 
 

@@ -1,4 +1,4 @@
-"""What a contact state of a seal means: pressures, forces of the walls, how it fits its gland."""
+"""Results of a contact state of a seal: pressures, forces of the walls, fit in the gland."""
 
 from __future__ import annotations
 
@@ -51,16 +51,16 @@ def contact_pressure(system: SealSystem, sealed_pressure: float, x: Array) -> Ar
     current = tributary_areas(system.deformed(x), mesh.arc_segments, mesh.arc_nodes)
     multipliers = np.minimum(system.rod_multipliers(x), 0.0)
     pressure = -multipliers * system.rod_areas / current
-    pressure[: system.dam] += sealed_pressure
-    pressure[system.dam] += 0.5 * sealed_pressure  # the pressure ends at this node
+    pressure[: system.pressure_boundary] += sealed_pressure
+    pressure[system.pressure_boundary] += 0.5 * sealed_pressure  # the pressure ends at this node
     return np.asarray(pressure)
 
 
 def unsealed(system: SealSystem, x: Array) -> str:
-    """Where the sealed pressure ends outside the contact of the state x; empty if nowhere."""
+    """Places where the sealed pressure ends outside the contact of the state x; empty if none."""
     if system.parameters.sealed_pressure == 0.0:
         return ""
-    if not system.pressing(ROD, x)[system.dam] > 0.0:
+    if not system.pressing(ROD, x)[system.pressure_boundary] > 0.0:
         return "at the lowest point of the section"
     crown = system.section.chains[WALLS[BORE]][0] == system.section.pressed_ends[1]
     return "" if (system.pressing(BORE, x)[crown] > 0.0).all() else "at its crown"
@@ -73,7 +73,7 @@ def contact_peaks(system: SealSystem, sealed_pressure: float, x: Array) -> tuple
 
 
 def fit_percent(p: ORing) -> dict[str, float]:
-    """How the free ring fits its gland."""
+    """Fit of the free ring in its gland."""
     depth = 0.5 * (p.housing_diameter - p.rod_diameter)
     return {
         "stretch_percent": stretch(p.inner_diameter, p.rod_diameter),

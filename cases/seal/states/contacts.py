@@ -1,4 +1,4 @@
-"""Where a section touches the rod: its contacts, one or several, and their edges."""
+"""Contacts of a section with the rod, one or several, and their edges."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def contacts(system: SealSystem, x: Array) -> list[Integers]:
 
 
 def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
-    """Where and how steeply each contact of the state x begins and ends along the arc.
+    """Place and slope of both ends of each contact of the state x along the arc.
 
     The square of the pressure is a straight line there, taken from the second and third node that
     touch; none where fewer than three do. Two edges of each contact, from the sealed side on.

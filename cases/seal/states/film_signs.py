@@ -1,4 +1,4 @@
-"""What a film says of its mesh: its inlet, the ends of its arc, whether it oscillates."""
+"""Signs of the mesh in a film: its inlet, the ends of its arc, oscillations."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def lacking(at: Mapping[str, Array], film: FilmLoads, entrance: float) -> float:
 
 
 def _steepest(at: Mapping[str, Array], film: FilmLoads) -> int | None:
-    """Where in the inlet the pressure rises most steeply, None if it does not rise."""
+    """Place in the inlet at which the pressure rises most steeply, None if it does not rise."""
     x, p, slope = at["x"].ravel(), at["p"].ravel(), _slope(at).ravel()
     top = x[np.argmax(p)]
     inlet = x < top if film.rod_speed > 0.0 else x > top

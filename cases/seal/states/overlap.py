@@ -1,4 +1,4 @@
-"""Whether a deformed section runs into itself, as the lips of a cup do under a high pressure.
+"""Overlap of a deformed section with itself, as of the lips of a cup under a high pressure.
 
 Contact of a section with itself is not modelled, nor with the rod beyond the film: it is noticed.
 """
@@ -12,7 +12,7 @@ from softehl.runtime.arrays import Array
 
 
 def overlap(system: SealSystem, x: Array) -> str:
-    """What the deformed outline of the state x runs into, in words; empty if nothing."""
+    """Bodies that the deformed outline of the state x overlaps, in words; empty if none."""
     deformed = system.deformed(x)
     place = crossing(deformed[system.mesh.boundary])
     if place is not None:

@@ -1,4 +1,4 @@
-"""What a run of a seal consists of: its strokes and speeds, finer meshes, what is missing."""
+"""Plan of a run of a seal: its strokes and speeds, finer meshes, missing states."""
 
 from collections.abc import Mapping, Sequence
 
@@ -29,7 +29,7 @@ DOUBTS = {
 
 
 def doubts(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, list[FilmRow]]:
-    """What is wrong with states that are not ok -> these states, worst first.
+    """Advice for states that are not ok -> these states, worst first.
 
     advice: what states came with, by U: why one is clipped or uncertain, other than by its error.
     """

@@ -1,4 +1,4 @@
-"""What a converged film of a seal means: h*, pressure, friction, leakage, limits."""
+"""Results of a converged film of a seal: h*, pressure, friction, leakage, limits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from softehl.cases.seal.equations.system import (
     FACET,
     FILM,
 )
-from softehl.cases.seal.gland.surfaces import regime
+from softehl.cases.seal.gland.surfaces import MICROMETRE, regime
 from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, groups
 from softehl.cases.seal.states.entrance import built_up, wedge, wedge_friction
 from softehl.cases.seal.states.film_signs import (
@@ -39,8 +39,6 @@ from softehl.runtime.fem.postprocess import (
 )
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.rules import trace_rule
-
-MICROMETRE = 1e-3  # mm
 
 _TORN = 1e-6  # void fraction of a film that has ruptured
 
@@ -146,7 +144,7 @@ def metering(at: Mapping[str, Array], parts: Sequence[slice], stroke: Stroke) ->
 
 
 def _lifted(at: Mapping[str, Array], part: slice, stroke: Stroke) -> bool:
-    """Whether pressure rises all the way through a part of the film, where the oil goes."""
+    """True if pressure rises all the way through a part of the film, where the oil goes."""
     last: int = part.stop - 1 if stroke == "out" else part.start
     return _top(at, part) == last
 
@@ -203,7 +201,7 @@ def filled_ratio(at: Mapping[str, Array], film: FilmLoads) -> float:
 
 
 def rough_numbers(system: SealSystem, at: Mapping[str, Array]) -> dict[str, float]:
-    """What asperities carry of load and friction, and how far they are apart: see FilmNumbers.
+    """Share of asperities in load and friction, and the mean gap: see FilmNumbers.
 
     at: fields of the film. Nothing is known between smooth surfaces.
     """

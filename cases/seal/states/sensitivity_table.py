@@ -24,7 +24,7 @@ class SensitivityRow(Record):
 
 
 def resolved(row: FilmRow) -> bool:
-    """Whether the mesh shows the film well enough to differentiate it.
+    """True if the mesh shows the film well enough to differentiate it.
 
     Stricter than the verdict: uniform meshes, too, must show the slope of the inlet.
     """

@@ -152,7 +152,7 @@ class FilmRow(Row):
 
     @property
     def usable(self) -> bool:
-        """Whether this is a result (a collapsed film never is)."""
+        """True if this is a result (a collapsed film never is)."""
         return self.verdict != COLLAPSED
 
     @property
@@ -168,7 +168,7 @@ class FilmRow(Row):
         return "out" if self.rod_speed_mm_s > 0 else "in"
 
     def within(self, tolerance: float) -> bool:
-        """Whether h* is ok and its error known to be at most so many per cent."""
+        """True if h* is ok and its error known to be at most so many per cent."""
         return self.verdict == OK and abs(self.h_star_error_percent) <= tolerance
 
 
@@ -222,13 +222,13 @@ class ContactState:
 
 
 def place(sealed_pressure: float, stroke: str) -> dict[str, Any]:
-    """What tells a stage from others of its name, as run.json has it."""
+    """Marks that tell a stage from others of its name, as in run.json."""
     return {"sealed_pressure_MPa": sealed_pressure, "stroke": stroke}
 
 
 @dataclass(frozen=True)
 class StageRecord(harness.StageRecord):
-    """What one stage of the path cost; its parameter is a load, or counts the steps of a film."""
+    """Cost of one stage of the path; its parameter is a load, or counts the steps of a film."""
 
     @property
     def stroke(self) -> str:
@@ -238,20 +238,10 @@ class StageRecord(harness.StageRecord):
 
 @dataclass(frozen=True)
 class Outcome(harness.Outcome):
-    """What a run reached: its film states, and the cost of its stages."""
+    """Result of a run: its film states, and the cost of its stages."""
 
     states: tuple[FilmState, ...]
     stages: tuple[StageRecord, ...] = ()
-
-    @property
-    def unknowns_total(self) -> int:
-        """Number of all unknowns."""
-        return self.unknowns["total"]
-
-    @property
-    def unknowns_pressure(self) -> int:
-        """Number of those that are film pressures."""
-        return self.unknowns["pressure"]
 
 
 class Observer(Protocol):

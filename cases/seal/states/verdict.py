@@ -1,4 +1,4 @@
-"""Whether a film on the path of falling speed can be trusted, from its numbers alone."""
+"""Verdict on a film on the path of falling speed, from its numbers alone."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ FEWEST_INLET_SEGMENTS = 1.5
 (docs/film-resolution.md); with fewer, anything between -94 % and +59 % occurs."""
 
 FEWEST_OF_LOBES = 3.0
-"""The same of a section with two lobes: an X-ring with 1.7 was 4 % off, its `inlet_ratio` 1.002."""
+"""Segments of a section with two lobes: an X-ring with 1.7 was 4 % off, its `inlet_ratio` 1.002."""
 
 INLET_SEGMENTS_OF_LOW_ORDERS = {("fe", 1): 3.0, ("dg", 1): 5.0, ("dg", 2): 2.0}
-"""The same for low orders m_p, by treatment of the Reynolds equation: they need more."""
+"""Segments for low orders m_p, by treatment of the Reynolds equation: they need more."""
 
 INLET_RATIO = (0.98, 1.02)
 """Credible h* over that of the film's own steepest inlet slope: 0.995 to 1.002 where an inlet is
 resolved, 0.83 to 0.957 where h* was 10 % wrong. Judged on graded meshes."""
 
 NEXT_RATIO = 0.15
-"""Farthest from 1 that of a contact may be which does not meter h*: the pressure of the groove
-before it follows it, and friction. Of an X-ring 0.894 at density 2 left h* right within 0.2 % and
-friction within 1.1 %, 0.736 at density 1 within 1.8 and 9 %. The estimate says more."""
+"""Farthest from 1 that the inlet ratio of a contact may be which does not meter h*: the pressure
+of the groove before it and friction depend on it. Of an X-ring 0.894 at density 2 left h* right
+within 0.2 % and friction within 1.1 %, 0.736 at density 1 within 1.8 and 9 %."""
 
 ANY_RATIO = (-inf, inf)
-"""That of meshes where it is not judged."""
+"""Ratios of meshes where they are not judged."""
 
 EXIT_FILMS, END_GAP = 5.0, 0.1
 """At its exit the arc is outside the film where the gap is so many h*, or so many mm."""
@@ -143,17 +143,17 @@ class FilmNumbers:
 
     @property
     def touching(self) -> bool:
-        """Whether asperities decide about the film too: its inlet is not that of (14)."""
+        """True if asperities decide about the film too: its inlet is not that of (14)."""
         return self.lambda_ratio < FULL
 
     @property
     def enters(self) -> bool:
-        """Whether the film is to begin with the pressure of the wedge before its arc."""
+        """True if the film is to begin with the pressure of the wedge before its arc."""
         return MOST_LACKING < self.lacking <= MOST_WEDGE
 
     @property
     def clipped(self) -> bool:
-        """Whether the arc ends within the film."""
+        """True if the arc ends within the film."""
         short = self.end_gap < min(EXIT_FILMS * self.h_star, END_GAP)
         return short or not self.lacking <= MOST_LACKING
 
@@ -166,7 +166,7 @@ def fewest_inlet_segments(reynolds: str, m_p: int, lobes: int = 1) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether the films met so far on a path of falling speed can be trusted.
+    """Verdict on the films met so far on a path of falling speed.
 
     reference: maximum contact pressure without film, MPa. last: the latest film. collapsed: what
     gave a spurious collapsed film away, if anything did: a pressure well above the contact's, a
@@ -219,7 +219,7 @@ class Verdict:
 
     @property
     def advice(self) -> str:
-        """What to do, empty for OK."""
+        """Advice; empty for OK."""
         word, last = self.word, self.last
         if word == COLLAPSED:
             return f"{FINER_MESH}: {self.collapsed}"

@@ -11,7 +11,7 @@ HARD = (60.0, 98.0)
 """Hardness Shore A of polyurethanes, between which the rule of Qi and others is taken."""
 
 _SHORE_A, _SHORE_D = (80.0, 85.0, 90.0, 95.0, 100.0), (29.0, 33.0, 39.0, 46.0, 58.0)
-"""The same hardness in both scales, of the conversion chart of ASTM D2240."""
+"""Equal hardnesses in both scales, of the conversion chart of ASTM D2240."""
 
 
 def limits(polymer: str | None) -> tuple[float, float]:

@@ -26,7 +26,7 @@ MATERIALS = (
 
 
 class Region(RubberKeys):
-    """What a region of a section is made of.  Raises pydantic.ValidationError, ValueError."""
+    """Material of a region of a section.  Raises pydantic.ValidationError, ValueError."""
 
     @classmethod
     def worded(cls, given: dict[str, Any]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from softehl.cases.seal.gland.trade.text import refused
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
 
-_PAPER = {"mu_1": 3.04, "mu_2": 0.62}
+_PAPER = {"mu_1": 3.04, "mu_2": 0.62}  # MPa, Table 1 of the paper
 
 
 def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -99,7 +99,7 @@ def outside(text: str | None, temperature: float | None) -> list[str]:
 
 
 def _source(values: Mapping[str, Any], material: Material) -> str:
-    """What says which material it is."""
+    """Key that says which material it is."""
     if values.get("shore_A") is not None:
         if not material.shore:
             names = ", ".join(f'"{n}"' for n, m in MATERIALS.items() if m.shore)
@@ -188,7 +188,7 @@ _LEAST_BULK = 20.0
 
 
 def soft(p: RubberKeys) -> list[str]:
-    """What is unusual about a rubber, in words."""
+    """Unusual properties of a rubber, in words."""
     ratio = p.bulk_modulus / p.shear_modulus
     if ratio >= _LEAST_BULK:
         return []

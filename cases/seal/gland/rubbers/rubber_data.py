@@ -28,7 +28,7 @@ from softehl.runtime.arrays import Array
 
 COLUMNS = ("test", "stretch", "stress_MPa")
 TEMPERATURE = "temperature_degC"
-_LARGEST = 1 << 20  # bytes
+_LARGEST = 1 << 20  # bytes of a table; tests of a rubber have some 10 kB
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +234,11 @@ def _locking(material: Material, data: RubberData, _: int) -> dict[str, Any]:
 
 
 _EXPONENTS = ((1.3, 5.0, -2.0), (2.0, 8.0, -1.0), (0.6, 3.0, -4.0))
+"""Exponents alpha of three terms with which fits are begun: the first are Ogden's of 1972; the best
+of the three fits counts."""
+
 _BOUNDS = ((0.05, 20.0), (0.05, 20.0), (-20.0, -0.05))
+"""Least and largest exponent of each term; at 0 a term has no stress."""
 
 
 def _ogden(material: Material, data: RubberData, terms: int) -> dict[str, Any]:

@@ -18,7 +18,7 @@ Terms = Annotated[
 
 
 class RubberKeys(Parameters):
-    """What a seal, or a region of it, is made of."""
+    """Keys of the material of a seal, or of a region of it."""
 
     material: materials.Name = key("mooney-rivlin", "rubber")
     mu_1: float | None = key(

@@ -1,4 +1,4 @@
-"""What the sections of seals have in common: named dimensions, and the shape that follows."""
+"""Base of the sections of seals: named dimensions, and the shape that follows."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Section(Parameters):
         raise NotImplementedError
 
     def crown(self) -> Point:
-        """Where, in that drawing, the housing ends the sealed pressure."""
+        """Place in that drawing at which the housing ends the sealed pressure."""
         raise NotImplementedError
 
 

@@ -12,7 +12,7 @@ from softehl.runtime.mesh.outline import Arc, Line, Outline, OutlineError, Piece
 from softehl.runtime.mesh.outline_checks import CLOSED
 from softehl.runtime.mesh.pieces import bulge_arc
 
-_UNITS = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 1e-3}
+_UNITS = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 1e-3}  # $INSUNITS of DXF -> mm
 _WORDS = ("DIMENSION", "HATCH", "LEADER", "MTEXT", "MULTILEADER", "POINT", "TEXT", "VIEWPORT")
 Named = tuple[Piece, str]
 

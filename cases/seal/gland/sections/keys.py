@@ -36,10 +36,10 @@ NAMES = {
     "trapezoid": "trapezoidal ring",
     "u_cup": "U-cup",
 }
-"""What seals of these sections are called."""
+"""Names of seals of these sections."""
 
 _RENAMED = {"width": "section_width"}  # what a page calls a dimension -> its key
-_STATIONS = 2000
+_STATIONS = 2000  # points of a film that are looked at for lobes: one in some 3 um
 _STEEP = 0.5  # sine of the angle between the sides and the edge of a cap, at least
 _BETWEEN = 0.01  # of the height: two lobes have a groove at least so deep between them
 

@@ -1,4 +1,4 @@
-"""What every section from a file needs: which parts carry film and pressure, and its place."""
+"""Parts of a section from a file that carry film and pressure, and its place in the groove."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def seated(outline: Outline, inner_diameter: float | None) -> Outline:
 
 
 def seat(outline: Outline, inner_diameter: float | None) -> Point:
-    """How far that moves it."""
+    """Displacement to that place."""
     a, b, c, _ = outline.box
     return -0.5 * (a + c), 0.0 if inner_diameter is None else 0.5 * inner_diameter - b
 

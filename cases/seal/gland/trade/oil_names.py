@@ -34,7 +34,6 @@ class OilName:
 _MINERAL = r"HLP-?D|HLP|HL|HM|CLP|CL|HH|hydraulic oil"
 _IMPROVED = r"HVLP-?D|HVLP"
 _ISO = r"ISO[ -]?VG|VG|ISO"
-_MAKERS = r"[A-Z][A-Za-z0-9.-]+(?: [A-Z][A-Za-z0-9.-]*)*"
 _DEGREE = r"(?:deg ?C|° ?C|C)"
 _AT = rf"(?:[ ,]*(?:at|@|/)? ?(?P<at>-?{NUMBER}) ?{_DEGREE})?"
 _GRADE = re.compile(

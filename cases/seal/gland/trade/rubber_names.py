@@ -80,7 +80,7 @@ def read_rubber(key: str, given: str) -> RubberName | None:
 
 
 def is_plastic(text: str) -> bool:
-    """Whether a name is that of a plastic."""
+    """True if a name is that of a plastic."""
     return _PLASTICS.fullmatch(plain(text)) is not None
 
 

@@ -79,7 +79,7 @@ def with_limits(values: dict[str, Any]) -> dict[str, Any]:
     for name, found in bands(tuple(values.get("said", ()))):
         source = f'{name} = "{_value(tuple(values["said"]), name)}"'
         for key_of in dict.fromkeys((name, LENGTHS[name])):
-            put(values, key_of, found.middle, source, 1e-9)
+            put(values, key_of, found.middle, source)
     return values
 
 
