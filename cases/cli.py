@@ -34,8 +34,8 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
 @click.command(
     help=f"""Run CASE, a TOML file or the name of a case that ships ({_NAMES}).
 
-    The seals are rod seals: they sit in the housing, and the rod slides in them. There are no
-    piston seals.
+    A seal sits in the housing and slides on a rod (rod = "36 f7"), or in a piston and slides on a
+    bore (bore = "40 H8").
 
     Writes curve.csv, the files of its rows, plots and run.json to DIR, each state as soon as it is
     there. Without --out, --resume and --overwrite mean the folder that was written to last.

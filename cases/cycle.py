@@ -269,7 +269,7 @@ class CycleCase(Case[Cycle, CycleRow]):
         from softehl.cases.seal.cycle.cycles import run_cycles
 
         def log(number: int, films: Any, before: Any, last: Any) -> CycleRow:
-            row = cycle_row(number, 0.5 * parameters.rod_diameter, films, before, last)
+            row = cycle_row(number, 0.5 * abs(parameters.rod_diameter), films, before, last)
             observer.state(State(row, cycle_tables(films)))
             return row
 

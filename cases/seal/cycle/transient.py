@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import pi
 
 import numpy as np
 
@@ -304,7 +303,7 @@ class March(Way):
             place_mm=self.motion.place(instant.t),
             rod_speed_mm_s=film.rod_speed,
             sealed_pressure_MPa=film.sealed_pressure,
-            friction_N=float(2.0 * pi * system.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
+            friction_N=float(system.around * (at["tau_rod"] * at["dx"]).sum()),
             flux_sealed_mm2_s=float(instant.fluxes[0]),
             flux_air_mm2_s=float(instant.fluxes[1]),
             volume_sealed_mm2=float(instant.volumes[0]),
