@@ -238,6 +238,10 @@ class CycleCase(Case[Cycle, CycleRow]):
             f"{abs(row.friction_in_N):.3g} N in at most; its work {row.energy_mJ:.4g} mJ{end}"
         ]
 
+    def caption(self, rows: Sequence[CycleRow]) -> str:
+        """See :class:`Case`."""
+        return "Friction loop and leakage of every cycle"
+
     def titled(self, parameters: Cycle) -> str:
         """See :class:`Case`."""
         return titled(self.title, parameters)
