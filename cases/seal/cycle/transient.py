@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from math import nan
 
 import numpy as np
 
@@ -71,6 +72,7 @@ class Reading:
     p_max_MPa: float
     asperity_load_percent: float
     iterations: int
+    lambda_ratio: float = nan
 
 
 @dataclass(frozen=True)
@@ -297,7 +299,7 @@ class March(Way):
     ) -> Reading:
         system, x = self.system, instant.x
         at = problem.fields(FILM, x)
-        share = rough_numbers(system, at).get("asperity_load", 0.0)
+        rough = rough_numbers(system, at)
         return Reading(
             t_s=instant.t,
             place_mm=self.motion.place(instant.t),
@@ -311,6 +313,7 @@ class March(Way):
             content_mm2=instant.held,
             h_min_um=1e3 * float(system.arc_film(x)[1].min()),
             p_max_MPa=float(at["p"].max()),
-            asperity_load_percent=100.0 * share,
+            asperity_load_percent=100.0 * rough.get("asperity_load", 0.0),
             iterations=iterations,
+            lambda_ratio=rough.get("lambda_ratio", nan),
         )
