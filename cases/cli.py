@@ -34,8 +34,8 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
 @click.command(
     help=f"""Run CASE, a TOML file or the name of a case that ships ({_NAMES}).
 
-    The seals are rod seals: they sit in the housing, and the rod slides in them. There are no
-    piston seals.
+    A seal sits in the housing and slides on a rod (rod = "36 f7"), or in a piston and slides on a
+    bore (bore = "40 H8").
 
     Writes curve.csv, the files of its rows, plots and run.json to DIR, each state as soon as it is
     there. Without --out, --resume and --overwrite mean the folder that was written to last.
@@ -171,14 +171,48 @@ def sweep(
     help="File of the report  [default: report.html in the first DIR]",
 )
 @click.option("--xlsx", is_flag=True, help="Write its tables beside it, as .xlsx.")
-def report_runs(folders: tuple[Path, ...], out: Path | None, xlsx: bool) -> int:
+@click.option(
+    "--system",
+    metavar="FOLDER",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Write friction and leakage over speed and pressure there instead: tables for Modelica, "
+    "numbers for Simscape, CSV.",
+)
+def report_runs(
+    folders: tuple[Path, ...], out: Path | None, xlsx: bool, system: Path | None
+) -> int:
     """Report the run in DIR, several side by side, or a sweep: one file of HTML, works offline.
 
     It has what was asked, the gland, the deformed section and the film with a slider over the
     speeds; the curve with errors and verdicts, friction, leakage, tolerances, limits and versions.
     Of several runs it also has the differences from the first, in per cent.
     """
+    if system is not None:
+        return _hand_over(folders, system)
     _write_report(folders, out or folders[0] / "report.html", xlsx=xlsx, quiet=False)
+    return 0
+
+
+def _hand_over(folders: tuple[Path, ...], target: Path) -> int:
+    """Write what a simulation of a system needs of the runs, or of a sweep over pressures."""
+    from softehl.cases.harness.errors import BadInput
+    from softehl.cases.harness.report.page import read_finished
+    from softehl.cases.harness.report.sweep_page import is_sweep, read_sweep
+    from softehl.cases.seal.report.hand_over import write_hand_over
+
+    runs = []
+    for folder in folders:
+        if is_sweep(folder):
+            points = read_sweep(folder, SHIPPED).points
+            runs += [point.run for point in points if point.run is not None]
+        else:
+            runs.append(read_finished(folder, SHIPPED))
+    try:
+        lines = write_hand_over(target, runs)
+    except OSError as error:
+        raise BadInput(f"cannot write {target}: {error.strerror or error}") from None
+    for line in lines:
+        click.echo(line)
     return 0
 
 

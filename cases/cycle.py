@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from math import nan, pi
+from math import isfinite, nan, pi
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.integrate import trapezoid
 
-from softehl.cases.harness.case import Case
+from softehl.cases.harness.case import Alarm, Case
 from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import KINDS, draw_columns, save
@@ -22,6 +22,7 @@ from softehl.cases.seal.gland.headings import CYCLE
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.rubbers.rubber import outside
+from softehl.cases.seal.gland.surfaces import MIXED
 from softehl.cases.seal.gland.trade.said import understood
 from softehl.cases.seal.gland.unused_keys import unused_keys
 from softehl.cases.seal.report.limits import LEFT_OUT
@@ -118,6 +119,10 @@ def unused(p: Cycle) -> list[str]:
     return [f"{key} has no effect on a cycle, only on steady films" for key in given]
 
 
+BREAKAWAY = 0.1
+"""Part of the largest speed up to which friction counts as that of breaking away."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class CycleRow(Row):
     """A row of curve.csv: one cycle."""
@@ -134,6 +139,16 @@ class CycleRow(Row):
     asperity_load_percent: float = column("%", "largest share of asperities in the load")
     change_percent: float = column(
         "%", "of energy and leaks against the cycle before", head="change", shown=".2g", default=nan
+    )
+    breakaway_N: float = column(
+        "N",
+        f"breakaway friction: the largest while the rod is slower than {BREAKAWAY:.0%} of its most",
+        head="breakaway",
+        shown=".4g",
+        default=nan,
+    )
+    lambda_ratio: float = column(
+        "", "least mean gap of the film over the roughness", head="lambda", shown=".2g", default=nan
     )
     mass_error: float = column("", "largest defect of the balance of oil over what the film holds")
     steps: int = column("", "steps in time", head="steps")
@@ -169,6 +184,8 @@ def cycle_row(number: int, radius: float, films: Any, before: Any, last: Any) ->
         h_min_um=min(r.h_min_um for r in films.readings),
         p_max_MPa=max(r.p_max_MPa for r in films.readings),
         asperity_load_percent=max(r.asperity_load_percent for r in films.readings),
+        breakaway_N=float(np.abs(F[np.abs(U) <= BREAKAWAY * np.abs(U).max()]).max(initial=0.0)),
+        lambda_ratio=min(r.lambda_ratio for r in films.readings),
         mass_error=float(np.ptp(balance) / before.content_mm2),
         steps=len(films.readings),
         newton_iterations=sum(r.iterations for r in films.readings),
@@ -233,10 +250,23 @@ class CycleCase(Case[Cycle, CycleRow]):
         leak = leaks(row.leak_mm3)
         if row.leak_mm3 > 0.0 and parameters.motion is None:
             leak += f", {far(row.leak_mm3, parameters.travel)}"
-        return [
-            f"cycle {row.cycle:g}: {leak}; friction {row.friction_out_N:.3g} N out, "
-            f"{abs(row.friction_in_N):.3g} N in at most; its work {row.energy_mJ:.4g} mJ{end}"
+        parts = [
+            f"cycle {row.cycle:g}: {leak}",
+            f"friction {row.friction_out_N:.3g} N out, {abs(row.friction_in_N):.3g} N in at most",
         ]
+        if isfinite(row.breakaway_N):
+            parts.append(f"{row.breakaway_N:.3g} N to break away")
+        parts.append(f"its work {row.energy_mJ:.4g} mJ")
+        if isfinite(row.lambda_ratio):
+            parts.append(f"least lambda {row.lambda_ratio:.2g}")
+        line = f"{'; '.join(parts)}{end}"
+        if row.lambda_ratio < MIXED:
+            line = Alarm(f"{line}; thinner than the surfaces are rough")
+        return [line]
+
+    def caption(self, rows: Sequence[CycleRow]) -> str:
+        """See :class:`Case`."""
+        return "Friction loop and leakage of every cycle"
 
     def titled(self, parameters: Cycle) -> str:
         """See :class:`Case`."""
@@ -269,7 +299,7 @@ class CycleCase(Case[Cycle, CycleRow]):
         from softehl.cases.seal.cycle.cycles import run_cycles
 
         def log(number: int, films: Any, before: Any, last: Any) -> CycleRow:
-            row = cycle_row(number, 0.5 * parameters.rod_diameter, films, before, last)
+            row = cycle_row(number, 0.5 * abs(parameters.rod_diameter), films, before, last)
             observer.state(State(row, cycle_tables(films)))
             return row
 

@@ -184,7 +184,7 @@ def _cells(state: RunState) -> dict[str, str]:
     run, p = state.run, state.run.parameters
     answer = run.case.answer(p, run.rows)
     return cells | {
-        "seal": p.ring or f"{p.named} {p.inner_diameter:g}x{p.section_diameter:g}",
+        "seal": p.ring or f"{p.named} {p.ring_diameter:g}x{p.section_diameter:g}",
         "rubber": p.compound or f"{p.shear_modulus:.3g} MPa",
         "pressure": f"{10 * p.sealed_pressure:g} bar",
         "states": f"{state.done} of {state.asked}",

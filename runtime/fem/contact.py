@@ -2,6 +2,9 @@
 
 An obstacle is a coaxial cylinder or a plane normal to the axis. With its constant normal n out of
 the obstacle, the gap of a deformed node x is n . x - c - offset.
+
+Radii may be counted negative, r = -radius: a bore around a body is then a rod below it. Forces
+change their sign with r, as the rows of all other terms that have 2 pi r in them do.
 """
 
 from __future__ import annotations
@@ -47,7 +50,7 @@ def plane(name: str, z: float, *, faces: int) -> Obstacle:
 
 
 def tributary_areas(points: Array, segments: Integers, nodes: Integers) -> Array:
-    """Reference area (n,) of each node, mm^2: integral of its shape function times 2 pi R.
+    """Reference area (n,) of each node, mm^2: integral of its shape function times 2 pi |R|.
 
     points: (V, 2) in (z, r); segments: (m, 2) node numbers; nodes: (n,), those asked for. The areas
     of all nodes of a chain add up to its surface; segments are weighted one by one, so that
@@ -55,7 +58,7 @@ def tributary_areas(points: Array, segments: Integers, nodes: Integers) -> Array
     """
     ends = points[segments]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    radius = ends[:, :, 1]
+    radius = np.abs(ends[:, :, 1])
     first = 2.0 * np.pi * length * (2.0 * radius[:, 0] + radius[:, 1]) / 6.0
     second = 2.0 * np.pi * length * (radius[:, 0] + 2.0 * radius[:, 1]) / 6.0
     total = np.bincount(segments[:, 0], first, len(points))
@@ -74,9 +77,10 @@ def contact_data(
     stiffer values let single nodes flip for ever.
     """
     areas = tributary_areas(points, segments, nodes)
-    width = areas / (2.0 * np.pi * points[nodes, 1])
+    radii = points[nodes, 1]
+    width = areas / (2.0 * np.pi * np.abs(radii))
     columns = [np.full(len(nodes), v) for v in (obstacle.n_z, obstacle.n_r, obstacle.c)]
-    return np.stack([*columns, areas, stiffness / width], axis=1)
+    return np.stack([*columns, np.copysign(areas, radii), stiffness / width], axis=1)
 
 
 def contact_block(

@@ -54,7 +54,7 @@ class ChangesLittle:
 
 @dataclass(frozen=True, eq=False)
 class KeepsOrientation:
-    """Quadrilaterals must not turn inside out, nor radii negative: the step is halved until not.
+    """Quadrilaterals must not turn inside out, nor cross the axis: the step is halved until not.
 
     coordinates: (n, 8) reference (z, r) of the corners; dofs: (n, 8) their displacements.
     """
@@ -78,4 +78,5 @@ class KeepsOrientation:
         forward = np.roll(points, -1, axis=1) - points
         backward = np.roll(points, 1, axis=1) - points
         jacobian = forward[..., 0] * backward[..., 1] - forward[..., 1] * backward[..., 0]
-        return bool(jacobian.min() > 0.0 and points[..., 1].min() > 0.0)
+        sides = points[..., 1] * self.coordinates.reshape(-1, 4, 2)[..., 1]
+        return bool(jacobian.min() > 0.0 and sides.min() > 0.0)

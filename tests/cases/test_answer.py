@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import nan
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -14,6 +16,7 @@ from softehl.cases.harness.case import Alarm
 from softehl.cases.harness.report.page import parts_of, render, write_xlsx
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.row import OK
+from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.states.answer import RETURNS, answer
 from softehl.cases.seal.states.state import UNCERTAIN, FilmRow
@@ -112,6 +115,32 @@ def test_a_report_of_cycles_has_their_numbers() -> None:
     assert said in page
     assert "work of friction on the rod [mJ]" in page
     assert "every speed is a steady state" not in page
+
+
+def test_rough_cycles_say_how_they_break_away() -> None:
+    run = cycles()
+    known = replace(run.rows[0], breakaway_N=15.0, lambda_ratio=3.5)
+    (calm,) = run.case.answer(run.parameters, [known])
+    assert "10 N in at most; 15 N to break away; its work 425 mJ; least lambda 3.5" in calm
+    assert not isinstance(calm, Alarm)
+    (line,) = run.case.answer(run.parameters, [replace(known, lambda_ratio=0.7)])
+    assert isinstance(line, Alarm)
+    assert line.endswith("least lambda 0.7; thinner than the surfaces are rough")
+
+
+def test_breaking_away_is_friction_of_a_slow_rod() -> None:
+    """Of a rod that is slow for a while: not the friction at full speed."""
+    ones: dict[str, Any] = dict.fromkeys((f.name for f in fields(Reading)), 1)
+    made = Reading(**{**ones, "lambda_ratio": 2.0})
+    speeds, forces = (0.0, 5.0, 100.0, -5.0), (3.0, 8.0, 20.0, -9.0)
+    readings = [
+        replace(made, t_s=float(k), rod_speed_mm_s=u, friction_N=f)
+        for k, (u, f) in enumerate(zip(speeds, forces, strict=True))
+    ]
+    films = SimpleNamespace(readings=readings[1:])
+    found = cycle.cycle_row(1, 25.0, films, readings[0], None)
+    assert found.breakaway_N == 9.0
+    assert found.lambda_ratio == 2.0
 
 
 def test_a_report_is_titled_by_its_seal() -> None:

@@ -117,8 +117,18 @@ def test_fill_of_a_square_gland_is_that_of_a_circle_in_a_square() -> None:
 
 
 def test_stretch_and_squeeze() -> None:
-    assert catalogue.stretch(50.0, 51.0) == pytest.approx(2.0)
-    assert catalogue.stretch(50.39, 50.0) == 0.0
+    on_rod, loose = catalogue.Ring("", 50.0, 4.0), catalogue.Ring("", 50.39, 4.0)
+    assert catalogue.stretch(on_rod, 51.0, 58.0) == pytest.approx(2.0)
+    assert catalogue.stretch(loose, 50.0, 57.0) == 0.0
+
+
+def test_a_ring_is_stretched_on_the_ground_of_a_piston() -> None:
+    outside = catalogue.Ring("", -40.0, 4.0)  # an inside diameter of 32 mm
+    assert catalogue.stretch(outside, -40.0, -33.0) == pytest.approx(100.0 / 32.0)
+    assert catalogue.fill(outside, -40.0, -33.0, 5.2) == pytest.approx(68.1, abs=0.1)
+
+
+def test_squeeze() -> None:
     assert catalogue.squeeze(3.53, 3.15) == pytest.approx(10.765, abs=1e-3)
 
 

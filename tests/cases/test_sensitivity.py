@@ -58,6 +58,7 @@ CASES = {
         400.0, section="rectangular", corner_radius=0.4, groove_width=4.3, housing_diameter=56.4
     ),
     "section x_ring": film_of(400.0, section="x_ring", groove_width=4.3, housing_diameter=56.4),
+    "piston": film_of(400.0, bore=50.0),
     "thinning": film_of(
         400.0, carreau_stress=0.01, carreau_exponent=0.6, carreau_plateau=0.3, stroke="in"
     ),
@@ -95,7 +96,7 @@ def reported(case: FilmCase, x: Array) -> dict[str, float]:
     return {
         "h_star": numbers.h_star,
         "friction": numbers.friction,
-        "leakage": 2.0 * math.pi * case.system.rod_radius * numbers.flux,
+        "leakage": case.system.around * numbers.flux,
         "p_max": numbers.p_max,
         "contact_width": end - start,
     }

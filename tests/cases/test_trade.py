@@ -134,7 +134,7 @@ def test_the_examples_of_astm_d2270() -> None:
         (("oil=hydraulic oil ISO 47", "temperature=50"), "nearest: ISO VG 46 and ISO VG 68"),
         (("oil=grease NLGI 2", "temperature=50"), "write the base oil"),
         (("ring=36x9", "rod=36"), "squeeze = 12.9 and groove_width = 12.2"),
-        (("bore=40 H8",), "unknown key 'bore' (a piston seal, which sits in the piston"),
+        (("piston=40",), "unknown key 'piston' (write bore = \"40 H8\")"),
         (("pressure=160 bar",), "unknown key 'pressure' (write sealed_pressure)"),
         (("Ra=0.2",), "unknown key 'Ra' (write roughness = \"Ra 0.2\")"),
         (("material=rubber 70",), 'write "NBR 70"'),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import pi
+from math import nan
 
 import numpy as np
 
@@ -72,6 +72,7 @@ class Reading:
     p_max_MPa: float
     asperity_load_percent: float
     iterations: int
+    lambda_ratio: float = nan
 
 
 @dataclass(frozen=True)
@@ -298,13 +299,13 @@ class March(Way):
     ) -> Reading:
         system, x = self.system, instant.x
         at = problem.fields(FILM, x)
-        share = rough_numbers(system, at).get("asperity_load", 0.0)
+        rough = rough_numbers(system, at)
         return Reading(
             t_s=instant.t,
             place_mm=self.motion.place(instant.t),
             rod_speed_mm_s=film.rod_speed,
             sealed_pressure_MPa=film.sealed_pressure,
-            friction_N=float(2.0 * pi * system.rod_radius * (at["tau_rod"] * at["dx"]).sum()),
+            friction_N=float(system.around * (at["tau_rod"] * at["dx"]).sum()),
             flux_sealed_mm2_s=float(instant.fluxes[0]),
             flux_air_mm2_s=float(instant.fluxes[1]),
             volume_sealed_mm2=float(instant.volumes[0]),
@@ -312,6 +313,7 @@ class March(Way):
             content_mm2=instant.held,
             h_min_um=1e3 * float(system.arc_film(x)[1].min()),
             p_max_MPa=float(at["p"].max()),
-            asperity_load_percent=100.0 * share,
+            asperity_load_percent=100.0 * rough.get("asperity_load", 0.0),
             iterations=iterations,
+            lambda_ratio=rough.get("lambda_ratio", nan),
         )

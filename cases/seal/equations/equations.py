@@ -137,7 +137,8 @@ class SealSystem(SealUnknowns):
         """Axial force of a wall on the section, the sum of normal forces on the bore, N."""
         if name == AIR_WALL and self.parameters.opens:
             block = self.problem.assembler.block(name)
-            return float(block.residual(x, self.problem.parameters[name])[:, 0].sum())
+            residual = block.residual(x, self.problem.parameters[name])
+            return self.side * float(residual[:, 0].sum())
         nodes, segments = self.section.chains[WALLS[name]]
         areas = tributary_areas(self.mesh.points, segments, nodes)
         return float(self.pressing(name, x) @ areas)
@@ -156,7 +157,7 @@ class SealSystem(SealUnknowns):
             problem = problem.also_fixed(self.layout.dofs(ROTATION), loads.moment)
         if loads.place is not None:
             return problem
-        return problem.also_fixed(self.layout.dofs(AXIAL), -loads.axial_force)
+        return problem.also_fixed(self.layout.dofs(AXIAL), -self.side * loads.axial_force)
 
     def film_problem(self, film: FilmLoads) -> Problem:
         """Film forces (18) and the Reynolds equation (25); the contact with the rod is without."""

@@ -16,12 +16,12 @@ _DIFFERENCE = 1e-4  # MPa between the ends of a segment
 
 def force(p: ORing) -> float:
     """A pressure on the rod, N."""
-    return pi * p.rod_diameter * _PRESSURE
+    return pi * abs(p.rod_diameter) * _PRESSURE
 
 
 def gap(p: ORing) -> float:
     """A gap times an area of the rod, mm^3."""
-    return pi * p.rod_diameter * _GAP
+    return pi * abs(p.rod_diameter) * _GAP
 
 
 def rotation(_: ORing) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 
@@ -40,8 +41,18 @@ class SealUnknowns:
 
     @property
     def rod_radius(self) -> float:
-        """Radius of the rod, mm."""
+        """Place r of the surface that slides, mm: radius of a rod, less that of a bore."""
         return 0.5 * self.parameters.rod_diameter
+
+    @property
+    def side(self) -> float:
+        """1 for a rod seal, -1 for a piston seal, whose forces have the other sign."""
+        return -1.0 if self.parameters.piston else 1.0
+
+    @property
+    def around(self) -> float:
+        """Circumference of the surface that slides, mm."""
+        return pi * abs(self.parameters.rod_diameter)
 
     @property
     def rod_areas(self) -> Array:
@@ -119,7 +130,7 @@ class SealUnknowns:
 
     def axial_force(self, x: Array) -> float:
         """Force that the hold exerts on the section, to the air side, N."""
-        return 0.0 - float(x[self.layout.part(AXIAL)][0])
+        return 0.0 - self.side * float(x[self.layout.part(AXIAL)][0])
 
     @property
     def film_ends(self) -> Integers:

@@ -29,7 +29,7 @@ def _ring(p: ORing, said: frozenset[str]) -> Iterator[str]:
     if p.section != ROUND and not said & set(dimensions(p.section)):
         yield f"the usual proportions of section {p.section}"
     if not said & {"ring", "inner_diameter"}:
-        yield f"inner diameter {p.inner_diameter:g} mm"
+        yield f"inner diameter {p.ring_diameter:g} mm"
     if p.shore_A is not None:
         low, high = shore_band(p.shore_A, p.polymer)
         yield (
@@ -44,10 +44,13 @@ def _gland(p: ORing, said: frozenset[str]) -> Iterator[str]:
     """Rod and groove."""
     if p.ring and read_ring(p.ring).outer is not None:
         said |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
-    if not said & {"rod", "rod_diameter"}:
+    if not said & {"rod", "rod_diameter", "bore"}:
         yield f"a rod of {p.rod_diameter:g} mm"
     sizes = {
-        "housing_diameter": (p.housing_diameter, {"squeeze", "groove_depth", "gland"}),
+        "housing_diameter": (
+            p.housing_diameter,
+            {"squeeze", "groove_depth", "gland", "groove_diameter"},
+        ),
         "groove_width": (p.groove_width, {"fill", "gland"}),
     }
     unsaid = [k for k, (_, others) in sizes.items() if not said & {k, *others}]
@@ -55,9 +58,14 @@ def _gland(p: ORing, said: frozenset[str]) -> Iterator[str]:
     if not charted:
         unsaid = [k for k in sizes if k not in said]  # also where the gland was asked for by name
     if unsaid:
-        yield f"{kind} ({', '.join(f'{k} = {sizes[k][0]:g} mm' for k in unsaid)})"
+        yield f"{kind} ({', '.join(f'{_called(p, k)} = {abs(sizes[k][0]):g} mm' for k in unsaid)})"
     if not said & {"backup", "extrusion_gap"}:
         yield "a back-up ring"
+
+
+def _called(p: ORing, key: str) -> str:
+    """A key of the groove as the user of a piston seal knows it."""
+    return "groove_diameter" if p.piston and key == "housing_diameter" else key
 
 
 def _kind(p: ORing) -> tuple[str, bool]:

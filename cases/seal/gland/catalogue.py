@@ -32,6 +32,7 @@ class Ring:
     """A ring as it is sold, mm. Tolerances are +-, None where the class gives none.
 
     area, middle: of a section that is not round, mm^2, and radius of its centroid, mm.
+    inner_diameter: less the outside diameter for a ring in a piston, see `ORing.piston`.
     """
 
     name: str
@@ -68,9 +69,14 @@ def ring(name: str) -> Ring:
     return _metric(name.strip(), said.inner, said.section)
 
 
-def stretch(inner_diameter: float, rod_diameter: float) -> float:
-    """Circumferential stretch of the inside of a ring on its rod, %; 0 if it is loose."""
-    return 100.0 * max(rod_diameter / inner_diameter - 1.0, 0.0)
+def stretch(a: Ring, rod_diameter: float, housing_diameter: float) -> float:
+    """Circumferential stretch of the inside of a ring on its rod, or on the ground of the groove
+    of its piston, %; 0 if it is loose.
+    """
+    on, inside = rod_diameter, a.inner_diameter
+    if rod_diameter < 0.0:
+        on, inside = housing_diameter, a.outer_diameter
+    return 100.0 * max(on / inside - 1.0, 0.0)
 
 
 def fill(a: Ring, rod_diameter: float, housing_diameter: float, width: float) -> float:
@@ -83,7 +89,8 @@ def warnings(
 ) -> tuple[str, ...]:
     """Warnings of handbooks about a ring and its gland, a line each."""
     filled = fill(a, rod_diameter, housing_diameter, width)
-    stretched = stretch(a.inner_diameter, rod_diameter)
+    stretched = stretch(a, rod_diameter, housing_diameter)
+    carrier = "piston" if rod_diameter < 0.0 else "rod"
     found = []
     if not FILL.low <= filled <= FILL.high:
         found.append(
@@ -92,8 +99,8 @@ def warnings(
         )
     if stretched > STRETCH:
         found.append(
-            f"the ring is stretched by {stretched:.1f} % on its rod; handbooks advise at most "
-            f"{STRETCH:g} %"
+            f"the ring is stretched by {stretched:.1f} % on its {carrier}; handbooks advise at "
+            f"most {STRETCH:g} %"
         )
     return tuple(found)
 

@@ -156,11 +156,23 @@ def _section_is_one(p: ORing) -> None:
         )
 
 
+def _diameters_have_one_sign(p: ORing) -> None:
+    if p.rod_diameter * p.inner_diameter < 0.0 or p.rod_diameter * p.housing_diameter < 0.0:
+        raise ValueError(
+            f"rod_diameter = {p.rod_diameter:g}, housing_diameter = {p.housing_diameter:g} and "
+            f"inner_diameter = {p.inner_diameter:g} mm have different signs; those of a piston "
+            "seal are negative: give bore and ring instead"
+        )
+
+
 def _seal_is_squeezed(p: ORing) -> None:
     gap = 0.5 * (p.housing_diameter - p.rod_diameter)
+    between, keys = "rod and housing", "rod_diameter, housing_diameter"
+    if p.piston:
+        between, keys = "bore and ground of the groove", "bore, groove_diameter"
     if not 0.5 * p.section_diameter < gap < p.section_diameter:
         raise ValueError(
-            f"the gap between rod and housing is {gap:g} mm (rod_diameter, housing_diameter); "
+            f"the gap between {between} is {gap:g} mm ({keys}); "
             f"to squeeze the seal it must be between a half and one section_diameter, "
             f"{0.5 * p.section_diameter:g} to {p.section_diameter:g} mm; give groove_depth or "
             'squeeze, or gland = "dynamic" gives a groove'
@@ -169,6 +181,11 @@ def _seal_is_squeezed(p: ORing) -> None:
 
 def _ring_fits_the_rod(p: ORing) -> None:
     stretch = p.rod_diameter / p.inner_diameter - 1.0
+    if p.piston and not -0.1 <= stretch <= 0.2:
+        raise ValueError(
+            f"bore = {-p.rod_diameter:g} mm is {100 * stretch:.3g} % larger than the ring outside, "
+            f"{-p.inner_diameter:g} mm; allowed are -10 to 20 %"
+        )
     if not -0.1 <= stretch <= 0.2:
         raise ValueError(
             f"rod_diameter = {p.rod_diameter:g} mm stretches inner_diameter = "
@@ -212,6 +229,7 @@ _CHECKS = (
     _air_side_is_closed_or_open,
     _arc_has_two_ends,
     _section_is_one,
+    _diameters_have_one_sign,
     _seal_is_squeezed,
     _ring_fits_the_rod,
     _section_is_between_the_walls,

@@ -6,6 +6,7 @@ gland the rest. What is given twice must agree.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -33,13 +34,50 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     values = dict(given)
     if isinstance(values.get("ring"), int):
         values["ring"] = str(values["ring"])  # "-226" is a number to a reader of TOML
-    if number(values.get("rod")):
-        _follow(values, "rod_diameter", float(values["rod"]), "rod")
+    side = _side(values)
+    for name in ("rod", "bore"):
+        if number(values.get(name)):
+            _follow(values, "rod_diameter", side * float(values[name]), name)
+    if number(values.get("groove_diameter")):
+        ground = side * float(values["groove_diameter"])
+        _follow(values, "housing_diameter", ground, "groove_diameter")
+    if side < 0.0:
+        _in_piston(values)
     if isinstance(values.get("ring"), str):
         _with_ring(values)
     if isinstance(values.get("gland"), str) or any(number(values.get(k)) for k in _GLAND):
         _with_gland(values)
     return values
+
+
+def _side(values: Mapping[str, Any]) -> float:
+    """-1 of a piston seal, whose diameters are counted negative, else 1."""
+    if values.get("bore") is None:
+        rod = values.get("rod_diameter")
+        return -1.0 if number(rod) and rod < 0.0 else 1.0
+    if values.get("rod") is not None:
+        raise ValueError(
+            f"rod = {values['rod']} and bore = {values['bore']}: a seal slides on one of them; a "
+            "rod seal has a rod, a piston seal a bore"
+        )
+    return -1.0
+
+
+def _in_piston(values: dict[str, Any]) -> None:
+    """The diameters of a piston seal that were given as they are measured, negative.
+
+    inner_diameter: of the ring; without one it is just as large as the bore outside.
+    """
+    bore, inner = values.get("rod_diameter"), values.get("inner_diameter")
+    section, ground = values.get("section_diameter", 3.53), values.get("housing_diameter")
+    if number(ground) and ground > 0.0:
+        values["housing_diameter"] = -float(ground)
+    if number(inner) and inner > 0.0 and number(section):
+        values["inner_diameter"] = -(inner + 2.0 * section)
+    if inner is None and not values.get("ring") and number(bore):
+        values["inner_diameter"] = float(bore)
+    if values.get("bore") is not None and not values.get("ring"):
+        _with_usual_gland(values)
 
 
 def _with_ring(values: dict[str, Any]) -> None:
@@ -51,17 +89,26 @@ def _with_ring(values: dict[str, Any]) -> None:
                 f'section = "{section}" and ring = "{values["ring"]}" contradict: leave one out'
             )
     if said.outer is not None:
-        _with_cup(values, said.inner, said.outer, said.width or 0.0)
+        ends = said.inner, said.outer
+        rod, ground = ends if _side(values) > 0.0 else (-ends[1], -ends[0])
+        _with_cup(values, rod, ground, said.width or 0.0)
         return
     ring = catalogue.ring(values["ring"])
     if values.get("rod_diameter") is None:
-        rod = round(1.02 * ring.inner_diameter, 1)
+        rod, bore = round(1.02 * ring.inner_diameter, 1), round(ring.outer_diameter, 1)
         raise ValueError(
-            f'ring = "{values["ring"]}" needs the rod that it seals, as in rod = {rod:g}'
+            f'ring = "{values["ring"]}" needs the rod that it seals, as in rod = {rod:g}, '
+            f"or the bore of a piston seal, as in bore = {bore:g}"
         )
-    _follow(values, "inner_diameter", ring.inner_diameter, "ring")
+    inner = ring.inner_diameter if _side(values) > 0.0 else -ring.outer_diameter
+    _follow(values, "inner_diameter", inner, "ring")
     _follow(values, "section_diameter", ring.section_diameter, "ring")
-    depths = ("housing_diameter", "squeeze", "gland", "groove_depth")
+    _with_usual_gland(values)
+
+
+def _with_usual_gland(values: dict[str, Any]) -> None:
+    """A standard gland where depth or width are not given."""
+    depths = ("housing_diameter", "groove_diameter", "squeeze", "gland", "groove_depth")
     widths = ("groove_width", "fill")
     if not any(map(values.get, depths)) or not any(map(values.get, widths)):
         values["gland"] = values.get("gland") or "dynamic"
@@ -93,8 +140,9 @@ def _with_gland(values: dict[str, Any]) -> None:
     if isinstance(values.get("gland"), str):
         gland = _gland(values, section)
         if values.get("housing_diameter") is None:
-            nominal = dict(bands(tuple(values.get("said", ())))).get("rod")
-            rod_of_chart = nominal.nominal if nominal else rod
+            limited = dict(bands(tuple(values.get("said", ()))))
+            nominal = limited.get("bore" if rod < 0.0 else "rod")
+            rod_of_chart = math.copysign(nominal.nominal, rod) if nominal else rod
             values["housing_diameter"] = round(rod_of_chart + 2.0 * gland.depth.middle, 4)
         if values.get("groove_width") is None and values.get("fill") is None:
             values["groove_width"] = round(gland.width.middle, 4)

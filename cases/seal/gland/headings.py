@@ -13,7 +13,16 @@ _CAVITATION = ("cavitation", "cavitation_pressure", "cavitation_penalty")
 SEAL = {
     "ring": ("ring", "inner_diameter", "section_diameter", *SectionKeys.model_fields),
     "gland": (
-        *("rod", "rod_diameter", "gland", "groove_depth", "squeeze", "housing_diameter"),
+        *(
+            "rod",
+            "bore",
+            "rod_diameter",
+            "gland",
+            "groove_depth",
+            "squeeze",
+            "groove_diameter",
+            "housing_diameter",
+        ),
         *("fill", "groove_width"),
         *("groove_centre", "backup", "extrusion_gap", "corner_fillet", "housing_friction"),
     ),
@@ -36,10 +45,10 @@ SEAL = {
 }
 """Heading -> keys."""
 
-_PISTON = "a piston seal, which sits in the piston and slides on the bore, is not solved yet"
-
 WORDS = {
-    **dict.fromkeys(("bore", "piston", "cylinder", "piston_diameter", "bore_diameter"), _PISTON),
+    **dict.fromkeys(
+        ("piston", "cylinder", "piston_diameter", "bore_diameter"), 'write bore = "40 H8"'
+    ),
     **dict.fromkeys(("pressure", "p", "p_s"), "write sealed_pressure"),
     **dict.fromkeys(("speed", "velocity", "u"), "write speeds"),
     **dict.fromkeys(("hardness", "rubber", "polymer"), 'write material = "NBR 70"'),
@@ -47,7 +56,7 @@ WORDS = {
     **dict.fromkeys(("eta", "dynamic_viscosity"), "write viscosity"),
     **dict.fromkeys(("seal", "profile", "type"), 'write ring = "36x4" or section = "u_cup"'),
     **dict.fromkeys(("temp", "t"), "write temperature"),
-    **dict.fromkeys(("housing", "groove_diameter", "gland_diameter"), "write housing_diameter"),
+    **dict.fromkeys(("housing", "gland_diameter"), "write housing_diameter"),
     **dict.fromkeys(("depth", "gland_depth"), "write groove_depth"),
     **dict.fromkeys(("width", "gland_width", "groove_length"), "write groove_width"),
     **dict.fromkeys(("surface", "finish", "ra", "rq"), 'write roughness = "Ra 0.2"'),

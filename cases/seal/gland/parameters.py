@@ -32,6 +32,8 @@ from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.parted_mesh import CAP
 from softehl.runtime.mesh.sections import SectionMesh
 
+SIGNED = "other than 0; of a piston seal negative: give bore"
+
 DENSITIES = (1, 2, 4, 8, 16)
 """Mesh densities of the paper, coarsest first."""
 
@@ -46,7 +48,17 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
     """
 
     names = (
-        *("ring", "rod", "squeeze", "groove_depth", "fill", "gland", "backup"),
+        *(
+            "ring",
+            "rod",
+            "bore",
+            "groove_diameter",
+            "squeeze",
+            "groove_depth",
+            "fill",
+            "gland",
+            "backup",
+        ),
         *("compound", "shore_A", "fit"),
         *("oil", "oil_density", "roelands", "said"),
     )
@@ -153,6 +165,20 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
     rod: float | None = key(
         None, "the same as rod_diameter", unit="mm", bounds='> 0, or "36 f7"', gt=0
     )
+    bore: float | None = key(
+        None,
+        "bore that a piston seal slides on: the groove is in the piston, inside the ring",
+        unit="mm",
+        bounds='> 0, or "40 H8"; left out = a rod seal',
+        gt=0,
+    )
+    groove_diameter: float | None = key(
+        None,
+        "diameter of the ground of the groove, for housing_diameter",
+        unit="mm",
+        bounds='> 0, or "33 h9"',
+        gt=0,
+    )
     squeeze: float | None = key(
         None,
         "part of section_diameter that the gland takes away, for housing_diameter",
@@ -163,7 +189,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
     )
     groove_depth: float | None = key(
         None,
-        "radial depth of the gland, from the rod to its ground, for housing_diameter",
+        "radial depth of the gland, from rod or bore to its ground, for housing_diameter",
         unit="mm",
         bounds="> 0, left out = by housing_diameter",
         gt=0,
@@ -205,7 +231,12 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
     )
 
     inner_diameter: float = key(
-        50.39, "inner diameter of the seal D_inner", unit="mm", gt=0, le=5000
+        50.39,
+        "inner diameter of the seal D_inner; of a piston seal less its outside diameter",
+        unit="mm",
+        bounds=SIGNED,
+        ge=-5000,
+        le=5000,
     )
     section_diameter: float = key(
         3.53,
@@ -213,8 +244,10 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
         unit="mm",
         gt=0,
     )
-    rod_diameter: float = key(50.0, "rod diameter D_rod", unit="mm", gt=0)
-    housing_diameter: float = key(56.30, "inner diameter of the housing D_housing", unit="mm", gt=0)
+    rod_diameter: float = key(50.0, "rod diameter D_rod", unit="mm", bounds=SIGNED)
+    housing_diameter: float = key(
+        56.30, "inner diameter of the housing D_housing", unit="mm", bounds=SIGNED
+    )
     viscosity: float = key(
         6.59e-8,
         "dynamic viscosity eta_0 at zero pressure",
@@ -301,6 +334,21 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
         """Diameters and width from ring, rod, squeeze and gland; rubber and oil.  ValueError."""
         values = fitted(with_outline(with_limits(dict(given))))
         return with_oil(with_rubber(with_regions(values)))
+
+    @property
+    def piston(self) -> bool:
+        """Whether the seal sits in a piston and slides on a bore.
+
+        Its diameters are counted negative then. With r = -radius a piston seal is a rod seal: what
+        slides is below it, what holds it above.
+        """
+        return self.rod_diameter < 0.0
+
+    @property
+    def ring_diameter(self) -> float:
+        """Inside diameter of the free seal, mm."""
+        outside = self.inner_diameter + 2.0 * self.section_diameter
+        return -outside if self.piston else self.inner_diameter
 
     @property
     def air_wall(self) -> float:
@@ -407,6 +455,13 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
     def rubber(self, region: str) -> RubberKeys:
         """Rubber of a region of the section; "" names the section itself."""
         return self.materials[region] if region else self
+
+    @field_validator("inner_diameter", "rod_diameter", "housing_diameter")
+    @classmethod
+    def _diameter_is_not_zero(cls, diameter: float) -> float:
+        if diameter == 0.0:
+            raise ValueError("a diameter is not 0")
+        return diameter
 
     @field_validator("density", mode="before")
     @classmethod

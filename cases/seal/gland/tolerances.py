@@ -18,7 +18,12 @@ from softehl.cases.seal.gland.trade.said import LENGTHS as LIMITED
 from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.gland.varied import LENGTHS, MEASURES, NUMBERS, PRESSURE_KEY
 
-_ALIASES = {"modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"), "rod": ("rod_diameter",)}
+_SURFACES = {
+    "rod": ("rod_diameter",),
+    "bore": ("rod_diameter",),
+    "groove_diameter": ("housing_diameter",),
+}
+_ALIASES = {"modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"), **_SURFACES}
 """Names for other keys: all that a rubber has are off by the same share."""
 
 _IN_MM = frozenset((*LENGTHS, *MEASURES))
@@ -114,7 +119,7 @@ def _of_the_gland(
     wrong = 0.01 * size * section if name == "squeeze" else size
     if name == "groove_depth" and unit == "%":
         wrong = 0.01 * size * depth
-    return 2.0 * wrong / housing, ("housing_diameter",)
+    return 2.0 * wrong / abs(housing), ("housing_diameter",)
 
 
 def _moved(name: str, values: Mapping[str, object]) -> tuple[str, ...]:

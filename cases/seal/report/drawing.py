@@ -36,8 +36,8 @@ def gland_figure(p: ORing) -> Figure:
         axes, (-0.5 * size, rod + 0.5 * size), (0.5 * size, rod + 0.5 * size), f"{size:.4g}", (0, 4)
     )
     axes.set_xlabel("z [mm]   (sealed side left, air side right)")
-    axes.set_ylabel("r [mm]")
-    axes.set_title(f"rod {p.rod_diameter:g} mm, housing {p.housing_diameter:.6g} mm")
+    style.radial_axis(axes, p)
+    axes.set_title(style.between(p))
     style.set_margins(figure, left=0.6, right=0.1, bottom=0.5, top=0.35)
     return figure
 

@@ -95,7 +95,7 @@ def section_figure(p: ORing, views: Sequence[View]) -> Figure:
         film = f"U = {speed} mm/s, h* = {view.row.h_star_um:.3g} µm"
         axes.set_title(f"{style.STROKES[view.row.stroke]}, {film}")
         axes.set_xlabel("z [mm]")
-    panels[0].set_ylabel("r [mm]")
+    style.radial_axis(panels[0], p)
     style.set_margins(figure, left=left, right=bar, bottom=0.48, top=0.82, between=0.05)
     _, low, right, high = panels[-1].get_position(original=True).extents
     width = figure.get_size_inches()[0]
@@ -160,7 +160,12 @@ def _draw_film(axes: Axes, p: ORing, profile: Profile, height: float) -> None:
     rod, x, film = 0.5 * p.rod_diameter, profile.x_mm, np.maximum(profile.p_MPa, 0.0)
     axes.fill_between(x, rod, rod - height * film, color=_FILM, lw=0)
     below = rod - height * film.max()
-    _write(axes, (p.groove_centre, below), f"film pressure, max {film.max():.3g} MPa", -3)
+    _write(
+        axes,
+        (p.groove_centre, below),
+        f"film pressure, max {film.max():.3g} MPa",
+        3 if p.piston else -3,
+    )
 
 
 def _draw_contact(axes: Axes, p: ORing, section: Section, height: float) -> None:
@@ -177,7 +182,7 @@ def _draw_contact(axes: Axes, p: ORing, section: Section, height: float) -> None
     axes.add_collection(bands)
     above = 0.5 * p.housing_diameter + height * pressure.max()
     text = f"contact pressure, max {pressure.max():.3g} MPa"
-    _write(axes, (p.groove_centre, above), text, 3)
+    _write(axes, (p.groove_centre, above), text, -3 if p.piston else 3)
 
 
 def _normals(points: Array, edges: Integers) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # imported late: matplotlib is slow to import
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from softehl.cases.seal.gland.parameters import ORing
@@ -42,13 +43,27 @@ SPEED = "rod speed |U| [mm/s]"
 def subject(p: ORing) -> str:
     """The ring, the oil and the sealed pressure in three lines, for the head of a picture."""
     return (
-        f"{p.named} {p.inner_diameter:g} \N{MULTIPLICATION SIGN} {p.section_diameter:g} mm, "
-        f"rod {p.rod_diameter:g} mm, housing {p.housing_diameter:g} mm\n"
+        f"{p.named} {p.ring_diameter:g} \N{MULTIPLICATION SIGN} {p.section_diameter:g} mm, "
+        f"{between(p)}\n"
         f"rubber μ = {p.shear_modulus:g} MPa, κ = {p.bulk_modulus:g} MPa; "
         f"pₛ = {p.sealed_pressure:g} MPa\n"
         f"oil η₀ = {p.viscosity * 1e9:g} mPa s, "
         f"\N{GREEK SMALL LETTER ALPHA} = {p.pressure_viscosity:g} /MPa"
     )
+
+
+def between(p: ORing) -> str:
+    """The two surfaces that the seal is squeezed between, in words."""
+    slides, holds = ("bore", "groove of the piston") if p.piston else ("rod", "housing")
+    return f"{slides} {abs(p.rod_diameter):.6g} mm, {holds} {abs(p.housing_diameter):.6g} mm"
+
+
+def radial_axis(axes: Axes, p: ORing) -> None:
+    """Radii at the axis of a picture, upwards: those of a piston seal are counted negative."""
+    axes.set_ylabel("r [mm]")
+    axes.yaxis.set_major_formatter(lambda r, _: f"{abs(r):.4g}")
+    if p.piston and not axes.yaxis_inverted():
+        axes.invert_yaxis()
 
 
 def write_head(figure: Figure, text: str, left: float) -> None:

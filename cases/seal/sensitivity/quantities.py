@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from math import pi
 
 import numpy as np
 
@@ -45,7 +44,7 @@ def quantities(case: FilmCase, problem: Problem, x: Array) -> dict[str, Quantity
     """All quantities of a converged film x (n,)."""
     at = problem.fields(FILM, x)
     flux, by_flux = _flux(case, problem, at, x)
-    ring = 2.0 * pi * case.system.rod_radius
+    ring = case.system.around
     friction = float((at["tau_rod"] * at["dx"]).sum())
     shear = {"tau_rod": at["dx"] / friction, "dx": at["tau_rod"] / friction}
     top = np.unravel_index(int(at["p"].argmax()), at["p"].shape)

@@ -53,8 +53,8 @@ def _corner(p: ORing) -> str:
 
 
 def _ring(p: ORing) -> str:
-    stretch = catalogue.stretch(p.inner_diameter, p.rod_diameter)
-    ring = f"{p.inner_diameter:g} x {p.section_diameter:g} mm"
+    stretch = catalogue.stretch(p.free_ring, p.rod_diameter, p.housing_diameter)
+    ring = f"{p.ring_diameter:g} x {p.section_diameter:g} mm"
     what = "a ring" if p.round else f"this {p.named}"
     return f"{what} of {ring}, stretched by {stretch:.2g} %,"
 

@@ -130,7 +130,9 @@ def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
     if 0 < low < len(dz):
         sealed[low] = p_s * dz[low - 1] / (dz[low - 1] + dz[low])
     wide = width > _NO_WIDTH * width.max()
-    pressures = np.divide(force, 2.0 * pi * r * width, out=np.zeros_like(r), where=wide) + sealed
+    pressures = (
+        np.divide(force, 2.0 * pi * np.abs(r) * width, out=np.zeros_like(r), where=wide) + sealed
+    )
     rows = system.pressure_dofs()
     y[rows] = np.stack([pressures[:-1], pressures[1:]], axis=1) @ _shapes(rows.shape[1] - 1).T
     return y

@@ -76,7 +76,7 @@ def fit_percent(p: ORing) -> dict[str, float]:
     """Fit of the free ring in its gland."""
     depth = 0.5 * (p.housing_diameter - p.rod_diameter)
     return {
-        "stretch_percent": stretch(p.inner_diameter, p.rod_diameter),
+        "stretch_percent": stretch(p.free_ring, p.rod_diameter, p.housing_diameter),
         "squeeze_percent": squeeze(p.section_diameter, depth),
         "fill_percent": fill(p.free_ring, p.rod_diameter, p.housing_diameter, p.groove_width),
     }
@@ -95,7 +95,7 @@ def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
         "sealed_wall_N": system.reaction(SEALED_WALL, x),
         "hold_N": system.axial_force(x),
         "housing_friction_N": system.housing_friction(x),
-        "sealed_pressure_N": p.sealed_pressure * pi * float(crown**2 - bottom**2),
+        "sealed_pressure_N": p.sealed_pressure * pi * abs(float(crown**2 - bottom**2)),
     }
     return {
         **fit_percent(p),
@@ -112,6 +112,6 @@ def mean_motion(system: SealSystem, x: Array) -> dict[str, float]:
         block, given = system.problem.assembler.block(name), system.problem.parameters[name]
         residuals[name] = float(block.residual(x, given)[:, -1].sum())
     return {
-        "mean_rotation_degrees": float(np.degrees(residuals["rotation"])),
+        "mean_rotation_degrees": system.side * float(np.degrees(residuals["rotation"])),
         "mean_place_mm": residuals["hold"],
     }

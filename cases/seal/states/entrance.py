@@ -8,8 +8,6 @@ with it.
 
 from __future__ import annotations
 
-from math import pi
-
 import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
@@ -61,5 +59,5 @@ def wedge_friction(
     a, b = gap[:-1], gap[1:]
     inverse = float((np.diff(way) * np.log(b / a) / (b - a)).sum())
     square = float((np.diff(way) / (a * b)).sum())
-    around = 2.0 * pi * system.rod_radius * flow
+    around = system.around * flow
     return around * inverse, around * (4.0 * inverse - 3.0 * h_star * square)

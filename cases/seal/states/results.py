@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import nan, pi
+from math import nan
 
 import numpy as np
 
@@ -71,7 +71,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
     h_star = q / (0.5 * film.rod_speed)
     within = min(level, THIN * h_star) if h_star > 0.0 else level
     drag, friction = (
-        float(2.0 * pi * system.rod_radius * (tau * at["dx"]).sum())
+        float(system.around * (tau * at["dx"]).sum())
         for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
     )
     end = 0 if film.stroke == "out" else -1
@@ -239,7 +239,7 @@ def film_state(
         p_max_MPa=numbers.p_max,
         pressure_jump_max_MPa=numbers.jump,
         rod_friction_N=numbers.friction,
-        leak_rate_mm3_s=2.0 * pi * system.rod_radius * numbers.flux,
+        leak_rate_mm3_s=system.around * numbers.flux,
         contact_start_mm=limits[0],
         contact_end_mm=limits[1],
         newton_iterations=iterations,

@@ -202,7 +202,7 @@ def with_outline(values: dict[str, Any]) -> dict[str, Any]:
     """The keys of a case with the height of an outline that is given.  ValueError."""
     if isinstance(values.get("outline"), str):
         inner = values.get("inner_diameter", 50.39)
-        inner = float(inner) if number(inner) and inner > 0.0 else 50.39  # refused with its key
+        inner = float(inner) if number(inner) and inner != 0.0 else 50.39  # refused with its key
         _, low, _, high = shape_of_file(Path(values["outline"]), inner).outline.box
         put(values, "section_diameter", high - low, f"outline = {values['outline']}")
     return values

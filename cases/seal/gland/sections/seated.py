@@ -82,7 +82,7 @@ def require_film_below(shape: Shape, file: str) -> Shape:
             f"{file}: {FILM} does not hold the lowest point of the contour; the rod is below, at "
             "small r (y of a drawing)"
         )
-    if low <= 0.0:
+    if low <= 0.0 < outline.box[3]:
         raise OutlineError(
             f"{file}: the contour reaches r = {low:g} mm; the axis of the rod is at r = 0, give "
             "inner_diameter to have it moved"

@@ -74,7 +74,10 @@ def read_ring(given: str) -> RingName:
                     f"U-cup {a:g}x{a + 2 * b:g}x{round(1.6 * b, 1):g}",
                 )
             return RingName(inner=a, section=b, kind=kind)
-        if kind in (None, "u_cup") and b > a:
+        if (kind is None and b > a) or (
+            kind == "u_cup" and b != a
+        ):  # a piston seal: the bore first
+            a, b = sorted((a, b))
             return RingName(inner=a, kind="u_cup", outer=b, width=float(third))
     if kind == "x_ring" and (found := _QUAD.fullmatch(rest)):
         return RingName(number=int(found["number"]), kind=kind)

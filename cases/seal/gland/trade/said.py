@@ -19,12 +19,13 @@ from softehl.cases.seal.gland.trade.text import NUMBER, NotUnderstoodError, plai
 
 LENGTHS = {
     **{"rod": "rod_diameter", "rod_diameter": "rod_diameter"},
-    **{k: k for k in ("housing_diameter", "groove_width", "groove_depth")},
+    **{k: k for k in ("bore", "groove_diameter", "housing_diameter", "groove_width")},
+    "groove_depth": "groove_depth",
     **{k: k for k in ("section_diameter", "inner_diameter")},
 }
 """Key that may be given with a tolerance -> the key that it means."""
 
-_SHAFTS = ("rod", "rod_diameter")
+_SHAFTS = ("rod", "rod_diameter", "groove_diameter")
 
 _SECTIONS = {
     **dict.fromkeys(("o-ring", "oring", "o ring", "circular"), "round"),
