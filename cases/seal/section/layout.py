@@ -139,7 +139,7 @@ class Layout:
 def pressure_boundary(excess: Array, index: int, p_s: float) -> int | None:
     """Place where contact holds back a pressure taken to act up to an index, None if just there.
 
-    excess: (n,) of contact over the pressure, which is p_s up to there and zero beyond. A contact of
+    excess: (n,) of contact over the pressure, which is p_s up to there and zero beyond. Contact of
     less than p_s does not hold it back: it goes on, at most to where contact presses most.
     """
     touching = excess > 0.0
