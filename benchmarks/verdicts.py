@@ -157,7 +157,7 @@ def told(line: Line) -> str:
 
 
 def tables(folder: Path, count: int) -> str:
-    """What is `ok` and how far it is off at most, then all states that have a reference."""
+    """Table of `ok` states and their largest errors, then one of all states with a reference."""
     tried = [n for n in range(count) if (folder / f"run_{n}.json").exists()]
     lines = [line for number in tried for line in compared(folder, number)]
     asked = sum(len(drawn(number)["speeds"]) for number in tried)

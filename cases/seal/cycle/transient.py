@@ -1,6 +1,6 @@
 """A film in time: squeeze on the moving surface, by backward Euler or BDF2 with its own steps.
 
-What is differentiated is the content of the film, not its thickness, and the axial place of the
+The rates are those of the content of the film, not of its thickness, and of the axial place of the
 surface (docs/film-physics.md). Each step is solved like a steady film: the section is condensed as
 seldom as possible.
 """

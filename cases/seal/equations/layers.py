@@ -21,10 +21,9 @@ _AT_WALL = 0.02  # of the section: as near to a wall it may come to touch it
 def film_layer(system: SealSystem, x: Array) -> Layer:
     """The film as the layer of the modified Newton iteration, near the state x.
 
-    Displacements of the arc and the moment are shared with the section; the pressures but
-    those at the ends are the film's own, whatever else its blocks know is prescribed. Where
-    the arc is at a wall, its multipliers are shared too: without the displacements of these
-    nodes nothing would determine them.
+    Displacements of the arc and the moment are shared with the section; the pressures but those at
+    the ends are the film's own; all other unknowns of its blocks are prescribed. Multipliers of arc
+    nodes at a wall are shared too: only the displacements of these nodes determine them.
     """
     start, nodes = system.layout.part(DISPLACEMENT).start, system.mesh.arc_nodes
     moment = system.layout.dofs(ROTATION)

@@ -52,8 +52,8 @@ def largest_flux(p: ORing) -> float:
 def pressure_flux(thickness: Array, dx: Array, order: int, viscosity: float) -> Array:
     """Flux (n,), mm^2/s, that a small difference of pressure drives through segments.
 
-    Where the film is thick, h^3 / (12 eta dx) turns the rounding of a pressure into a flux, and
-    only what a difference of pressure that matters would drive is large. thickness, dx: (n,), mm.
+    In a thick film h^3 / (12 eta dx) turns the rounding of a pressure into a flux, which is to
+    count as small. thickness, dx: (n,), mm.
     """
     conductance = order**2 * np.maximum(thickness, 0.0) ** 3 / (12.0 * viscosity * dx)
     return np.asarray(_DIFFERENCE * conductance)

@@ -1,7 +1,7 @@
 """From the names of catalogues to the measures of a case: ring, rod, gland, depth and fill.
 
 A ring gives two diameters; the rod, and either the depth, the squeeze, the housing or a standard
-gland the rest. What is given twice must agree.
+gland the rest. Values that are given twice must agree.
 """
 
 from __future__ import annotations

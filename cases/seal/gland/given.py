@@ -14,7 +14,7 @@ def number(value: object) -> TypeGuard[float]:
 def put(values: dict[str, Any], key: str, value: Any, source: str) -> None:
     """Set a key, or see that what was given agrees to 1e-6, less than tables and units round.
 
-    value: a number or several. source: what it follows from, in words. What was given as another
+    value: a number or several. source: what it follows from, in words. A value of another
     type stays, to be refused with its key. Raises ValueError for a contradiction.
     """
     before = values.get(key)

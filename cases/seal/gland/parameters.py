@@ -4,7 +4,7 @@ Units are mm, MPa, N, s.
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
@@ -34,7 +34,8 @@ from softehl.runtime.mesh.sections import SectionMesh
 
 SIGNED = "other than 0; of a piston seal negative: give bore"
 
-DENSITIES = (1, 2, 4, 8, 16)
+Density = Literal[1, 2, 4, 8, 16]
+DENSITIES: tuple[int, ...] = get_args(Density)
 """Mesh densities of the paper, coarsest first."""
 
 # strict again on the item: the list itself is lax so that a TOML array becomes a tuple
@@ -65,7 +66,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
     headings = SEAL
     words = WORDS
 
-    density: Literal[1, 2, 4, 8, 16] = key(
+    density: Density = key(
         2,
         "mesh density d: 27 d segments on an arc that is given, 33 d or more on one that is found",
         bounds="1, 2, 4, 8 or 16",

@@ -139,8 +139,8 @@ class Layout:
 def pressure_boundary(excess: Array, index: int, p_s: float) -> int | None:
     """Place where contact holds back a pressure taken to act up to an index, None if just there.
 
-    excess: (n,) of contact over the pressure, which is p_s up to there and zero beyond. Where less
-    than p_s holds it back it goes on, at most to where contact presses most.
+    excess: (n,) of contact over the pressure, which is p_s up to there and zero beyond. Contact of
+    less than p_s does not hold it back: it goes on, at most to where contact presses most.
     """
     touching = excess > 0.0
     if not touching.any() or (touching[index] and excess[min(index + 1, len(excess) - 1)] >= p_s):

@@ -1,7 +1,7 @@
 """The reported quantities of a film and how they follow from its fields: values and gradients.
 
-Each is what `cases.seal.states.results` reports. Where that chooses a point or a segment (the
-largest pressure, the segment of the flux, where the film is 20 um thick) the choice is held.
+They are those of `cases.seal.states.results`. A point or a segment that is chosen there (the
+largest pressure, the segment of the flux, the place where the film is 20 um thick) is held.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A case whose parameters vary while its mesh is frozen: the map from its measures to the nodes.
 
-Where the arc begins and ends and how its segments are spaced is frozen: every node of the outline
-keeps its part of a line or an arc. A remeshed run differs from that by the error of its mesh.
+Ends and segments of the arc are frozen: every node of the outline keeps its part of a line or an
+arc. A remeshed run differs from that by the error of its mesh.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ class FilmCase:
     def rate(self, name: str) -> Inputs:
         """The rate of its inputs by the logarithm of a parameter.
 
-        All of them are polynomials of the keys, of degree 4 at most (polar moment of the section)
-        of lengths and linear in the others, but for the augmentation of contacts, on which no
-        converged state depends, and for arcs, which are smooth: there the step leaves 1e-7.
+        The inputs are polynomials of the keys: of degree 4 at most in lengths (polar moment of the
+        section), linear in the others. Two are not: the augmentation of contacts, on which no
+        converged state depends, and arcs, where the step leaves an error of 1e-7.
         """
         lengths = *LENGTHS, *self.system.parameters.measures
         degree = 4 if name in lengths else 2

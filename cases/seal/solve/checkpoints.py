@@ -41,7 +41,7 @@ class Checkpoints:
         self.states.append(state)
 
     def restart(self, p: ORing) -> Checkpoint | None:
-        """Where to take up the path of a case; None where there is nothing but rest.
+        """State at which to take up the path of a case; None where there is nothing but rest.
 
         With friction there is not: what slips remembers its path.
         """

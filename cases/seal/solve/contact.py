@@ -172,7 +172,7 @@ def correction_stage(
 
 
 def path_corrector(system: SealSystem, newton: Newton) -> Corrector | None:
-    """What corrects the steps of a contact path, None for Newton's method as it stands."""
+    """Corrector of the steps of a contact path, None for Newton's method as it stands."""
     p = system.parameters
     if p.solver != "auto" or p.rubs:
         return None

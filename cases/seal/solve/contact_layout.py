@@ -1,4 +1,4 @@
-"""Where the mesh of the section is to be fine: at both edges of its contact, and below them.
+"""Places where the mesh of a section is fine: both edges of its contact, and below them.
 
 There `solve.inlet` has a length of the film for every speed, which is as K^(-6/5). So segments that
 grow with the distance from the edges and are as K^(-6/5) at them resolve every speed, and one mesh
@@ -127,7 +127,7 @@ def placed_layout(
 
 
 def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:
-    """Where the section meets the edge of the gap, on an arc between `ends`, mm, or its air end."""
+    """Place at which the section meets the edge of the gap, on an arc between `ends`, mm."""
     nodes = system.mesh.arc_nodes
     centre = np.array([p.air_wall, 0.5 * p.rod_diameter])
     centre += p.corner_fillet + np.array([0.0, p.extrusion_gap])
@@ -138,7 +138,7 @@ def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) ->
 
 
 def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) -> float:
-    """Where on the arc (mm) an end of the film is to be: side 0 the sealed, 1 the air end.
+    """Place on the arc (mm) of an end of the film: side 0 the sealed, 1 the air end.
 
     At most at `bound`, which may lie beyond the arc.
     """
@@ -172,8 +172,8 @@ def _way_out(system: SealSystem, x: Array, s: Array, side: int, bound: float) ->
 
 
 def _free(system: SealSystem, x: Array, side: int) -> float:
-    """How much of the outline (mm) beyond an end of the arc touches no wall, nearly; any length of
-    a section with flats, which lie on it from their corners on.
+    """Length of the outline (mm) beyond an end of the arc that touches no wall, nearly;
+    inf for a section with flats, which lie on it from their corners on.
     """
     if system.section.layout.flat:
         return np.inf

@@ -57,7 +57,7 @@ class ContactStore:
     folder: Path | None = None
 
     def densities(self, parameters: ORing, among: Sequence[int]) -> list[int]:
-        """Those of some densities of which there is a state, good or not; finest first."""
+        """Densities of which there is a state, good or not; finest first."""
         if self.folder is None:
             return []
         sections = [parameters.model_copy(update={"density": d}) for d in among]

@@ -42,7 +42,7 @@ def without_films(missed: Sequence[NoFilm], p: ORing) -> tuple[Status, str]:
 
 
 def _film_advice(p: ORing) -> str:
-    """What may help a film that was not found."""
+    """Advice for a film that was not found."""
     if p.given_arc:
         return _ARC.format(*p.given_arc)
     times = p.sealed_pressure / p.shear_modulus

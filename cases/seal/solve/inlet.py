@@ -39,7 +39,7 @@ class InletScales:
         return cls(inlet_time(p, edge, speed), MULTIPLE * film_thickness(p, [edge], speed))
 
     def at(self, ratio: float) -> InletScales:
-        """Those at another speed, which is so many times ours: l is as U^0.4, h as U^0.6."""
+        """Scales at another speed, which is so many times ours: l is as U^0.4, h as U^0.6."""
         return InletScales(self.time * ratio**-0.6, self.thickness * ratio**0.6)
 
 

@@ -33,7 +33,7 @@ Differentiate = Callable[[Film], Slopes | None]
 
 
 def verdict_of_contact(system: SealSystem, x: Array) -> Verdict:
-    """What the contact state x (n,) says about any of its films."""
+    """Verdict on the contact state x (n,), before its films."""
     p = system.parameters
     return Verdict(
         float(contact_pressure(system, p.sealed_pressure, x).max()),

@@ -63,7 +63,7 @@ class StageFailed:
 
     @property
     def message(self) -> str:
-        """How far the stage came, and what may help."""
+        """Words on how far the stage came, and what may help."""
         return self.stage.ended(self.reached)
 
     @property

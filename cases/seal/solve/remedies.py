@@ -1,4 +1,4 @@
-"""Where a path of the contact ends, and what may help, in words of ring, gland and pressure."""
+"""Ends of a path of the contact, and what may help, in words of ring, gland and pressure."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def not_carried(p: ORing, name: str) -> str:
 
 
 def _corner(p: ORing) -> str:
-    """What happens between wall and rod at too high a pressure."""
+    """Words on the gap between wall and rod at too high a pressure."""
     return _EXTRUSION.format(p.extrusion_gap, p.corner_fillet) if p.opens else _PRESSURE
 
 

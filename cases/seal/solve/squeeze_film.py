@@ -71,12 +71,12 @@ class SqueezeFilm:
     moment: float = 0.0
 
     def at(self, speed: float) -> SqueezeFilm:
-        """The same at another |U|, mm/s."""
+        """Film at another |U|, mm/s."""
         film = replace(self.film, speed=speed, entrance=0.0)
         return replace(self, film=film, scales=self.scales.at(speed / self.film.speed))
 
     def carried(self, system: SealSystem, x: Array, dry: Array) -> SqueezeFilm:
-        """The same film on the mesh of another system; x: (n,) carried to it, dry: contact."""
+        """Film on the mesh of another system; x: (n,) carried to it, dry: contact."""
         film = replace(
             self.film,
             gap=system.arc_film(x)[1] + OFFSET,

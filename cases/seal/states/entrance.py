@@ -1,9 +1,8 @@
 """The wedge of oil before an arc that begins within its film, and the pressure it has built up.
 
-An inlet may be longer than the part of a section that can be given a film: behind the tip of a lip
-there is nothing to go on with, and an arc may be given. The gap goes on as the section shows it,
-and (14) holds there too. Its pressure is small and hardly moves what is so far off; the film begins
-with it.
+An inlet may be longer than the part of a section that can have a film, behind the tip of a lip or
+on a given arc. The gap before the arc is that of the deformed section, and (14) holds there too.
+Its pressure is small and hardly deforms the section; the film begins with it.
 """
 
 from __future__ import annotations

@@ -71,8 +71,8 @@ def _slope(at: Mapping[str, Array]) -> Array:
 def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> float:
     """h* over sqrt(8 eta |U| / (9 p')), p' the steepest rise of the pressure in the inlet.
 
-    at: fields of the film, (segments, points) each. By (14) p' = 6 eta U (h - h*) / h^3, which is
-    largest at h = 3/2 h*: the ratio is 1 for a film that fulfils (14), on a mesh that shows it.
+    at: fields of the film, (segments, points) each. By (14) p' = 6 eta U (h - h*) / h^3. This is
+    largest at h = 3/2 h*, so that the ratio is 1 where the mesh shows the inlet.
     """
     steepest = _steepest(at, film)
     if steepest is None:
@@ -85,9 +85,9 @@ def inlet_ratio(at: Mapping[str, Array], film: FilmLoads, h_star: float) -> floa
 def oscillation(x: Array, h: Array, level: float = CONTACT_FILM) -> float:
     """Oscillation index of the nodal film thickness h (nodes,) at x (nodes,), dimensionless.
 
-    The largest alternating second difference over the mid contact relative to the median of h
-    there: D_i = h_(i-1) - 2 h_i + h_(i+1), and a pair of neighbours of opposite sign counts with
-    the smaller of |D_i|, |D_(i+1)|. A zigzag of amplitude a about h has the index 4 a / h, a
+    The largest alternating second difference D_i = h_(i-1) - 2 h_i + h_(i+1) over the mid contact,
+    relative to the median of h there. Neighbours D_i, D_(i+1) of opposite sign count with the
+    smaller of |D_i|, |D_(i+1)|. A zigzag of amplitude a about h has the index 4 a / h, a
     smooth film next to none. The mid contact is the middle four fifths of where h is below the
     level, mm: that of `contact_film`, or `THIN` films.
     """

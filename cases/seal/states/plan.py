@@ -82,7 +82,7 @@ def pieces(parameters: ORing, rows: Sequence[FilmRow], jobs: int) -> list[ORing]
 def missing_speeds(parameters: ORing, stroke: Stroke, rows: Sequence[FilmRow]) -> tuple[float, ...]:
     """The requested speeds |U| of a stroke to be solved.
 
-    Those that are not there, or are there from a coarser mesh outside the tolerance.
+    They have no row, or one of a coarser mesh that does not meet the tolerance.
     """
     outside = {row.key for row in outside_tolerance(parameters, rows)}
     kept = {r.key for r in rows if not (r.key in outside and r.density < parameters.density)}

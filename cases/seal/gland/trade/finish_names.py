@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from math import pi, sqrt
 
+from softehl.cases.harness.units import read_quantity
 from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
 
 RMS_OF_RA = sqrt(0.5 * pi)
@@ -15,7 +16,6 @@ _FINISH = re.compile(
     rf"|(?P<height2>{NUMBER}) ?(?P<unit2>um|nm|uin|mm)? ?(?P<kind2>R[a-z]{{1,3}}\d?)",
     re.IGNORECASE,
 )
-_UNITS = {"um": 1.0, "nm": 1e-3, "uin": 0.0254, "mm": 1e3}
 
 
 def read_finish(given: str) -> float | None:
@@ -31,8 +31,8 @@ def read_finish(given: str) -> float | None:
         if re.fullmatch(r"N ?(1[0-2]|[1-9])", text, re.IGNORECASE):
             raise refused("roughness", given, "is a grade of ISO 1302, a band of Ra", "Ra 0.2")
         raise refused("roughness", given, "is no finish in um", "Ra 0.2", "Rq 0.25", "0.25 um")
-    kind, height = found["kind"] or found["kind2"], float(found["height"] or found["height2"])
-    height *= _UNITS[(found["unit"] or found["unit2"] or "um").lower()]
+    kind, unit = found["kind"] or found["kind2"], found["unit"] or found["unit2"] or "um"
+    height = read_quantity(f"{found['height'] or found['height2']} {unit.lower()}", "um")
     if kind.lower() == "ra":
         return round(RMS_OF_RA * height, 6)
     if kind.lower() in ("rq", "rms"):
