@@ -31,7 +31,7 @@ AXES = "xyz"
 _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or m.weak"
 
 
-class NeedsElement(ModelError):
+class NeedsElement(ModelError):  # noqa: N818 (named after what it is)
     """What a page says is known in whole elements only."""
 
     def __init__(self, what: str) -> None:

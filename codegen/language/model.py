@@ -163,8 +163,8 @@ class Model:
     def internal(self, name: str, count: int | None = None) -> Any:
         """One unknown of an element, or a list of so many, called name_0, name_1, ...
 
-        No other element knows them. A study condenses them from its equations exactly, keeps their values with the element, and
-        has them in `result.fields`.
+        No other element knows them. A study condenses them from its equations exactly, keeps their
+        values with the element, and has them in `result.fields`.
         """
         if count is None:
             return self._internal_unknowns([name])[0]

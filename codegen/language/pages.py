@@ -124,7 +124,9 @@ class Page:
         if self.degree is not None:
             return rule_of(cell, self.degree)
         order = order_of(cell)
-        values = form is None or any(q.axis is None and q.component.order == order for q in form.unknowns)
+        values = form is None or any(
+            q.axis is None and q.component.order == order for q in form.unknowns
+        )
         short = cell.name.startswith(("line", "tri", "tet"))
         return rule_of(cell, 2 * order) if values and short else cell.rule
 
