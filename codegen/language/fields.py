@@ -113,6 +113,19 @@ class Fields(Model):
         """What a scalar, list or matrix is at the centroid of the parent cell."""
         raise NeedsElement(f"m.centroid({value})")
 
+    @property
+    def size(self) -> Any:
+        """Volume of a cell at a facet per area of the facet: a length."""
+        raise _no_facet("m.size", self.cell)
+
+    def jump(self, value: Any) -> Any:
+        """A value on a facet in the cell that the normal leaves, less that in the other one."""
+        raise _no_facet(f"m.jump({value})", self.cell)
+
+    def average(self, value: Any) -> Any:
+        """Mean of a value in both cells at a facet."""
+        raise _no_facet(f"m.average({value})", self.cell)
+
     def previous(self, field: Any) -> Any:
         """A field at the beginning of the step; it has gradients, too."""
         return self._of_step(field, "old")
@@ -276,6 +289,11 @@ class Fields(Model):
         for k in range(self.dimension):
             slopes.append(sp.Add(*(expression.diff(t.value) * t.slopes[k] for t in fields)))
         return slopes
+
+
+def _no_facet(what: str, cell: Element) -> ModelError:
+    words = f'{what}: {cell.name} is a cell here; facets are on="interior" and sides of a mesh'
+    return ModelError(words)
 
 
 def _leaves(expression: Any) -> set[Any]:
