@@ -12,12 +12,12 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language.definition import Component
+from softehl.codegen.language.definition import Component, Definition
 from softehl.codegen.language.elements.cells import ELEMENTS, Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.elements.shapes import interpolate
 from softehl.codegen.language.entries import Entries
-from softehl.codegen.language.fields import AXISYMMETRIC, Traced
+from softehl.codegen.language.fields import AXISYMMETRIC, Elsewhere, Traced
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.nodal import Nodal
 
@@ -28,7 +28,7 @@ FACES = {"tri": "line2", "quad": "line2", "tet": "tri3", "hex": "quad4"}
 
 
 def shape_of(cell: Element) -> str:
-    """Kind of a cell without its number of nodes.  Raises ModelError where facets have no traces."""
+    """Kind of a cell without its number of nodes.  Raises ModelError where there are no traces."""
     shape = cell.name.rstrip("0123456789")
     if shape not in FIRST or cell.lines is not None:
         raise ModelError(
@@ -51,7 +51,7 @@ class Facet(Nodal):
         *,
         both: bool,
     ) -> None:
-        self._count = 1 + both
+        self._count, self._crossed = 1 + both, False
         super().__init__(name, cell, geometry, rule, doc, dimension=cell.dimension)
         self._others: dict[Any, Any] = {}
         self._sides = [self._seen(k) for k in range(self._count)]
@@ -91,8 +91,15 @@ class Facet(Nodal):
         pairs = zip(here.values, self._beyond(here), strict=True)
         return here.arrange([(a + b) / 2 for a, b in pairs])
 
+    def finish(self) -> Definition:
+        """The frozen definition.  Raises Elsewhere where nothing is said of the second cell."""
+        if self._count > 1 and not self._crossed:
+            raise Elsewhere(f"{self.name}: a page on facets between cells has m.jump or m.average")
+        return super().finish()
+
     def _beyond(self, here: Entries) -> list[Any]:
         """What values of the first cell are in the second."""
+        self._crossed = True
         return [sp.sympify(v).xreplace(self._others) for v in here.values]
 
     def _at_facet(self, second: int) -> list[Any]:
@@ -140,10 +147,8 @@ class Facet(Nodal):
 
     def _surface(self) -> tuple[Any, Any]:
         t = self._tangents
-        if self.dimension == 2:
-            crossed = sp.Matrix([t[1, 0], -t[0, 0]])
-        else:
-            crossed = t[:, 0].cross(t[:, 1])
+        flat = self.dimension == 2
+        crossed = sp.Matrix([t[1, 0], -t[0, 0]]) if flat else t[:, 0].cross(t[:, 1])
         vector = self.define("reference_area", crossed)
         area = self.define("size_of_area", sp.sqrt(vector.dot(vector)))
         return area, vector / area

@@ -38,6 +38,10 @@ class NeedsElement(ModelError):  # noqa: N818 (named after what it is)
         super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
 
 
+class Elsewhere(ModelError):  # noqa: N818 (named after what it is)
+    """A page is not meant for cells, or not for facets; another one of its file may be."""
+
+
 @dataclass(frozen=True)
 class Traced:
     """Value of a component at the point, and its slopes along the axes."""
@@ -293,7 +297,7 @@ class Fields(Model):
 
 def _no_facet(what: str, cell: Element) -> ModelError:
     words = f'{what}: {cell.name} is a cell here; facets are on="interior" and sides of a mesh'
-    return ModelError(words)
+    return Elsewhere(words)
 
 
 def _leaves(expression: Any) -> set[Any]:

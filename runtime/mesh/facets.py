@@ -47,7 +47,7 @@ def interior(mesh: Mesh, kind: str) -> Integers:
     if len(mesh.cells) > 1:
         raise MeshError(f'on="interior": the mesh has {", ".join(mesh.cells)}; one kind is needed')
     turned, cells = turns(kind), mesh.cells[kind]
-    faces, count, _ = turned.shape
+    faces = len(turned)
     every = cells[:, turned[:, 0]].reshape(-1, cells.shape[1])  # (cells * faces, k)
     at = list(CELLS[kind].sides[0])
     corners = mesh.origin[every[:, at]]
@@ -84,7 +84,7 @@ def split(mesh: Mesh) -> Mesh:
         copied.append(nodes.ravel())
         first += nodes.size
     old = np.concatenate(copied)
-    sides = {}
+    sides: dict[str, dict[str, Integers]] = {}
     for name in mesh.sides:
         sides[name] = {}
         for face, there in mesh.faces(name).items():

@@ -65,7 +65,9 @@ def elements_of(
         return "point1", mesh.nodes(on)[:, None]
     stem, _, facet = kernel.cell.partition("_")
     if facet and (on is None or stem not in mesh.cells):
-        raise StudyError(f'{name!r}: {kernel.name} stands on facets of {stem}: on="interior" or on=a side')
+        raise StudyError(
+            f'{name!r}: {kernel.name} stands on facets of {stem}: on="interior" or on=a side'
+        )
     if facet:
         assert on is not None
         nodes = interior(mesh, stem) if facet == "interior" else beside(mesh, on, stem)
