@@ -130,7 +130,9 @@ def test_what_has_no_facets_says_so() -> None:
         penalised(mesh, 1.0)
     with pytest.raises(MeshError, match="facets of wedge6"):
         turns("wedge6")
-    with pytest.raises(ValueError, match=r"m.jump.* quad4 is a cell here"):
-        Study(mesh).add("body", PAGE, model="facets", gamma=1.0)
+    with pytest.raises(ValueError, match=r"m.size: quad4 is a cell here"):
+        Study(mesh).add("body", nitsche)
+    with pytest.raises(ValueError, match=r"laplace.* has m.jump or m.average"):
+        load_kernel(laplace, cell="quad4_interior")
     with pytest.raises(StudyError, match='on="interior" or on=a side'):
         Study(mesh).add("body", load_kernel(PAGE, "facets", cell="quad4_interior"), gamma=1.0)
