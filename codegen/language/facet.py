@@ -98,7 +98,7 @@ class Facet(Nodal):
         return super().finish()
 
     def _beyond(self, here: Entries) -> list[Any]:
-        """What values of the first cell are in the second."""
+        """Values of the first cell as they are in the second."""
         self._crossed = True
         return [sp.sympify(v).xreplace(self._others) for v in here.values]
 

@@ -32,7 +32,7 @@ _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or
 
 
 class NeedsElement(ModelError):  # noqa: N818 (named after what it is)
-    """What a page says is known in whole elements only."""
+    """Error of a page that asks for what is known in whole elements only."""
 
     def __init__(self, what: str) -> None:
         super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
@@ -114,7 +114,7 @@ class Fields(Model):
         raise NeedsElement("m.jacobian")
 
     def centroid(self, value: Any) -> Any:
-        """What a scalar, list or matrix is at the centroid of the parent cell."""
+        """Value of a scalar, list or matrix at the centroid of the parent cell."""
         raise NeedsElement(f"m.centroid({value})")
 
     @property

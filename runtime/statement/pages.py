@@ -41,7 +41,7 @@ def kinds_of(mesh: Mesh, on: str | Predicate | None, cells: str | None) -> tuple
 
 
 def wants_traces(error: BaseException | None) -> bool:
-    """Whether a page could not be read because it needs the cells beside a side."""
+    """True where a page could not be read because it needs the cells beside a side."""
     while error is not None:
         if getattr(error, "traces", False):
             return True
@@ -135,7 +135,7 @@ def page_on(
 
 
 def facet_nodes(kernel: Kernel) -> Integers | None:
-    """Which nodes of the elements of a page on facets are on the facet; None on cells and sides."""
+    """Nodes on the facet, of the elements of a page on facets; None on cells and sides."""
     stem, _, facet = kernel.cell.partition("_")
     return np.array(CELLS[stem].side_nodes[0][1]) if facet else None
 
