@@ -67,8 +67,9 @@ class Family:
     data (n, len(data)), point_data (n, points, len(point_data)), parameters (len(parameters),) or
     a mapping by name, rule None for the model's default (the only one when `unrolled`).
     places: of every unknown its name without number, and its node or None. history: point data
-    whose new values the last fields are. internal: unknowns of one element alone. cell: on which a page of fields stands. kept: numbers that
-    products by sum factorisation keep at a point, 0 where the family has none.
+    whose new values the last fields are. internal: unknowns of one element alone. cell: on which a
+    page of fields stands. kept: numbers that products by sum factorisation keep at a point, 0 where
+    the family has none.
     """
 
     name: str

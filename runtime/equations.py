@@ -13,6 +13,7 @@ from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.unknowns import Elements, Numbering
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.names import listed, meant
+from softehl.runtime.statement.pages import facet_nodes
 from softehl.runtime.statement.records import Block, Force, Statement, StudyError
 from softehl.runtime.system import System
 
@@ -104,7 +105,9 @@ class _Writer:
         given = [block.data[d] for d in block.kernel.data if d in block.data]
         data = np.stack(given, axis=1) if given else None  # what else there is comes with steps
         return ElementBlock(
-            block.name, block.kernel, places, self.numbering.dofs[block.name], data=data
+            *(block.name, block.kernel, places, self.numbering.dofs[block.name]),
+            data=data,
+            check_orientation=facet_nodes(block.kernel) is None,
         )
 
     def force(self, force: Force) -> ElementBlock:

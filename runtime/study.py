@@ -46,12 +46,14 @@ from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement import given as read
 from softehl.runtime.statement.contacts import touch
 from softehl.runtime.statement.pages import (
+    beside_of,
     elements_of,
     geometry_of,
     is_folder,
     kinds_of,
     page_on,
     require_page,
+    wants_traces,
 )
 from softehl.runtime.statement.records import (
     Condition,
@@ -125,7 +127,13 @@ class Study(Fitted):
         law = material is not None
         page = material if law else source
         kinds = kinds_of(self.mesh, on, cells)
-        kernels = [self._loaded(page, model, kinds[0] if kinds else None, law=law)]
+        try:
+            kernels = [self._loaded(page, model, kinds[0] if kinds else None, law=law)]
+        except ValueError as error:
+            if on is None or not wants_traces(error):
+                raise
+            kinds = beside_of(self.mesh, on)
+            kernels = [self._loaded(page, model, kinds[0], law=law)]
         if kernels[0].cell and not isinstance(page, Kernel):
             kernels += [self._loaded(page, model, kind, law=law) for kind in kinds[1:]]
         for kernel in kernels:

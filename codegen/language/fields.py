@@ -31,11 +31,15 @@ AXES = "xyz"
 _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or m.weak"
 
 
-class NeedsElement(ModelError):
-    """What a page says is known in whole elements only."""
+class NeedsElement(ModelError):  # noqa: N818 (named after what it is)
+    """Error of a page that asks for what is known in whole elements only."""
 
     def __init__(self, what: str) -> None:
         super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
+
+
+class Elsewhere(ModelError):  # noqa: N818 (named after what it is)
+    """A page is not meant for cells, or not for facets; another one of its file may be."""
 
 
 @dataclass(frozen=True)
@@ -110,8 +114,21 @@ class Fields(Model):
         raise NeedsElement("m.jacobian")
 
     def centroid(self, value: Any) -> Any:
-        """What a scalar, list or matrix is at the centroid of the parent cell."""
+        """Value of a scalar, list or matrix at the centroid of the parent cell."""
         raise NeedsElement(f"m.centroid({value})")
+
+    @property
+    def size(self) -> Any:
+        """Volume of a cell at a facet per area of the facet: a length."""
+        raise _no_facet("m.size", self.cell)
+
+    def jump(self, value: Any) -> Any:
+        """A value on a facet in the cell that the normal leaves, less that in the other one."""
+        raise _no_facet(f"m.jump({value})", self.cell)
+
+    def average(self, value: Any) -> Any:
+        """Mean of a value in both cells at a facet."""
+        raise _no_facet(f"m.average({value})", self.cell)
 
     def previous(self, field: Any) -> Any:
         """A field at the beginning of the step; it has gradients, too."""
@@ -276,6 +293,11 @@ class Fields(Model):
         for k in range(self.dimension):
             slopes.append(sp.Add(*(expression.diff(t.value) * t.slopes[k] for t in fields)))
         return slopes
+
+
+def _no_facet(what: str, cell: Element) -> ModelError:
+    words = f'{what}: {cell.name} is a cell here; facets are on="interior" and sides of a mesh'
+    return Elsewhere(words)
 
 
 def _leaves(expression: Any) -> set[Any]:

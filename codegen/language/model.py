@@ -74,7 +74,7 @@ class Model:
             raise ModelError(
                 f"the name {name[:20]}... of a model has {len(name)} letters, allowed are {LONGEST}"
             )
-        wrong = cells.foreign(rule, nodes)
+        wrong = self._foreign(rule, nodes)
         if wrong:
             raise ModelError(f"{name} has {nodes} nodes, and {wrong}")
         self.name, self.nodes, self.rule, self.unroll = name, nodes, rule, unroll
@@ -113,6 +113,10 @@ class Model:
         self._conditions: list[Condition] = []
         self._tasks: tuple[str, ...] | None = None
         self._declared: dict[str, tuple[Node, str]] = {}
+
+    def _foreign(self, rule: QuadratureRule, nodes: int) -> str:
+        """Words on a rule of another cell than that of the nodes."""
+        return cells.foreign(rule, nodes)
 
     # declarations -------------------------------------------------------------------------------
 
@@ -163,8 +167,8 @@ class Model:
     def internal(self, name: str, count: int | None = None) -> Any:
         """One unknown of an element, or a list of so many, called name_0, name_1, ...
 
-        No other element knows them. A study condenses them from its equations exactly, keeps their values with the element, and
-        has them in `result.fields`.
+        No other element knows them. A study condenses them from its equations exactly, keeps their
+        values with the element, and has them in `result.fields`.
         """
         if count is None:
             return self._internal_unknowns([name])[0]

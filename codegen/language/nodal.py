@@ -42,12 +42,16 @@ class Nodal(Fields):
         *,
         dimension: int,
     ) -> None:
-        super().__init__(name, cell, geometry, len(cell.nodes), rule, doc)
+        super().__init__(name, cell, geometry, self._count_of_nodes(cell), rule, doc)
         self.dimension = dimension
         self._X = self.coordinates(*"XYZ"[:dimension])
         self._at = self.point()
         self._values: dict[int, list[Any]] = {}
         self._along: list[tuple[list[Any], list[Any]]] = []
+
+    def _count_of_nodes(self, cell: Element) -> int:
+        """Nodes of one element."""
+        return len(cell.nodes)
 
     @abstractmethod
     def _slopes_of(self, component: Component, column: Sequence[Any]) -> list[Any]:

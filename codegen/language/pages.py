@@ -11,6 +11,7 @@ from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.cells import Element, element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import applied
+from softehl.codegen.language.facet import FACES, Facet, shape_of
 from softehl.codegen.language.fields import (
     AXISYMMETRIC,
     GEOMETRIES,
@@ -72,12 +73,16 @@ class Page:
     def definition(self, cell: str, geometry: str | None = None) -> Definition:
         """The model of an element of a cell, by its name, in a geometry (None: the usual one).
 
+        "quad4_interior" is a facet between two cells, "quad4_side" one with the cell beside it.
         It is a side where the geometry has one dimension more: quad4 of a solid, line2 in plane
         strain.
         """
-        kind = element(cell)
+        stem, _, facet = cell.partition("_")
+        kind = element(stem)
         chosen = geometry_of(kind.dimension, geometry)
         name = f"{self.name}_{cell}" + ("_axisymmetric" if chosen == AXISYMMETRIC else "")
+        if facet:
+            return self._on_facet(name, kind, chosen, facet)
         if space_of(chosen, kind.dimension) > kind.dimension:
             degree = self.degree or 2 * order_of(kind)
             side = Side(name, kind, chosen, rule_of(kind, degree), self.doc)
@@ -94,6 +99,16 @@ class Page:
         unroll = False if self.form == "point" else None
         at = None if self.form == "whole" else point
         return replace(whole.finish(), point=at, unroll=unroll)
+
+    def _on_facet(self, name: str, kind: Element, geometry: str, facet: str) -> Definition:
+        """On facets between two cells ("interior") or on those of a side ("side")."""
+        if facet not in ("interior", "side"):
+            raise PlaceError(f'no facet "{facet}" of {kind.name}: "interior" or "side"')
+        face = element(FACES[shape_of(kind)])
+        rule = rule_of(face, self.degree or 2 * order_of(kind))
+        made = Facet(name, kind, geometry, rule, self.doc, both=facet == "interior")
+        applied(self.name, self.write, made)
+        return replace(made.finish(), cell=f"{kind.name}_{facet}")
 
     def definitions(self, on: On) -> list[Definition]:
         """Its models on all cells that are wanted."""
@@ -124,7 +139,9 @@ class Page:
         if self.degree is not None:
             return rule_of(cell, self.degree)
         order = order_of(cell)
-        values = form is None or any(q.axis is None and q.component.order == order for q in form.unknowns)
+        values = form is None or any(
+            q.axis is None and q.component.order == order for q in form.unknowns
+        )
         short = cell.name.startswith(("line", "tri", "tet"))
         return rule_of(cell, 2 * order) if values and short else cell.rule
 

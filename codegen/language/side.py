@@ -17,6 +17,16 @@ from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.nodal import Nodal
 
 
+class NeedsTraces(ModelError):  # noqa: N818 (named after what it is)
+    """Error of a page that asks for what is known on facets of cells (cell="quad4_side"), not on faces alone."""
+
+    traces = True
+
+    def __init__(self, what: str) -> None:
+        words = 'on a side there are values of fields, no gradients, but with cell="quad4_side"'
+        super().__init__(f"{what}: {words}")
+
+
 class Side(Nodal):
     """Faces of a mesh, of one dimension less; slopes are those along the parent coordinates."""
 
@@ -56,8 +66,21 @@ class Side(Nodal):
         return area
 
     def grad(self, value: Any) -> Any:
-        """Refused: a side knows values alone."""
-        raise ModelError(f"grad of {value}: on a side there are values of fields, no gradients")
+        """Refused: faces alone know no gradients."""
+        raise NeedsTraces(f"grad of {value}")
+
+    @property
+    def size(self) -> Any:
+        """Refused likewise."""
+        raise NeedsTraces("m.size")
+
+    def jump(self, value: Any) -> Any:
+        """Refused likewise."""
+        raise NeedsTraces(f"m.jump({value})")
+
+    def average(self, value: Any) -> Any:
+        """Refused likewise."""
+        raise NeedsTraces(f"m.average({value})")
 
     def _derived(self, columns: Sequence[Sequence[Any]], parent: Sequence[Sequence[Any]]) -> Any:
         """Derivatives of nodal values by the parent coordinates, [component][direction]."""

@@ -39,7 +39,7 @@ class Whole(Nodal):
         return self._map.matrix
 
     def centroid(self, value: Any) -> Any:
-        """What a scalar, list or matrix is at the centroid of the parent cell."""
+        """Value of a scalar, list or matrix at the centroid of the parent cell."""
         linear = self._element(1) if self.order > 1 else self.cell
         middle = [sum(x) / sp.Integer(len(linear.nodes)) for x in zip(*linear.nodes, strict=True)]
         there = dict(zip(self._at, middle, strict=True))

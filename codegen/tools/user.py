@@ -31,6 +31,7 @@ from typing import Any
 
 from softehl.codegen.language import names
 from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.fields import Elsewhere
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
@@ -86,7 +87,7 @@ def _found(path: Path, on: On, *, by_itself: bool) -> list[Definition | Law]:
             )
         if not by_itself:
             entries = others if others and not on.materials else [law.page() for law in laws]
-        found = [d for entry in entries for d in _made(entry, on)]
+        found = _all_made(entries, on)
     if not found:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
     check_names(path.name, found)
@@ -183,6 +184,20 @@ def _makes_a_model(module: ModuleType, value: Any) -> bool:
     if isinstance(annotation, str):
         return annotation.strip("\"' ").rpartition(".")[2] == Definition.__name__
     return annotation is Definition
+
+
+def _all_made(entries: Iterable[Any], on: On) -> list[Definition | Law]:
+    """All models that stand there.  Raises Elsewhere where none of the pages does."""
+    found: list[Definition | Law] = []
+    refused: list[Elsewhere] = []
+    for entry in entries:
+        try:
+            found += _made(entry, on)
+        except Elsewhere as error:
+            refused.append(error)
+    if refused and not found:
+        raise refused[0]
+    return found
 
 
 def _made(entry: Any, on: On) -> list[Definition | Law]:

@@ -35,11 +35,12 @@ _PARDISO = 5.0
 def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callable[[], str]]:
     """A linear solver of that name, and a function that says which and why where size decides.
 
-    It condenses internal unknowns of elements. Raises StudyError for an unknown name or where multigrid cannot be used.
+    It condenses internal unknowns of elements. Raises StudyError for an unknown name or where
+    multigrid cannot be used.
     """
     groups = internal(system)
     found, note = _of_rest(system, linear, system.size - sum(g.size for g in groups))
-    return (Condensing(found, groups, system.size) if groups else found), note
+    return (Condensing(found, groups) if groups else found), note
 
 
 def internal(system: System) -> tuple[Integers, ...]:

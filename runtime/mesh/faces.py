@@ -7,10 +7,14 @@ import numpy as np
 from softehl.runtime.arrays import Flags, Integers
 
 
-def once(faces: Integers, corners: int) -> Integers:
-    """The rows whose corners, the first of their nodes, occur only once."""
+def once(faces: Integers, corners: int, origin: Integers | None = None) -> Integers:
+    """The rows whose corners, the first of their nodes, occur only once.
+
+    origin: number of each node, the same for copies of one.
+    """
+    known = faces if origin is None else origin[faces]
     _, first, count = np.unique(
-        np.sort(faces[:, :corners], axis=1), axis=0, return_index=True, return_counts=True
+        np.sort(known[:, :corners], axis=1), axis=0, return_index=True, return_counts=True
     )
     return np.ascontiguousarray(faces[np.sort(first[count == 1])])
 

@@ -42,13 +42,15 @@ class Mesh:
 
     points: (n, dim) places of the nodes. cells: kind -> node numbers (m, k). groups: name -> kind
     -> numbers of cells of that kind. sides: name -> faces, in any order of their nodes; `faces`
-    gives them from outside counterclockwise.
+    gives them from outside counterclockwise. numbers: (n,) nodes with the same number are at one
+    place of which every cell has its own copy; None: there are no copies.
     """
 
     points: Array
     cells: Mapping[str, Integers]
     groups: Mapping[str, Mapping[str, Integers]] = field(default_factory=dict)
     sides: Mapping[str, Faces] = field(default_factory=dict)
+    numbers: Integers | None = None
 
     def __post_init__(self) -> None:
         """Raises MeshError for an unknown kind of cell or a wrong number of nodes."""
@@ -165,12 +167,26 @@ class Mesh:
             raise MeshError(f"group {name!r}: the predicate chooses no cell")
         return replace(self, groups={**self.groups, name: chosen})
 
+    def split(self) -> Mesh:
+        """The mesh with nodes of its own for every cell, so that fields may jump between them.
+
+        on="interior" of `Study.add` finds the facets at which they meet.
+        """
+        from softehl.runtime.mesh.facets import split
+
+        return split(self)
+
     # looking at it ------------------------------------------------------------------------------
 
     @property
     def dimension(self) -> int:
         """Number of coordinates."""
         return int(self.points.shape[1])
+
+    @property
+    def origin(self) -> Integers:
+        """(n,) the same number for all copies of a node; see `split`."""
+        return np.arange(len(self.points)) if self.numbers is None else self.numbers
 
     @cached_property
     def boundary(self) -> Faces:
@@ -179,7 +195,10 @@ class Mesh:
         for kind, nodes in self.cells.items():
             for face, local in CELLS[kind].side_nodes:
                 found.setdefault(face.name, []).append(nodes[:, list(local)])
-        return {k: once(np.concatenate(parts), CELLS[k].corners) for k, parts in found.items()}
+        copies = self.numbers
+        return {
+            k: once(np.concatenate(parts), CELLS[k].corners, copies) for k, parts in found.items()
+        }
 
     def faces(self, where: str | Predicate) -> Faces:
         """Faces of a named side, or those of the boundary all of whose nodes are meant.

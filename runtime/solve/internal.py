@@ -8,13 +8,12 @@ from the others, K_II^-1 (r_I - K_IE x_E). This is exact: a step is that of the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse import bsr_array, csc_array, csr_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.solve.held import Judging
+from softehl.runtime.solve.held import Judging, loosest
 from softehl.runtime.solve.linear import Factors, LinearSolver, SingularMatrix, SparseMatrix
 
 _SYMMETRIC = 1e-8  # of the largest entry
@@ -24,29 +23,28 @@ _SYMMETRIC = 1e-8  # of the largest entry
 class Condensing:
     """A linear solver of what is left when internal unknowns are eliminated.
 
-    groups: (n, k) numbers of the internal unknowns of n like elements. size: of all unknowns.
+    groups: (n, k) numbers of the internal unknowns of n like elements. A matrix may have rows
+    beyond those of the problem, as paths by arc length do.
     """
 
     solver: LinearSolver
     groups: tuple[Integers, ...]
-    size: int
 
     @property
     def name(self) -> str:
         """See `LinearSolver`."""
         return self.solver.name
 
-    @cached_property
-    def external(self) -> Integers:
-        """All other unknowns, rising."""
-        kept: Flags = np.ones(self.size, dtype=bool)
+    def external(self, size: int) -> Integers:
+        """All other unknowns of so many, rising."""
+        kept: Flags = np.ones(size, dtype=bool)
         for group in self.groups:
             kept[group] = False
         return np.flatnonzero(kept)
 
     def factorise(self, K: SparseMatrix) -> Eliminated:
         """Factors of K, (n, n); raises SingularMatrix, also where internal unknowns are loose."""
-        rows, parts, E = csr_array(K), [], self.external
+        rows, parts, E = csr_array(K), [], self.external(K.shape[0])
         S = rows[E][:, E]
         for group in self.groups:
             inner = group.ravel()
@@ -100,15 +98,10 @@ class Eliminated:
 
     def loosest(self) -> int | None:
         """See `solve.held.Judging`: what K_II admits is regular, so the rest decides."""
-        if isinstance(self.rest, Judging):
-            number = self.rest.loosest()
-        else:
-            number = self._loose()
+        number = self.rest.loosest() if isinstance(self.rest, Judging) else self._loose()
         return None if number is None else int(self.external[number])
 
     def _loose(self) -> int | None:
-        from softehl.runtime.solve.held import loosest
-
         matrix = getattr(self.rest, "matrix", None)
         return None if matrix is None else loosest(matrix, self.rest)
 
@@ -130,11 +123,13 @@ def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, Array | None]:
     except np.linalg.LinAlgError:
         inverse = np.full_like(blocks, np.nan)
     if not np.isfinite(inverse).all():
-        bad = int(np.argmin(np.abs(np.linalg.det(blocks / np.maximum(sizes, 1e-300)[:, None, None]))))
+        bad = int(
+            np.argmin(np.abs(np.linalg.det(blocks / np.maximum(sizes, 1e-300)[:, None, None])))
+        )
         row = int(group[bad, 0])
         raise SingularMatrix(f"internal unknowns of element {bad} cannot be eliminated", row)
     uneven = np.abs(blocks - np.swapaxes(blocks, 1, 2)).max(initial=0.0)
     even = uneven <= _SYMMETRIC * sizes.max(initial=0.0)
-    signs = np.linalg.eigvalsh(blocks).ravel() if even else None
+    signs = np.asarray(np.linalg.eigvalsh(blocks)).reshape(-1) if even else None
     where = np.arange(n)
     return bsr_array((inverse, where, np.arange(n + 1)), shape=(n * k, n * k)), signs

@@ -11,6 +11,8 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.unknowns import Slot, slots
 from softehl.runtime.kernels import Kernel
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.facets import beside, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.statement.given import datum, known, parameter
 from softehl.runtime.statement.records import Block, StudyError
@@ -30,10 +32,27 @@ def kinds_of(mesh: Mesh, on: str | Predicate | None, cells: str | None) -> tuple
     """The kinds of cells or faces that are meant."""
     if on is None:
         return tuple(mesh.cells_of(cells))
+    if on == "interior" and on not in mesh.sides:
+        return tuple(f"{kind}_interior" for kind in mesh.cells)
     try:
         return tuple(mesh.faces(on))
     except MeshError:
         return ()  # nodes without faces: for a page of one node
+
+
+def wants_traces(error: BaseException | None) -> bool:
+    """True where a page could not be read because it needs the cells beside a side."""
+    while error is not None:
+        if getattr(error, "traces", False):
+            return True
+        error = error.__cause__
+    return False
+
+
+def beside_of(mesh: Mesh, on: str | Predicate) -> tuple[str, ...]:
+    """Kinds of facets of a side with the cells beside it, of those cells that have faces there."""
+    there = mesh.outer_faces(on)
+    return tuple(f"{k}_side" for k in mesh.cells if there.keys() & set(CELLS[k].faces))
 
 
 def elements_of(
@@ -44,6 +63,15 @@ def elements_of(
         raise StudyError(f"{name!r}: give cells=... or on=..., not both")
     if on is not None and kernel.nodes == 1:
         return "point1", mesh.nodes(on)[:, None]
+    stem, _, facet = kernel.cell.partition("_")
+    if facet and (on is None or stem not in mesh.cells):
+        raise StudyError(
+            f'{name!r}: {kernel.name} stands on facets of {stem}: on="interior" or on=a side'
+        )
+    if facet:
+        assert on is not None
+        nodes = interior(mesh, stem) if facet == "interior" else beside(mesh, on, stem)
+        return CELLS[stem].side_nodes[0][0].name, nodes
     there = _faces(mesh, on, kernel) if on is not None else mesh.cells_of(cells)
     if kernel.cell in there:
         return kernel.cell, there[kernel.cell]
@@ -87,7 +115,8 @@ def page_on(
     if missing:
         hint = "; where t is the time or load factor, give t=lambda t: t" if "t" in missing else ""
         raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}{hint}")
-    centres = mesh.points[nodes].mean(axis=1)
+    own = facet_nodes(kernel)
+    centres = mesh.points[nodes if own is None else nodes[:, own]].mean(axis=1)
     data = {d: datum(name, d, given[d], centres) for d in kernel.data if d in given}
     return Block(
         name=name,
@@ -103,6 +132,12 @@ def page_on(
         initial=_initial(name, kernel, given, centres),
         parameters={p: parameter(name, p, given[p]) for p in kernel.parameters if p in given},
     )
+
+
+def facet_nodes(kernel: Kernel) -> Integers | None:
+    """Nodes on the facet, of the elements of a page on facets; None on cells and sides."""
+    stem, _, facet = kernel.cell.partition("_")
+    return np.array(CELLS[stem].side_nodes[0][1]) if facet else None
 
 
 def _require_fit(mesh: Mesh, kernel: Kernel) -> None:
