@@ -229,7 +229,7 @@ class Study(Fitted):
         depth: float | None = None,
     ) -> None:
         """Contact of two sides of deformable bodies, which may slide far; of one side with itself
-        where there is no other; in 3-D of two sides without friction.
+        where there is no other.
 
         side: which has the pressure as an unknown, the finer or the softer one; `fields(name)` has
         its pressure and shear stress. friction: Coulomb's coefficient. of: displacements, u_x and
