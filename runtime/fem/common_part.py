@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.mesh.cells import Cell
+from softehl.runtime.mesh.cells import CELLS, Cell
 
 CORNER = 12
 """Numbers that tell a corner: xi (2), A (2, 2) by columns, eta (2), B (2, 2) by columns."""
@@ -87,8 +87,6 @@ def mean_normal(cell: Cell, corners: Array) -> Array:
 
 
 def _linear(cell: Cell) -> Cell:
-    from softehl.runtime.mesh.cells import CELLS
-
     return CELLS["tri3" if cell.corners == 3 else "quad4"]
 
 
@@ -123,8 +121,8 @@ def _crossings(S: Array, M: Array) -> tuple[Array, Array, Flags]:
     beta = (off[..., 0] * e[..., 1] - off[..., 1] * e[..., 0]) / det
     for share in (alpha, beta):
         apart &= (share > _ON) & (share < 1.0 - _ON)
-    found = (np.where(apart, v, 0.0).reshape(n, a * b) for v in (alpha, beta))
-    return *found, apart.reshape(n, a * b)  # type: ignore[return-value]
+    alpha, beta = (np.where(apart, v, 0.0).reshape(n, a * b) for v in (alpha, beta))
+    return alpha, beta, apart.reshape(n, a * b)
 
 
 def _once(points: Array, valid: Flags, S: Array) -> Flags:

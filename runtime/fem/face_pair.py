@@ -132,12 +132,12 @@ class _Places:
     @property
     def nodes(self) -> int:
         """Of both faces."""
-        return self.x.shape[1]
+        return int(self.x.shape[1])
 
     @property
     def ndof(self) -> int:
         """Unknowns of an element."""
-        return 3 * self.nodes + MULTIPLIERS * self.multipliers.shape[1]
+        return 3 * self.nodes + MULTIPLIERS * int(self.multipliers.shape[1])
 
     def points(self) -> Iterator[tuple[_Varied, _Point]]:
         """Weights and points of the rule of a triangle."""
@@ -265,9 +265,9 @@ class _Places:
         eta = np.tile(other.nodes[: other.corners].mean(axis=0), (len(self.x), 1))
         theirs, still = slice(k, None), np.zeros((len(eta), 2, self.ndof))
         for _ in range(_ITERATIONS):
-            y = self._held(other, self.x[:, theirs], (eta, still))[0]
+            there = self._held(other, self.x[:, theirs], (eta, still))[0]
             K = -np.einsum("nkd,nkc->ncd", other.gradient(eta), self.x[:, theirs])
-            step = _solved(K, normal[0], y - x[0])[:, :2]
+            step = _solved(K, normal[0], there - x[0])[:, :2]
             eta = eta + np.clip(step, -2.0, 2.0)
             if np.abs(step).max(initial=0.0) < 1e-14:
                 break
@@ -284,10 +284,13 @@ def _along(K: Array, off: _Varied, normal: _Varied) -> _Varied:
 
 
 def _solved(K: Array, n: Array, right: Array) -> Array:
-    """Solution (n, 3, ...) of the columns of K (n, 3, 2) and n (n, 3)."""
+    """Solution (n, 3, ...) of the columns of K (n, 3, 2) and n (n, 3); nan if any is singular."""
     whole = np.concatenate([K, n[:, :, None]], axis=2)
     flat = right.ndim == 2
-    found = np.linalg.solve(whole, right[:, :, None] if flat else right)
+    try:
+        found = np.linalg.solve(whole, right[:, :, None] if flat else right)
+    except np.linalg.LinAlgError:
+        return np.full(right.shape, np.nan)
     return np.asarray(found[:, :, 0] if flat else found)
 
 
@@ -298,12 +301,12 @@ def _shapes(cell: Cell, at: _Varied) -> _Varied:
 
 def _gradients(cell: Cell, at: _Varied) -> _Varied:
     """Their derivatives (n, k, 2); differences are exact, they are at most quadratic."""
-    change = 0.0
+    change = np.zeros((*at[0].shape[:1], len(cell.nodes), 2, at[1].shape[2]))
     for d in (0, 1):
         h = 0.5 * np.eye(2)[d]
         second = cell.gradient(at[0] + h) - cell.gradient(at[0] - h)
-        change = change + second[:, :, :, None] * at[1][:, None, None, d]
-    return cell.gradient(at[0]), np.asarray(change)
+        change += second[:, :, :, None] * at[1][:, None, None, d]
+    return cell.gradient(at[0]), change
 
 
 def _corners(cell: Cell) -> Cell:
