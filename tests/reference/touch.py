@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from tests.reference.differentiate import Matrix, Number, Vector, jacobian, mp, mpf
@@ -81,12 +81,12 @@ def fields_side(
 
 
 SIDES = {f"touch_side_{a}": a for a in (3, 4)}
-RESIDUALS: dict[str, Callable[..., Vector]] = {
-    "touch": residual_point,
+RESIDUALS = {
+    "touch": partial(residual_point),
     **{name: partial(residual_side, a) for name, a in SIDES.items()},
 }
-TANGENTS: dict[str, Callable[..., Matrix]] = {
-    "touch": tangent_point,
+TANGENTS = {
+    "touch": partial(tangent_point),
     **{name: partial(tangent_side, a) for name, a in SIDES.items()},
 }
 FIELDS = {name: partial(fields_side, a) for name, a in SIDES.items()}
