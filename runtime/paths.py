@@ -126,10 +126,11 @@ class Paths:
                 raise StudyError(f"{name} = {value}: must be positive")
         if start is not None and restart is not None:
             raise StudyError("start and restart: give one of them, a result or a checkpoint")
-        where = engine_of(engine, linear)
         if method in METHODS:
             refused = {"tolerance": tolerance, "checkpoint": checkpoint, "restart": restart}
             require_none(method, {**refused, "engine": None if engine == "serial" else engine})
+        where = engine_of(engine, linear)
+        if method in METHODS:
             system = where.spread(self.system())
             motions = Motions(method, dt, where.newton(system, newton), mass, velocity, rho_inf)
             told = Telling(progress, True, "t", 0.0 if start is None else start.t, note_of(where))
