@@ -824,56 +824,14 @@ void softehl_mortar_side_3_fields(
     const double *direction,
     const double *rule, const double *basis,
     double *values, double *tangent);
-void softehl_touch_33_residual(
+void softehl_touch_residual(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *coordinates, const double *dofs,
     const double *data, const double *parameters,
     const double *direction,
     const double *rule, const double *basis,
     double *values, double *tangent);
-void softehl_touch_33_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_34_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_34_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_43_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_43_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_44_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_44_tangent(
+void softehl_touch_tangent(
     ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
     const double *coordinates, const double *dofs,
     const double *data, const double *parameters,

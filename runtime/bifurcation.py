@@ -87,8 +87,8 @@ class Detector:
             if not self.blind:
                 self.blind = True
                 warnings.warn(
-                    f"no symmetric, regular tangent at load factor {after.t:.4g} (friction, contact, "
-                    "follower loads): bifurcations of such a path are not seen",
+                    f"no symmetric, regular tangent at load factor {after.t:.4g} (friction, "
+                    "contact, follower loads): bifurcations of such a path are not seen",
                     Blind,
                     stacklevel=2,
                 )

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.fem.face_pair import FacePair
 from softehl.runtime.fem.touching import Contact, Side
 from softehl.runtime.fem.touching_faces import FaceContact
 from softehl.runtime.fem.unknowns import Numbering
@@ -44,9 +45,6 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyC
             depth = np.full(len(reach), touch.depth)
         sides.append(Side(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
     kinds = [(s.kind, other) for s in sides for other, _ in touch.others]
-    nodes = {kind: len(CELLS[kind].nodes) for pair in kinds for kind in pair}
-    flat = mesh.dimension == 2
-    family = "mortar" if flat else "touch"
     unknowns = [touch.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
     given = (
         touch.name,
@@ -55,11 +53,14 @@ def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyC
         np.stack([numbering.nodal[n] for n in unknowns], axis=1),
         tuple(sides),
         touch.others,
-        {(a, b): load_kernel(f"{family}_{nodes[a]}{nodes[b]}") for a, b in kinds},
     )
-    if not flat:
-        return FaceContact(*given)
-    return Contact(*given, touch.friction, touch.ring, touch.alone)
+    if mesh.dimension == 3:
+        law = load_kernel("touch")
+        pairs = {(a, b): FacePair(law, CELLS[a], CELLS[b]) for a, b in kinds}
+        return FaceContact(*given, pairs, touch.friction, touch.alone)
+    nodes = {kind: len(CELLS[kind].nodes) for pair in kinds for kind in pair}
+    kernels = {(a, b): load_kernel(f"mortar_{nodes[a]}{nodes[b]}") for a, b in kinds}
+    return Contact(*given, kernels, touch.friction, touch.ring, touch.alone)
 
 
 def _require_displacements(statement: Statement, touch: Touch) -> None:

@@ -227,9 +227,9 @@ FAULTS = (
         "tests/runtime/test_touching.py",
     ),
     Fault(
-        "runtime/fem/touching_faces.py",
-        "facing < FACING) & (start[:, 2] < side.reach[one])",
-        "facing < FACING) & (start[:, 2] > side.reach[one])",
+        "runtime/fem/face_pair.py",
+        "change = off[1] - w[:, 2, None, None] * normal[1]",
+        "change = off[1] + w[:, 2, None, None] * normal[1]",
         "tests/runtime/test_touching_faces.py",
     ),
     Fault(

@@ -48,7 +48,7 @@ ORDER = {
             "begin bifurcation fit",
             "held watch engines",
         ),
-        *("follow load march buckling periodic", "dynamics", "study"),
+        *("follow load march buckling periodic", "dynamics", "paths", "study"),
     ),
     "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "app", "cli document"),
     "cases/seal": (

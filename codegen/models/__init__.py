@@ -53,7 +53,7 @@ ALL: dict[str, Callable[[], Definition]] = {
     "contact_corner": contact.corner,
     **{f"mortar_{a}{b}": partial(mortar.pair, a, b) for a in (2, 3) for b in (2, 3)},
     **{f"mortar_side_{a}": partial(mortar.side, a) for a in (2, 3)},
-    **{f"touch_{a}{b}": partial(touch.point, a, b) for a in (3, 4) for b in (3, 4)},
+    "touch": touch.touch,
     **{f"touch_side_{a}": partial(touch.face, a) for a in (3, 4)},
     "film": film.reynolds_segment,
     "film_upwind": film.bubble_load,

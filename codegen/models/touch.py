@@ -1,4 +1,4 @@
-"""Contact of two deformable faces in space: a point of a face against its partner."""
+"""Contact of two deformable faces in space: mortar integrals over their common part."""
 
 from __future__ import annotations
 
@@ -12,104 +12,81 @@ from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.shapes import interpolate, quad4, quad4_gradient
 from softehl.codegen.language.model import Model
 
+_AXES = ((0, "x"), (1, "y"), (2, "z"))
 _Columns = Sequence[Sequence[Any]]
 
 
-def point(nodes: int, others: int) -> Definition:
-    """Points of a face against one face of another side: pressure by an augmented Lagrangian.
+def touch() -> Definition:
+    """A point of a face and its partner on another face: pressure and shear stress.
 
-    The first `nodes` are those of the face, which has the multiplier lambda at its nodes; then
-    come those of the other. The partner of a point is where the line along its normal n meets the
-    other face, at the distance g: one Newton step from the parent coordinates and the distance
-    that are given, which leaves nothing where these are exact, and gives their derivatives. The
-    pressure p = max(0, lambda - rho g) acts along n, and lambda is its mean (Poulios and Renard
-    2015).
+    apart: from the point to its partner. slope_a, slope_b: of the face along its parent
+    coordinates, so that n is its normal; came: motion of the partner against the point since the
+    step before. With g = apart n, p is max(0, lambda - rho g); tau' is tau + rho came along the
+    face, cut off at the length friction p. The stress p n + tau' acts on the partner, its opposite
+    on the point; lambda and tau are the means of p and tau' (Poulios and Renard 2015).
     """
-    name, doc = f"touch_{nodes}{others}", point.__doc__ or ""
-    m = Model(name, nodes=nodes + others, rule=_rule(nodes), unroll=False, doc=doc)
-    X = m.coordinates("X", "Y", "Z")
-    u = m.nodal_unknowns("u_x", "u_y", "u_z")
-    (t,) = m.nodal_unknowns("lambda", nodes=nodes)
-    rho, xi, eta, apart = m.data(
+    m = Model("touch", nodes=1, rule=quadrature.point_rule(), doc=touch.__doc__ or "")
+    names = [f"{v}_{c}" for v in ("apart", "slope_a", "slope_b", "came") for _, c in _AXES]
+    at = [m.unknown(name) for name in (*names, "lambda", "tau_x", "tau_y", "tau_z")]
+    r, a, b, came, (lam, *tau) = at[:3], at[3:6], at[6:9], at[9:12], at[12:]
+    rho, friction, depth, reach = m.data(
         rho="augmentation parameter [MPa/mm]",
-        xi_start="first parent coordinate of the partner, nearly",
-        eta_start="second parent coordinate of the partner, nearly",
-        apart="distance of the partner, nearly [mm]",
+        friction="coefficient of friction",
+        depth="largest penetration that counts [mm]",
+        reach="largest gap that counts [mm]",
     )
-    x = _moved(X, u)
-    at_point = m.point()
-    N, n = _shape(nodes, *at_point), _normal(m, [c[:nodes] for c in x], at_point)
-    at = [m.define(f"at_{k}", interpolate(N, x[k][:nodes]), interface=True) for k in range(3)]
-    M, gap = _partner(m, [c[nodes:] for c in x], at, n, (xi, eta, apart))
-    trial = m.define("trial", interpolate(N, t) - rho * gap)
-    p = m.define("p", sp.Piecewise((trial, trial >= 0), (0, True)), interface=True)
-    area = m.define("area", _area([c[:nodes] for c in X], at_point))
-    shares = [*N, *(-v for v in M)]
-    T = [m.define(f"T_{k}", area * p * n[k], interface=True) for k in range(3)]
+    across = [m.define(f"across_{k}", v) for k, v in enumerate(_cross(a, b))]
+    length = m.define("length", sp.sqrt(_dot(across, across)))
+    n = [m.define(f"n_{c}", across[k] / length) for k, c in _AXES]
+    gap = m.define("gap", _dot(r, n))
+    # where nothing decides, at the start, sides touch and stick
+    trial = m.define("trial", lam - rho * gap)
+    near = sp.Piecewise((trial, (gap - reach) * (gap + depth) < 0), (0, True))
+    p = m.define("p", sp.Piecewise((near, trial >= 0), (0, True)))
+    whole = [m.define(f"stick_{c}", tau[k] + rho * came[k]) for k, c in _AXES]
+    off = m.define("stick_n", _dot(whole, n))
+    along = [m.define(f"along_{c}", whole[k] - off * n[k]) for k, c in _AXES]
+    square, limit = m.define("square", _dot(along, along)), m.define("limit", friction * p)
+    slides = square > limit**2
+    size = sp.sqrt(sp.Piecewise((square, slides), (1, True)))
+    share = m.define("share", sp.Piecewise((limit / size, slides), (1, friction > 0), (0, True)))
+    q = [
+        m.define(f"q_{c}", sp.Piecewise((share * along[k], trial >= 0), (0, True)))
+        for k, c in _AXES
+    ]
     m.weak_form(
         [
-            *((T[k] * v, u[k][a]) for k in range(3) for a, v in enumerate(shares)),
-            *((area * p * v / rho, t[a]) for a, v in enumerate(N)),
+            *((p * n[k] + q[k], r[k]) for k, _ in _AXES),
+            (p / rho, lam),
+            *((q[k] / rho, tau[k]) for k, _ in _AXES),
         ]
     )
     return m.finish()
 
 
 def face(nodes: int) -> Definition:
-    """The whole face of `point`: its multiplier where nothing meets it, and what it means.
+    """The whole face of `touch`: its multipliers where nothing meets it, and what they mean.
 
-    lambda is per reference area; the fields are per deformed area, and `area` is that of a
-    quadrature point: sum(pressure * area) is the force.
+    lambda and tau are per reference area; the fields are per deformed area, and `area` is that of
+    a quadrature point: sum(pressure * area) is the force.
     """
     name, doc = f"touch_side_{nodes}", face.__doc__ or ""
-    m = Model(name, nodes=nodes, rule=_rule(nodes), unroll=False, doc=doc)
+    rule = quadrature.triangle(4) if nodes == 3 else quadrature.gauss(3, 2)
+    m = Model(name, nodes=nodes, rule=rule, unroll=False, doc=doc)
     X = m.coordinates("X", "Y", "Z")
     u = m.nodal_unknowns("u_x", "u_y", "u_z", idle=("u_x", "u_y", "u_z"))
-    (lam,) = m.nodal_unknowns("lambda", nodes=nodes)
+    multipliers = m.nodal_unknowns("lambda", "tau_x", "tau_y", "tau_z", nodes=nodes)
     (rho,) = m.data(rho="augmentation parameter [MPa/mm]")
     at, x = m.point(), _moved(X, u)
     N = _shape(nodes, *at)
     area, now = m.define("area", _area(X, at)), m.define("area_now", _area(x, at))
-    p = m.define("p", interpolate(N, lam))
-    m.weak_form([(-area * p * v / rho, lam[a]) for a, v in enumerate(N)])
-    m.fields(pressure=p * area / now)
-    m.fields(**{c: interpolate(N, x[k]) for k, c in enumerate("xyz")}, area=now * m.weight)
+    values = [m.define(f"value_{k}", interpolate(N, v)) for k, v in enumerate(multipliers)]
+    pairs = zip(values, multipliers, strict=True)
+    m.weak_form([(-area * p * v / rho, t[a]) for p, t in pairs for a, v in enumerate(N)])
+    names = ("pressure", *(f"shear_{c}" for _, c in _AXES))
+    m.fields(**{name: v * area / now for name, v in zip(names, values, strict=True)})
+    m.fields(**{c: interpolate(N, x[k]) for k, c in _AXES}, area=now * m.weight)
     return m.finish()
-
-
-def _partner(
-    m: Model, other: _Columns, at: Sequence[Any], n: Sequence[Any], start: tuple[Any, Any, Any]
-) -> tuple[list[Any], Any]:
-    """Shape functions of the partner and its distance, by a Newton step from the start."""
-    xi, eta, apart = start
-    count = len(other[0])
-    place = [interpolate(_shape(count, xi, eta), c) for c in other]
-    place = [m.define(f"there_{k}", place[k]) for k in range(3)]
-    a, b = (
-        [m.define(f"{s}_{k}", v[k]) for k in range(3)]
-        for s, v in zip("ab", _slopes(other, (xi, eta)), strict=True)
-    )
-    off = [m.define(f"off_{k}", at[k] + apart * n[k] - place[k]) for k in range(3)]
-    # a dxi + b deta - n dg = off, by Cramer's rule
-    facing = m.define("facing", _dot(_cross(a, b), n))
-    first = m.define("xi_there", xi + _dot(_cross(off, b), n) / facing, interface=True)
-    second = m.define("eta_there", eta + _dot(_cross(a, off), n) / facing, interface=True)
-    gap = m.define("gap", apart - _dot(_cross(a, b), off) / facing, interface=True)
-    return _shape(count, first, second), gap
-
-
-def _normal(m: Model, x: _Columns, at: Sequence[Any]) -> list[Any]:
-    """Unit normal out of the body of a face whose nodes go round counterclockwise from outside."""
-    a, b = _slopes(x, at)
-    a = [m.define(f"slope_a_{k}", a[k]) for k in range(3)]
-    b = [m.define(f"slope_b_{k}", b[k]) for k in range(3)]
-    across = [m.define(f"across_{k}", v) for k, v in enumerate(_cross(a, b))]
-    length = m.define("length", sp.sqrt(_dot(across, across)))
-    return [m.define(f"n_{k}", across[k] / length, interface=True) for k in range(3)]
-
-
-def _rule(nodes: int) -> quadrature.QuadratureRule:
-    return quadrature.triangle(4) if nodes == 3 else quadrature.gauss(3, 2)
 
 
 def _shape(nodes: int, xi: Any, eta: Any) -> list[Any]:

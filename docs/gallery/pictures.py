@@ -448,6 +448,33 @@ def swing(figure: Figure, space: dict[str, Any]) -> None:
     right.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=7)
 
 
+def laminate(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.2])
+    result = space["sheared"].result
+    mesh, places = result.system.mesh, result.deformed(("u_x", "u_y"))
+    for name in ("stiff", "soft"):
+        drawn = draw_cells(
+            left,
+            places,
+            mesh.cells_of(name)["quad4"],
+            result.fields(name)["W"].mean(axis=1),
+            cmap="viridis",
+            clim=(0.0, 0.3),
+        )
+    left.autoscale_view()
+    figure.colorbar(drawn, ax=left, label="energy per volume [MPa]", shrink=0.85)
+    shares = np.linspace(0.0, 1.0, 60)
+    exact = np.array([space["backus"](s) for s in shares])
+    there = np.array([0.1, 0.25, 0.5, 0.75, 0.9])
+    found = [space["moduli"](space["laminate"](s).solve(np.eye(2)).A) for s in there]
+    for k, name in enumerate(("xxxx", "xxyy", "yyyy", "xyxy")):
+        (line,) = right.plot(shares, exact[:, k], lw=1, label=f"$A_{{{name}}}$")
+        right.plot(there, np.array(found)[:, k], "o", color=line.get_color())
+    right.set_xlabel("share of stiff layers")
+    right.set_ylabel("MPa")
+    right.legend()
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
@@ -465,6 +492,7 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "contact": contact,
     "column": column,
     "swing": swing,
+    "laminate": laminate,
 }
 
 if __name__ == "__main__":

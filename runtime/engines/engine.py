@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from softehl.runtime.engines.sizes import Linear, linear_solver
@@ -20,8 +20,8 @@ class Engine(Protocol):
         """The part of the equations that this process has; see `runtime.share`."""
         ...
 
-    def newton(self, given: Newton | None) -> Newton:
-        """Newton's method as it was asked for, on the engine's linear solver; after `spread`."""
+    def newton(self, system: System, given: Newton | None) -> Newton:
+        """Newton's method as it was asked for, on the linear solver for what `spread` gave."""
         ...
 
 
@@ -38,21 +38,18 @@ class Serial:
 
     linear: Linear = "auto"
     note: Callable[[], str] = str
-    _system: System | None = field(default=None, init=False, repr=False)
 
     def spread(self, system: System) -> System:
         """See `Engine`."""
-        self._system = system
         return system
 
-    def newton(self, given: Newton | None) -> Newton:
+    def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""
         if given is not None and self.linear != "auto":
             raise StudyError("newton and linear: give one of them, newton has a linear solver")
         if given is not None:
             return given
-        assert self._system is not None
-        solver, self.note = linear_solver(self._system, self.linear)
+        solver, self.note = linear_solver(system, self.linear)
         return Newton(linear=Kept(solver))
 
 

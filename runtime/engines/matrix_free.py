@@ -61,7 +61,7 @@ class MatrixFree:
         iteration = Iteration(self.tolerance, self.most, self.iterations)
         return replace(system, share=_Alone(levels, iteration))
 
-    def newton(self, given: Newton | None) -> Newton:
+    def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""
         return replace(given or Newton(), linear=Iterative())
 

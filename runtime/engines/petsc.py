@@ -53,7 +53,7 @@ class Petsc:
         team = Team(part, exchange, cut.interleaved, solver)
         return replace(part.system, share=Processes(team))
 
-    def newton(self, given: Newton | None) -> Newton:
+    def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""
         return replace(given or Newton(), linear=Distributed())
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -67,7 +67,7 @@ class Contact:
     def blocks(self, x: Array, old: Array) -> list[ElementBlock]:
         """Elements of the pairs at unknowns x; old: those of the step before."""
         one, other = self.pairs(x)
-        mine, theirs = _starts([s.faces for s in self.sides]), _starts([f for _, f in self.others])
+        mine, theirs = starts([s.faces for s in self.sides]), starts([f for _, f in self.others])
         kind, kind_of_other = (
             np.searchsorted(s, k, side="right") - 1 for s, k in ((mine, one), (theirs, other))
         )
@@ -85,15 +85,8 @@ class Contact:
         places = self.points + moved
         mine = np.concatenate([s.faces[:, :2] for s in self.sides])
         theirs = np.concatenate([faces[:, :2] for _, faces in self.others])
-        depth, reach = (np.concatenate([getattr(s, n) for s in self.sides]) for n in _LIMITS)
-        centre, radius, along = _balls(places[mine])
-        far, size, against = _balls(places[theirs])
-        tree = cKDTree(far)
-        nearest = SLANTED * tree.query(centre)[0]
-        reach = radius + size.max() + np.maximum(reach, np.minimum(depth, nearest))
-        one, other = within(tree, centre, reach)
-        kept = np.einsum("nc,nc->n", along[one], against[other]) < FACING
-        kept &= (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
+        one, other = facing(_balls(places[mine]), _balls(places[theirs]), limits(self.sides))
+        kept = (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
         if self.alone:
             kept &= one < other
         return one[kept], other[kept]
@@ -132,15 +125,34 @@ def within(tree: cKDTree, places: Array, radius: Array) -> tuple[Integers, Integ
     return one, np.concatenate([np.empty(0, dtype=np.int64), *found]).astype(np.int64)
 
 
-_LIMITS = ("depth", "reach")
+Balls: TypeAlias = tuple[Array, Array, Array]
+"""Centres (n, dim), radii (n,) of faces, and directions (n, dim) that are opposite in contact."""
 
 
-def _starts(parts: Sequence[Integers]) -> Integers:
+def facing(mine: Balls, theirs: Balls, limits: tuple[Array, Array]) -> tuple[Integers, Integers]:
+    """Pairs of faces that look at each other and are near enough to meet."""
+    (centre, radius, along), (far, size, against), (depth, reach) = mine, theirs, limits
+    tree = cKDTree(far)
+    nearest = SLANTED * tree.query(centre)[0]
+    one, other = within(
+        tree, centre, radius + size.max() + np.maximum(reach, np.minimum(depth, nearest))
+    )
+    kept = np.einsum("nc,nc->n", along[one], against[other]) < FACING
+    return one[kept], other[kept]
+
+
+def limits(sides: Sequence[Side]) -> tuple[Array, Array]:
+    """Depth and reach of the faces of all kinds."""
+    depth, reach = (np.concatenate([getattr(s, n) for s in sides]) for n in ("depth", "reach"))
+    return depth, reach
+
+
+def starts(parts: Sequence[Integers]) -> Integers:
     """Numbers of the first row of each part, counted through all."""
     return np.cumsum([0, *map(len, parts)])[:-1]
 
 
-def _balls(ends: Array) -> tuple[Array, Array, Array]:
+def _balls(ends: Array) -> Balls:
     """Centres (n, 2), radii (n,) and unit directions (n, 2) of segments with ends (n, 2, 2)."""
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.mesh import Faces
 
+_ASKEW = np.array([0.2, 0.5, 0.84])
 _OPPOSITE, _BENEATH = -0.5, 0.5  # cosines: which faces look the other way, and lie below
 
 
@@ -58,6 +59,14 @@ def in_chains(lines: Integers) -> Integers:
             order[k] = None
             k = at.get(int(lines[k, 1]))
     return np.asarray(lines[list(order)])
+
+
+def by_normals(points: Array, faces: Integers) -> Integers:
+    """Faces (n, k) in the order of their normals along a direction that no mesh is built along:
+    two that face each other are far apart in it, neighbours are not.
+    """
+    normals = _centres_and_normals(points, faces)[1]
+    return np.asarray(faces[np.argsort(normals @ _ASKEW, kind="stable")])
 
 
 def _centres_and_normals(points: Array, faces: Integers) -> tuple[Array, Array]:

@@ -10,12 +10,12 @@ from softehl.runtime.fem.unknowns import Slot
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, Predicate
-from softehl.runtime.mesh.thickness import in_chains
+from softehl.runtime.mesh.thickness import by_normals, in_chains
 from softehl.runtime.statement.given import finite
 from softehl.runtime.statement.pages import page_on
 from softehl.runtime.statement.records import Block, StudyError, shown
 
-MULTIPLIERS = {2: ("lambda", "tau"), 3: ("lambda",)}
+MULTIPLIERS = {2: ("lambda", "tau"), 3: ("lambda", "tau_x", "tau_y", "tau_z")}
 """Unknowns of a contact by the dimension of its mesh."""
 KINDS = {2: ("line2", "line3"), 3: ("tri3", "quad4")}
 """Faces that may touch."""
@@ -74,10 +74,8 @@ def touch(
             raise StudyError(
                 f"{words}: {kind} cannot touch; {' and '.join(KINDS[mesh.dimension])} can"
             )
-    if mesh.dimension == 3 and (alone or numbers["friction"]):
-        raise StudyError(f"{words}: in 3-D contact is of two sides, without friction")
     if alone:
-        mine = theirs = {kind: in_chains(faces) for kind, faces in mine.items()}
+        mine = theirs = {k: _in_order(mesh, faces) for k, faces in mine.items()}
     blocks = {}
     for kind, faces in mine.items():
         label = name if len(mine) == 1 else f"{name}:{kind}"
@@ -86,6 +84,13 @@ def touch(
     faces_of = (*theirs.items(),)
     found = Touch(name, (*blocks,), faces_of, names, friction or 0.0, ring, alone, stiffness, depth)
     return found, blocks
+
+
+def _in_order(mesh: Mesh, faces: Integers) -> Integers:
+    """Faces of a surface that meets itself: of two that face each other the first has the pressure,
+    and so its neighbours should have it.
+    """
+    return in_chains(faces) if mesh.dimension == 2 else by_normals(mesh.points, faces)
 
 
 def _block(

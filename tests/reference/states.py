@@ -216,26 +216,24 @@ def mortar_states() -> Iterator[State]:
 
 
 def touch_states() -> Iterator[State]:
-    """Two faces, turned: all points pressed, some of them, none; faces alone."""
+    """Points that stick, slip, are open or too deep, their face turned; faces alone."""
     corners = {3: UNIT[[0, 1, 2]], 4: UNIT}
     turn = np.linalg.qr(np.array([[1.0, 0.3, -0.2], [-0.1, 1.0, 0.4], [0.3, -0.2, 1.0]]))[0]
     turn *= np.sign(np.linalg.det(turn))
-    for a, b in ((3, 3), (3, 4), (4, 3), (4, 4)):
-        rng = np.random.default_rng(2015)
-        for label, gap, slope in (("pressed", -0.01, 0.0), ("tilted", 0.06, 0.3), ("open", 0.3, 0)):
-            side = np.column_stack([corners[a] * [1, -1], 0.02 * rng.uniform(-1, 1, a)])
-            other = np.column_stack([3 * corners[b], -gap + slope * corners[b][:, 0]])
-            other[:, 2] += 0.02 * rng.uniform(-1, 1, b)
-            now = np.concatenate([side, other]) @ turn.T + [0.3, 0.1, -0.2]
-            u = 0.1 * rng.uniform(-1, 1, now.shape)
-            start = (10.0, *((0.3, 0.4) if b == 3 else (0.05, -0.1)), gap + 0.01)
-            dofs = (*_tuple(u), *_tuple(rng.uniform(0.2, 0.6, a)))
-            yield State(f"touch_{a}{b}", label, _tuple(now - u), dofs, (), start)
+    for label, gap, came in (
+        ("sticking", -0.01, (1e-3, -2e-3)),
+        ("slipping", -0.02, (0.03, 0.05)),
+        ("open", 0.3, (0.01, 0.0)),
+        ("beyond", -0.7, (0.01, 0.0)),
+    ):
+        rows = [[0.02, -0.01, gap], [1.1, 0.2, 0.0], [-0.1, 0.9, 0.0], [*came, 1e-3]]
+        dofs = (*_tuple(np.array(rows) @ turn.T), 0.4, 0.02, -0.03, 0.01)
+        yield State("touch", label, (), dofs, (), (10.0, 0.3, 0.5, 1.0))
     for a in (3, 4):
         rng = np.random.default_rng(2016)
         now = np.column_stack([corners[a], 0.1 * rng.uniform(-1, 1, a)]) @ turn.T
         u = 0.1 * rng.uniform(-1, 1, now.shape)
-        dofs = (*_tuple(u), *_tuple(rng.uniform(0.2, 0.6, a)))
+        dofs = (*_tuple(u), *_tuple(rng.uniform(0.2, 0.6, (a, 4))))
         yield State(f"touch_side_{a}", "turned", _tuple(now - u), dofs, (), (10.0,))
 
 

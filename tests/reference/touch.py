@@ -1,4 +1,4 @@
-"""Contact of two faces in space: the points of a face against their partners on another one."""
+"""Contact of two faces in space: a point against its partner, and what a face has."""
 
 from __future__ import annotations
 
@@ -11,57 +11,48 @@ from tests.reference.rules import gauss
 Points = list[Vector]
 
 
-def residual_point(
-    nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
-) -> Vector:
-    """Forces at the nodes of both, then what lambda is short of at the nodes of the face.
-
-    data: rho, and from where the partner is sought: parent coordinates and distance.
-    """
-    rho, *start = data
-    count = len(X) // 3
-    x = _places(X, dofs, range(count))
-    rest = _places(X, [mpf(0)] * len(X), range(nodes))
-    multipliers = dofs[3 * count :]
+def residual_point(_: object, dofs: Sequence[Number], data: Sequence[Number], __: object) -> Vector:
+    """Stress on the partner, then what lambda and tau are made of, over rho."""
+    rho, friction, depth, reach = data
+    apart, a, b, came = (list(dofs[3 * k : 3 * k + 3]) for k in range(4))
+    across = _cross(a, b)
+    n = [v / _length(across) for v in across]
+    gap = _dot(apart, n)
+    pressure = dofs[12] - rho * gap
     found = [mpf(0)] * len(dofs)
-    for at, weight in _rule(nodes):
-        mine, N = x[:nodes], _shape(nodes, at)
-        across = _cross(*_slopes(mine, at))
-        length = _length(across)
-        n = [v / length for v in across]
-        partner, gap = _partner(x[nodes:], _sum(N, mine), n, start)
-        pressure = sum((a * v for a, v in zip(N, multipliers, strict=True)), mpf(0)) - rho * gap
-        if pressure <= 0:
-            continue
-        push = weight * pressure * _length(_cross(*_slopes(rest, at)))
-        shares = [*N, *(-v for v in _shape(count - nodes, partner))]
-        for a, share in enumerate(shares):
-            for c in range(3):
-                found[3 * a + c] += push * share * n[c]
-        for a, share in enumerate(N):
-            found[3 * count + a] += push * share / rho
+    if pressure <= 0:
+        return found
+    if not -depth < gap < reach:
+        pressure = mpf(0)
+    stick = [t + rho * c for t, c in zip(dofs[13:], came, strict=True)]
+    shear = _cross(n, _cross(stick, n))
+    if _length(shear) > friction * pressure:
+        shear = [v * friction * pressure / _length(shear) for v in shear]
+    for c in range(3):
+        found[c] = pressure * n[c] + shear[c]
+        found[13 + c] = shear[c] / rho
+    found[12] = pressure / rho
     return found
 
 
-def tangent_point(
-    nodes: int, X: Sequence[Number], dofs: Vector, data: Sequence[Number], _: object
-) -> Matrix:
+def tangent_point(_: object, dofs: Vector, data: Sequence[Number], __: object) -> Matrix:
     """Differences of the residual."""
-    return jacobian(lambda v: residual_point(nodes, X, v, data, _), dofs)
+    return jacobian(lambda v: residual_point(_, v, data, __), dofs)
 
 
 def residual_side(
     nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
 ) -> Vector:
-    """Minus the integrals of lambda over rho, with each shape function."""
+    """Minus the integrals of lambda and tau over rho, with each shape function."""
     (rho,) = data
     rest = _places(X, [mpf(0)] * len(X), range(nodes))
     found, multipliers = [mpf(0)] * len(dofs), dofs[3 * nodes :]
     for at, weight in _rule(nodes):
         N, area = _shape(nodes, at), weight * _length(_cross(*_slopes(rest, at)))
-        value = sum((a * v for a, v in zip(N, multipliers, strict=True)), mpf(0))
-        for a, share in enumerate(N):
-            found[3 * nodes + a] -= area * share * value / rho
+        for k in range(4):
+            value = sum((a * v for a, v in zip(N, multipliers[k::4], strict=True)), mpf(0))
+            for a, share in enumerate(N):
+                found[3 * nodes + 4 * a + k] -= area * share * value / rho
     return found
 
 
@@ -75,25 +66,27 @@ def tangent_side(
 def fields_side(
     nodes: int, X: Sequence[Number], dofs: Sequence[Number], data: Sequence[Number], _: object
 ) -> Matrix:
-    """True pressure, place, and area of each point."""
+    """True pressure and shear stress, place, and area of each point."""
     rest, moved = (_places(X, u, range(nodes)) for u in ([mpf(0)] * len(X), dofs))
     rows, multipliers = [], dofs[3 * nodes :]
     for at, weight in _rule(nodes):
         N = _shape(nodes, at)
         before, now = (_length(_cross(*_slopes(p, at))) for p in (rest, moved))
-        value = sum((a * v for a, v in zip(N, multipliers, strict=True)), mpf(0))
-        rows.append([value * before / now, *_sum(N, moved), now * weight])
+        values = [
+            sum((a * v for a, v in zip(N, multipliers[k::4], strict=True)), mpf(0))
+            for k in range(4)
+        ]
+        rows.append([*(v * before / now for v in values), *_sum(N, moved), now * weight])
     return rows
 
 
-FAMILIES = {f"touch_{a}{b}": a for a in (3, 4) for b in (3, 4)}
 SIDES = {f"touch_side_{a}": a for a in (3, 4)}
 RESIDUALS = {
-    **{name: partial(residual_point, a) for name, a in FAMILIES.items()},
+    "touch": partial(residual_point),
     **{name: partial(residual_side, a) for name, a in SIDES.items()},
 }
 TANGENTS = {
-    **{name: partial(tangent_point, a) for name, a in FAMILIES.items()},
+    "touch": partial(tangent_point),
     **{name: partial(tangent_side, a) for name, a in SIDES.items()},
 }
 FIELDS = {name: partial(fields_side, a) for name, a in SIDES.items()}
@@ -145,25 +138,16 @@ def _slopes(points: Points, at: Sequence[Number]) -> tuple[Vector, Vector]:
     return found[0], found[1]
 
 
-def _partner(
-    points: Points, at: Vector, n: Vector, start: Sequence[Number]
-) -> tuple[Vector, Number]:
-    """One Newton step for x(xi, eta) = at + gap n from the start."""
-    xi, eta, gap = start
-    a, b = _slopes(points, (xi, eta))
-    place = _sum(_shape(len(points), (xi, eta)), points)
-    off = [at[c] + gap * n[c] - place[c] for c in range(3)]
-    K = mp.matrix([[a[c], b[c], -n[c]] for c in range(3)])
-    step = mp.lu_solve(K, mp.matrix(off))
-    return [xi + step[0], eta + step[1]], gap + step[2]
-
-
 def _sum(shares: Vector, points: Points) -> Vector:
     return [sum((s * p[c] for s, p in zip(shares, points, strict=True)), mpf(0)) for c in range(3)]
 
 
 def _cross(a: Vector, b: Vector) -> Vector:
     return [a[k - 2] * b[k - 1] - a[k - 1] * b[k - 2] for k in range(3)]
+
+
+def _dot(a: Vector, b: Vector) -> Number:
+    return sum((v * w for v, w in zip(a, b, strict=True)), mpf(0))
 
 
 def _length(a: Vector) -> Number:

@@ -66,6 +66,18 @@ def gasket(k: int, order: int) -> Mesh:
     return mesh
 
 
+def extruded(flat: Mesh, length: float) -> Mesh:
+    """Quadrilaterals in the plane as one layer of hexahedra, with their sides; "skin" is what the
+    boundary in the plane becomes.
+    """
+    n, quads = len(flat.points), flat.cells["quad4"]
+    points = np.concatenate([np.column_stack([flat.points, np.full(n, z)]) for z in (0, length)])
+    lines = {name: faces["line2"] for name, faces in flat.sides.items()}
+    lines["skin"] = flat.boundary["line2"]
+    sides = {k: {"quad4": np.column_stack([v, v[:, ::-1] + n])} for k, v in lines.items()}
+    return Mesh(points, {"hex8": np.column_stack([quads, quads + n])}, sides=sides)
+
+
 def force(result: Result) -> float:
     """Integral of the pressure of a contact."""
     found = result.fields("contact")
