@@ -105,6 +105,12 @@ class ORingCase(Case[ORing, FilmRow]):
         """See :class:`Case`."""
         return answer(rows, parameters.travel)
 
+    def told(self, folder: Path) -> list[str]:
+        """See :class:`Case`: tolerances and sensitivities."""
+        from softehl.cases.seal.report.sensitivity import told
+
+        return told(folder)
+
     def merits(self, parameters: ORing, rows: Sequence[FilmRow]) -> Mapping[str, float]:
         """See :class:`Case`; of all speeds the worst."""
         found = {

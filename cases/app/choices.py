@@ -53,7 +53,7 @@ _OILS = (
 
 CHOICES = (
     Choice("ring", "Seal", "ISO 3601 36x4", _RINGS),
-    Choice("rod", "Rod", "36 f7", ()),
+    Choice("rod", "Rod, or bore of a piston", "36 f7", ()),
     Choice("compound", "Rubber", "NBR 70", _RUBBERS),
     Choice("oil", "Oil", "HLP 46", _OILS),
     Choice("temperature", "Temperature", "40 degC", [f"{t} degC" for t in range(20, 101, 10)]),
@@ -70,21 +70,37 @@ CHOICES = (
 """All that is chosen by one text, in the order of the desk."""
 
 
+BORE = "bore "
+"""What the size of a bore begins with."""
+
+
+def slides_on(text: str) -> tuple[str, str]:
+    """The key and its value that a rod, or a bore, is in a case."""
+    bore = text.lower().startswith(BORE)
+    return ("bore", text[len(BORE) :].strip()) if bore else ("rod", text)
+
+
 def rods(ring: str) -> list[str]:
-    """Rods that a ring goes with, the usual one first; none where the ring is not understood."""
+    """Rods that a ring goes with, the usual one first, and the bore that it just fits into; none
+    where the ring is not understood.
+    """
     try:
         said = read_ring(ring)
     except NotUnderstoodError:
         return []
     if said.number is None:
         sizes: tuple[float, float] = (said.inner, ceil(1.02 * said.inner))
+        bore = said.outer or said.inner + 2.0 * said.section
     elif said.number in as568():
         inner = as568()[said.number].inner_diameter
         sizes = (ceil(inner), round(1.02 * inner, 1))
+        bore = round(as568()[said.number].outer_diameter, 1)
     else:
         return []
     shown = dict.fromkeys(map(number_text, sizes))
-    return [f"{size}{fit}" for size in shown for fit in _FITS]
+    found = [f"{size}{fit}" for size in shown for fit in _FITS]
+    return [*found, *(f"{BORE}{number_text(bore)}{fit}" for fit in _HOLES)]
 
 
+_HOLES = (" H8", " H9", "")
 _FITS = (" f7", " f8", " h8", " h9", " e8", "")

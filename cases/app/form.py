@@ -8,7 +8,7 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmui
 
-from softehl.cases.app.choices import CHOICES, DENSITIES, SPEEDS, USUAL_SPEEDS, rods
+from softehl.cases.app.choices import CHOICES, DENSITIES, SPEEDS, USUAL_SPEEDS, rods, slides_on
 from softehl.cases.app.runs import CASE
 from softehl.cases.harness.case import Run, load_case
 from softehl.cases.harness.case_file import read_assignment, validated
@@ -73,6 +73,9 @@ class Form:
                 found[key] = value
         if str(found.get("ring", "")).lower().startswith(_BY_GROOVE):
             found.pop("gland", None)
+        if isinstance(rod := found.pop("rod", None), str):
+            key, value = slides_on(rod)
+            found[key] = value
         for line in (self.widgets["more"].value or "").splitlines():
             if line.strip():
                 key, value = read_assignment(line, _HERE)

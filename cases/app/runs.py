@@ -145,7 +145,7 @@ class Desk:
 
     def _free(self, values: Mapping[str, Any]) -> str:
         """A new name for a run with these keys."""
-        words = [str(values[key]) for key in ("ring", "rod", "compound") if values.get(key)]
+        words = [str(values[key]) for key in ("ring", "rod", "bore", "compound") if values.get(key)]
         first = re.sub(r"[^A-Za-z0-9.]+", "-", " ".join(words)).strip("-.") or CASE
         number, name = 1, first
         while (self.folder / name).exists():

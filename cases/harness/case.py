@@ -111,6 +111,10 @@ class Case(Generic[P, R]):
         """The main results in words, a line each; what should alarm a reader is an Alarm."""
         return []
 
+    def told(self, folder: Path) -> list[str]:
+        """What other files of a finished run say, in lines that follow the answer."""
+        return []
+
     def merits(self, parameters: P, rows: Sequence[R]) -> Mapping[str, float]:
         """Numbers that runs of a sweep are judged by: words with a unit -> value.
 

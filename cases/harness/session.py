@@ -174,6 +174,8 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
         table.print_rows(case, rows, rejected)
         for line in case.answer(record.run.parameters, rows):
             click.secho(line, fg="red" if isinstance(line, Alarm) else None)
+        for line in case.told(record.folder):
+            click.echo(line)
         if words := case.assumed(record.run.parameters, record.run.given):
             click.echo(f"assumed: {', '.join(words)}")
         for note in case.notes(rows, record.advice):

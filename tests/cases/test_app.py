@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from softehl.__main__ import main
-from softehl.cases.app.choices import CHOICES, rods
+from softehl.cases.app.choices import CHOICES, rods, slides_on
 from softehl.cases.app.runs import Desk, case_text
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.seal.gland.parameters import ORing
@@ -44,7 +44,9 @@ def test_all_that_is_offered_is_understood() -> None:
                 given["compound"] = "PU 95"  # which bears all of them
             if option == "smooth":
                 continue
-            assert ORing(**given).rod_diameter > 0.0, option
+            key, rod = slides_on(given.pop("rod"))
+            p = ORing.model_validate({**given, key: rod})
+            assert p.piston == (key == "bore"), option
 
 
 def test_a_ring_that_is_not_understood_has_no_rods() -> None:

@@ -62,6 +62,7 @@ THINNING: dict[str, Any] = {
 
 OTHER_WORDS = {
     *("eyring_stress", "carreau_rate"),
+    *("bore", "groove_diameter"),
     *("ring", "rod", "squeeze", "groove_depth", "fill", "gland", "backup", "said", "compound"),
     *("sensitivity", "tolerances", "travel"),
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),

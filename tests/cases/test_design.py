@@ -185,3 +185,14 @@ def test_the_held_mesh_gives_what_the_run_did() -> None:
     changed = held_film.change("friction", "rod_diameter", 0.9995)
     assert changed is not None
     assert 0.95 < changed < 0.99
+
+
+def test_a_piston_seal_is_told_by_its_own_sizes(capsys: pytest.CaptureFixture[str]) -> None:
+    """Diameters are counted negative inside; no sign of it is told."""
+    p = ORing(bore=40.0, ring="32x4")
+    steps = [Step(-33.0, 3.2, 3.2), Step(-32.9, 2.9, 2.9)]
+    design_command._tell(p, Target.of("friction -10%"), "housing_diameter", steps)
+    told = capsys.readouterr().out
+    assert "groove_diameter = 33: friction = 3.2" in told
+    assert "by groove_diameter = 32.9 (-0.303 %)" in told
+    assert "= -3" not in told

@@ -19,8 +19,9 @@ from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import ORing
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
-from softehl.cases.seal.gland.tolerances import band, read_tolerances
+from softehl.cases.seal.gland.tolerances import ToleranceRow, band, read_tolerances
 from softehl.cases.seal.gland.varied import LENGTHS
+from softehl.cases.seal.report.sensitivity import told
 from softehl.cases.seal.sensitivity.quantities import QUANTITIES
 from softehl.cases.seal.sensitivity.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
@@ -34,7 +35,7 @@ from softehl.cases.seal.states.state import FilmRow, Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
 from softehl.runtime.fem.postprocess import interval_below
-from softehl.runtime.io import read_csv
+from softehl.runtime.io import read_csv, write_csv
 from softehl.runtime.solve.linear import Factorisation, SparseMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.superlu import SuperLU
@@ -320,6 +321,26 @@ def test_what_makes_no_sense_is_refused(given: dict[str, object], message: str) 
 
 
 # ----------------------------------------------------------------------------------- command line
+
+
+def test_a_run_tells_its_tolerances(tmp_path: Path) -> None:
+    """The largest three keys of each quantity, and the band; nothing without the files."""
+    assert told(tmp_path) == []
+    slopes = {"rod_diameter": -40.0, "mu_1": 0.4, "viscosity": 0.5, "U": -0.01}
+    rows = [
+        (1.0, 200.0, quantity, name, slope)
+        for quantity in ("h_star", "friction", "leakage", "p_max")
+        for name, slope in slopes.items()
+    ]
+    write_csv(tmp_path / "sensitivity.csv", SensitivityRow.header(), rows)
+    band_row = (1.0, 200.0, "friction", 23.4, 17.6, "section_diameter", 16.9)
+    write_csv(tmp_path / "tolerances.csv", ToleranceRow.header(), [band_row])
+    most = "rod_diameter -40 %, viscosity +0.5 %, mu_1 +0.4 %"
+    assert told(tmp_path) == [
+        "  +200 mm/s, likely changes by tolerances: friction 18 % (at worst 23 %, most of it "
+        "section_diameter)",
+        f"  +200 mm/s, for 1 % of a key: h*: {most}; friction: {most}; leakage: {most}",
+    ]
 
 
 @pytest.mark.slow

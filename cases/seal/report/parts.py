@@ -83,7 +83,7 @@ def _gland(runs: Sequence[FinishedRun]) -> Part:
         if contact.get("air_wall_N") is not None and len(runs) == 1:
             rows.append(("force on the wall of the air side", -float(contact["air_wall_N"]), "N"))
     table = Table("How the ring sits", ("", *(run.name for run in runs), "unit"), rows)
-    text = "The free section on the rod, and the gland it is pressed into; lengths in mm."
+    text = "The free section where it slides, and the gland it is pressed into; lengths in mm."
     return Part("Gland and ring", text, pictures=pictures, tables=[table])
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softehl.cases.harness.pictures import save
-from softehl.cases.seal.gland.tolerances import band, read_tolerances
+from softehl.cases.harness.row import Record
+from softehl.cases.seal.gland.tolerances import ToleranceRow, band, read_tolerances
 from softehl.cases.seal.report import style
 from softehl.cases.seal.states.sensitivity_table import SensitivityRow
 from softehl.cases.seal.states.state import FilmRow
@@ -22,6 +23,7 @@ PANELS = {"h_star": "film thickness $h^*$", "friction": "friction", "leakage": "
 """Quantities of the picture, and what they are called in it."""
 
 _SHOWN = 10  # parameters
+_TOLD = 3  # of them on the terminal
 _TICKS = (-10.0, -1.0, 0.0, 1.0, 10.0)  # % for 1 %, on an axis that is linear within 0.1
 Table = dict[float, dict[str, dict[str, float]]]
 
@@ -57,6 +59,39 @@ def write_sensitivities(
 
     with matplotlib.rc_context(style.STYLE):
         save(tornado_figure(p, table), folder / "tornado", kinds)
+
+
+def told(folder: Path) -> list[str]:
+    """What tolerances do, and which keys matter most, in a line for each speed."""
+    bands = [ToleranceRow.parse(c) for c in _cells(folder / "tolerances.csv", ToleranceRow)]
+    slopes = [SensitivityRow.parse(c) for c in _cells(folder / "sensitivity.csv", SensitivityRow)]
+    lines = []
+    for speed in dict.fromkeys(row.rod_speed_mm_s for row in slopes):
+        words = [
+            f"{_called(b.quantity)} {b.likely_percent:.2g} % (at worst {b.worst_percent:.2g} %, "
+            f"most of it {b.largest})"
+            for b in bands
+            if b.rod_speed_mm_s == speed and b.quantity in PANELS
+        ]
+        if words:
+            lines.append(f"  {speed:+g} mm/s, likely changes by tolerances: {'; '.join(words)}")
+        words = []
+        for quantity in PANELS:
+            own = [r for r in slopes if (r.rod_speed_mm_s, r.quantity) == (speed, quantity)]
+            own.sort(key=lambda r: -abs(r.log_derivative))
+            most = (f"{r.parameter} {r.log_derivative:+.2g} %" for r in own[:_TOLD])
+            words.append(f"{_called(quantity)}: {', '.join(most)}")
+        lines.append(f"  {speed:+g} mm/s, for 1 % of a key: {'; '.join(words)}")
+    return lines
+
+
+def _called(quantity: str) -> str:
+    """A quantity in plain text."""
+    return "h*" if quantity == "h_star" else quantity
+
+
+def _cells(path: Path, kind: type[Record]) -> list[list[str]]:
+    return read_csv(path, kind.header()) if path.exists() else []
 
 
 def tornado_figure(p: ORing, table: Table) -> Figure:

@@ -19,7 +19,8 @@ from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.runtime.names import meant
 
-SAME = {"rod": "rod_diameter"}
+_OF_PISTON = {"bore": "rod_diameter", "groove_diameter": "housing_diameter"}
+SAME = {"rod": "rod_diameter", **_OF_PISTON}
 """Names of a key."""
 
 _SPEED = "not by the speed: sensitivity.csv has U, and each of `speeds` is a row of a run"
@@ -93,13 +94,15 @@ def _hold(p: ORing, quantity: str, key: str) -> Change | None:
 def _tell(p: ORing, target: Target, key: str, steps: Sequence[Step]) -> None:
     first, last = steps[0], steps[-1]
     sign = 1.0 if p.stroke == "out" else -1.0
+    name = {of: said for said, of in _OF_PISTON.items()}.get(key, key) if p.piston else key
+    values = [abs(step.value) if name != key else step.value for step in steps]
     click.echo(f"p_s = {p.sealed_pressure:g} MPa, U = {sign * p.speeds[0]:+g} mm/s")
-    for step in steps:
-        click.echo(f"  {key} = {step.value:.8g}: {target.quantity} = {step.quantity:.5g}")
+    for step, value in zip(steps, values, strict=True):
+        click.echo(f"  {name} = {value:.8g}: {target.quantity} = {step.quantity:.5g}")
     change = 100.0 * (last.quantity / first.quantity - 1.0)
     moved = 100.0 * (last.value / first.value - 1.0)
     click.echo(
         f"{target.quantity} {change:+.2f} % (wanted {100.0 * (target.factor - 1.0):+g} %) by "
-        f"{key} = {last.value:.8g} ({moved:+.3f} %); by the first sensitivity alone: "
-        f"{steps[1].value:.8g}, which gives {100 * (steps[1].quantity / first.quantity - 1):+.2f} %"
+        f"{name} = {values[-1]:.8g} ({moved:+.3f} %); by the first sensitivity alone: "
+        f"{values[1]:.8g}, which gives {100 * (steps[1].quantity / first.quantity - 1):+.2f} %"
     )

@@ -30,7 +30,8 @@ WITHOUT_INFLUENCE = (
     *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
     *("viscosity", "pressure_viscosity", "shear_traction", "cavitation_penalty"),
     *("cavitation", "cavitation_pressure", "roughness", "asperity_stiffness", "boundary_friction"),
-    *("ring", "rod", "squeeze", "groove_depth", "fill", "gland", "backup"),  # dimensions follow
+    *("ring", "rod", "bore", "groove_diameter", "squeeze", "groove_depth", "fill", "gland"),
+    "backup",  # dimensions follow
     *("said", "compound", "travel"),
     *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
     *("shear_thinning", "eyring_stress", "carreau_stress", "carreau_rate", "carreau_exponent"),
