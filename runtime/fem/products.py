@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -85,21 +86,16 @@ class Places:
         unknowns = dofs.reshape(-1, dofs.shape[2])[first]
         nodes = local[:, lexicographic(cell)]
         pieces, shared = _divided(nodes, len(unknowns), count)
-        filled, spans, at = [], [], 0
-        for piece in (*pieces, shared):
-            some = _filled(piece)
-            filled.append(some)
-            spans.append((at, at + len(some)))
-            at += len(some)
-        order = np.concatenate(filled)
+        order, (*runs, rest) = _together([*pieces, shared])
         index = nodes[np.abs(order) - (order < 0)]  # -1 - e: element e once more
         index[order < 0] = len(unknowns)
         order = np.where(order < 0, -1 - order, order)
-        at = np.arange(unknowns.size).reshape(unknowns.shape)
-        at, size = (at, at.size) if numbers is None else (numbers[unknowns], len(numbers))
+        own = np.arange(unknowns.size).reshape(unknowns.shape)
+        at = own if numbers is None else numbers[unknowns]
+        size = own.size if numbers is None else len(numbers)
         places = np.append(at[:, 0], size).astype(np.int32)[index]
         lanes = np.ascontiguousarray(np.swapaxes(places.reshape(-1, GROUP, index.shape[1]), 1, 2))
-        return cls(order, lanes, unknowns, at, size, (*spans[:-1],), spans[-1])
+        return cls(order, lanes, unknowns, at, size, (*runs,), rest)
 
     def vector(self) -> Array:
         """Zeros for the unknowns node by node, and for what is read and written behind them."""
@@ -115,6 +111,13 @@ def _divided(nodes: Numbers, size: int, count: int) -> tuple[list[Integers], Int
     np.maximum.at(most, nodes, owner[:, None])
     met: Flags = (least != most)[nodes].any(axis=1)
     return [np.flatnonzero((owner == k) & ~met) for k in range(count)], np.flatnonzero(met)
+
+
+def _together(pieces: Sequence[Integers]) -> tuple[Integers, list[tuple[int, int]]]:
+    """All pieces one after the other in whole groups, and where each begins and ends."""
+    filled = [_filled(piece) for piece in pieces]
+    ends = np.cumsum([0, *map(len, filled)]).tolist()
+    return np.concatenate(filled), [*pairwise(ends)]
 
 
 def _filled(elements: Integers) -> Integers:

@@ -27,8 +27,7 @@ _POWERS = 12  # products for an estimate of the largest eigenvalue, which is the
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """An operator with the inverse of its diagonal, (n,), and the interpolation (n, m)
-    from the next level.
+    """An operator with the inverse of its diagonal, (n,), and (n, m) from the next level.
 
     top: largest eigenvalue of the operator over its diagonal.
     """
