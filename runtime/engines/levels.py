@@ -23,8 +23,8 @@ class Levels:
     """Places of elements and levels of lower order, which all states share.
 
     places: of the elements of a block. transfers: to the first lower order, and lower: unknowns
-    (n, k) of the elements there. unknowns: of every level by their numbers in the system; on lower
-    levels those of a node are neighbours. steps: interpolation to each level from the next.
+    (n, k) of the elements there. unknowns: of every level by their numbers in the system; those of
+    a node are neighbours. steps: interpolation to each level from the next.
     components: unknowns of a node. near: (m, k) motions that the lowest level hardly resists.
     """
 
@@ -44,16 +44,17 @@ class Levels:
         orders = [order, LOWER[order]] if order > 1 else [1, 1]
         while orders[-1] > 1:
             orders.append(LOWER[orders[-1]])
-        dofs = [{b.name: b.dofs for b in pages}]
-        unknowns = [np.arange(system.size)]
+        numbers = _node_by_node(nodal, system.size)
+        whole = _inverse(numbers, system.size)
+        dofs = [{b.name: whole[b.dofs] for b in pages}]
+        unknowns = [numbers]
         steps: list[csr_array] = []
         for upper, now in pairwise(orders):
             own = {b.name: Transfer.of(b, now).lower_dofs(b) for b in pages}
             first = np.concatenate([d[:, :, 0].ravel() for d in own.values()])
             at = np.flatnonzero(np.isin(nodal[0], first))
             found = np.stack([numbers[at] for numbers in nodal], axis=1).ravel()
-            inverse = np.empty(system.size, dtype=np.int64)
-            inverse[found] = np.arange(len(found))
+            inverse = _inverse(found, system.size)
             dofs.append({n: inverse[d.reshape(len(d), -1)] for n, d in own.items()})
             pairs = [
                 (dofs[-2][b.name], dofs[-1][b.name], _element(b, upper, now, whole=len(steps) == 0))
@@ -61,10 +62,24 @@ class Levels:
             ]
             steps.append(interpolation(pairs, len(unknowns[-1]), len(found)))
             unknowns.append(found)
-        places = {b.name: Places.of(b, threads) for b in pages}
+        places = {b.name: Places.of(b, threads, whole) for b in pages}
         transfers = {b.name: Transfer.of(b, orders[1]) for b in pages}
         near = motions(system.mesh.points[at], names)
         return cls(places, transfers, dofs[1], (*unknowns,), (*steps,), len(names), near)
+
+
+def _node_by_node(nodal: Sequence[Integers], size: int) -> Integers:
+    """All unknowns: those of nodes that have every field node by node, then the others."""
+    columns = np.stack(nodal, axis=1)
+    first = columns[(columns >= 0).all(axis=1)].ravel()
+    return np.concatenate([first, np.setdiff1d(np.arange(size), first)])
+
+
+def _inverse(numbers: Integers, size: int) -> Integers:
+    """Place of each of `size` unknowns among numbers."""
+    found = np.empty(size, dtype=np.int64)
+    found[numbers] = np.arange(len(numbers))
+    return found
 
 
 def _element(block: ElementBlock, upper: int, lower: int, *, whole: bool) -> Array:

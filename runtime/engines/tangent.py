@@ -33,8 +33,10 @@ class Iteration:
 class Tangent:
     """The tangent at a state: products of pages, a matrix of loads and springs, and multigrid.
 
-    rest: matrix of all blocks that are no pages. diagonals: of K, (n,). lower: K at the first lower
-    level, without prescribed unknowns. free: whether an unknown is not prescribed.
+    rest: matrix of all blocks that are no pages, node by node as the first level has it.
+    diagonals: of K, (n,). lower: K at the first lower level, without prescribed unknowns. free:
+    whether an unknown is not prescribed. held: prescribed ones, and work: two vectors for products,
+    node by node.
     """
 
     problem: Problem
@@ -45,6 +47,8 @@ class Tangent:
     diagonals: Array
     lower: csr_array
     free: Flags
+    held: Integers
+    work: tuple[Array, Array]
 
     @classmethod
     def of(cls, problem: Problem, levels: Levels, iteration: Iteration, x: Array) -> Tangent:
@@ -65,22 +69,38 @@ class Tangent:
                 tangents = block.tangent(x, given)[1]
                 rest = rest + _matrix(block.dofs, tangents, len(x))
         diagonal += rest.diagonal()
-        P = _held(levels.steps[0], free, free[levels.unknowns[1]])
+        order = levels.unknowns[0]
         if rest.nnz:
+            rest = csr_array(rest)[order][:, order]
+            P = _held(levels.steps[0], free[order], free[levels.unknowns[1]])
             lower = lower + P.T @ rest @ P
-        found = csr_array(rest), diagonal, csr_array(lower), free
-        return cls(problem, levels, iteration, tuple(products), *found)
+        found = csr_array(rest), diagonal, csr_array(lower), free, np.flatnonzero(~free[order])
+        places = next(iter(levels.places.values()))
+        work = places.vector(), places.vector()
+        return cls(problem, levels, iteration, tuple(products), *found, work)
 
     def times(self, v: Array) -> Array:
         """K v, prescribed unknowns included."""
-        y = np.asarray(self.rest @ v)
-        for product in self.products:
-            product.add(v, y)
+        order, y = self.levels.unknowns[0], np.empty_like(v)
+        y[order] = self._product(v[order], self.held[:0])
         return y
 
+    def _product(self, v: Array, held: Integers) -> Array:
+        """K v node by node, where unknowns that are held do not move."""
+        given, found = self.work
+        x, y = given[: len(v)], found[: len(v)]
+        x[:] = v
+        x[held] = 0.0
+        found.fill(0.0)
+        for product in self.products:
+            product(given, found)
+        return y + self.rest @ x if self.rest.nnz else y.copy()
+
     def apply(self, v: Array) -> Array:
-        """K v with rows and columns of prescribed unknowns replaced by those of 1."""
-        return np.where(self.free, self.times(np.where(self.free, v, 0.0)), v)
+        """K v node by node, rows and columns of prescribed unknowns replaced by those of 1."""
+        y = self._product(v, self.held)
+        y[self.held] = v[self.held]
+        return y
 
     def diagonal(self) -> Array:
         """Of K."""
@@ -94,11 +114,11 @@ class Tangent:
 
     def solve(self, r: Array) -> Array:
         """x of K x = r.  Raises SingularMatrix where the iteration does not get there."""
-        given, cycle = self.iteration, self._multigrid()
+        given, cycle, order = self.iteration, self._multigrid(), self.levels.unknowns[0]
         if self._is_symmetric():
-            found = conjugate_gradients(self.apply, cycle, r, given.tolerance, given.most)
+            found = conjugate_gradients(self.apply, cycle, r[order], given.tolerance, given.most)
         else:
-            found = minimal_residuals(self.apply, cycle, r, given.tolerance, given.most)
+            found = minimal_residuals(self.apply, cycle, r[order], given.tolerance, given.most)
         given.counts.append(found.iterations)
         # up to a negative curvature it is a direction of descent, which Newton's method may take
         if not (found.converged or found.negative) or not np.isfinite(found.x).all():
@@ -106,7 +126,9 @@ class Tangent:
                 f"matrix-free: no linear solution after {found.iterations} iterations: leave "
                 "linear out, or take more steps"
             )
-        return found.x
+        x = np.empty_like(r)
+        x[order] = found.x
+        return x
 
     def _is_symmetric(self) -> bool:
         u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, len(self.free)))
@@ -116,7 +138,7 @@ class Tangent:
 
     def _multigrid(self) -> Multigrid:
         levels, free = self.levels, [self.free[numbers] for numbers in self.levels.unknowns]
-        diagonal = np.where(self.free, self.diagonals, 1.0)
+        diagonal = np.where(self.free, self.diagonals, 1.0)[levels.unknowns[0]]
         if not np.isfinite(diagonal).all():
             raise SingularMatrix("the tangent has entries that are not finite")
         found = [Level.of(self.apply, diagonal, _held(levels.steps[0], free[0], free[1]))]

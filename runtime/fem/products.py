@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -57,20 +58,25 @@ class Places:
 
     order: (m,) elements in groups, some twice to fill up a group. index: (groups, nodes, GROUP)
     places of the first unknown of their nodes in vectors that go node by node, x running first; an
-    element that stands there twice is nowhere the second time, behind all nodes.
-    unknowns: (nodes, components) numbers of unknowns in the system. runs: (first, last) of each
-    thread; rest: of what is shared.
+    element that stands there twice is nowhere the second time, behind all unknowns, which are
+    `size`. unknowns: (nodes, components) numbers of unknowns in the system; at: their places. runs:
+    (first, last) of each thread; rest: of what is shared.
     """
 
     order: Integers
     index: Numbers
     unknowns: Integers
+    at: Integers
+    size: int
     runs: tuple[tuple[int, int], ...]
     rest: tuple[int, int]
 
     @classmethod
-    def of(cls, block: ElementBlock, count: int) -> Places:
-        """For so many threads."""
+    def of(cls, block: ElementBlock, count: int, numbers: Integers | None = None) -> Places:
+        """For so many threads.
+
+        numbers: places of all unknowns of the system; None: the block has vectors of its own.
+        """
         kernel = require_product(block)
         cell = CELLS[kernel.cell]
         columns = by_components(kernel)
@@ -80,22 +86,20 @@ class Places:
         unknowns = dofs.reshape(-1, dofs.shape[2])[first]
         nodes = local[:, lexicographic(cell)]
         pieces, shared = _divided(nodes, len(unknowns), count)
-        filled, spans, at = [], [], 0
-        for piece in (*pieces, shared):
-            some = _filled(piece)
-            filled.append(some)
-            spans.append((at, at + len(some)))
-            at += len(some)
-        order = np.concatenate(filled)
+        order, (*runs, rest) = _together([*pieces, shared])
         index = nodes[np.abs(order) - (order < 0)]  # -1 - e: element e once more
         index[order < 0] = len(unknowns)
         order = np.where(order < 0, -1 - order, order)
-        lanes = np.swapaxes(index.reshape(-1, GROUP, index.shape[1]), 1, 2) * unknowns.shape[1]
-        return cls(order, np.ascontiguousarray(lanes), unknowns, (*spans[:-1],), spans[-1])
+        own = np.arange(unknowns.size).reshape(unknowns.shape)
+        at = own if numbers is None else numbers[unknowns]
+        size = own.size if numbers is None else len(numbers)
+        places = np.append(at[:, 0], size).astype(np.int32)[index]
+        lanes = np.ascontiguousarray(np.swapaxes(places.reshape(-1, GROUP, index.shape[1]), 1, 2))
+        return cls(order, lanes, unknowns, at, size, (*runs,), rest)
 
     def vector(self) -> Array:
         """Zeros for the unknowns node by node, and for what is read and written behind them."""
-        return np.zeros((len(self.unknowns) + 1) * self.unknowns.shape[1] + 3)
+        return np.zeros(self.size + self.unknowns.shape[1] + 3)
 
 
 def _divided(nodes: Numbers, size: int, count: int) -> tuple[list[Integers], Integers]:
@@ -107,6 +111,13 @@ def _divided(nodes: Numbers, size: int, count: int) -> tuple[list[Integers], Int
     np.maximum.at(most, nodes, owner[:, None])
     met: Flags = (least != most)[nodes].any(axis=1)
     return [np.flatnonzero((owner == k) & ~met) for k in range(count)], np.flatnonzero(met)
+
+
+def _together(pieces: Sequence[Integers]) -> tuple[Integers, list[tuple[int, int]]]:
+    """All pieces one after the other in whole groups, and where each begins and ends."""
+    filled = [_filled(piece) for piece in pieces]
+    ends = np.cumsum([0, *map(len, filled)]).tolist()
+    return np.concatenate(filled), [*pairwise(ends)]
 
 
 def _filled(elements: Integers) -> Integers:
@@ -187,10 +198,10 @@ class Product:
 
     def add(self, x: Array, y: Array) -> None:
         """y += K x for vectors of the whole system."""
-        unknowns, given, found = self.places.unknowns, self.places.vector(), self.places.vector()
-        given[: unknowns.size] = x[unknowns].ravel()
+        places, given, found = self.places, self.places.vector(), self.places.vector()
+        given[places.at] = x[places.unknowns]
         self(given, found)
-        y[unknowns] += found[: unknowns.size].reshape(unknowns.shape)
+        y[places.unknowns] += found[places.at]
 
 
 def _aligned(rows: int, columns: int) -> Array:

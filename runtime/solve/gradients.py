@@ -43,12 +43,15 @@ def conjugate_gradients(
             return Found(x, k, converged=True)
         z = precondition(r)
         product = float(r @ z)
-        p = z + product / before * p if k else z
+        p *= product / before
+        p += z
         Ap = apply(p)
         curvature = float(p @ Ap)
         if not curvature > 0.0 or not product > 0.0:
             return Found(x if k else z, k + 1, converged=False, negative=curvature <= 0.0)
-        x, r = x + product / curvature * p, r - product / curvature * Ap
+        x += product / curvature * p
+        Ap *= product / curvature
+        r -= Ap
         before = product
     return Found(x, most, converged=False)
 

@@ -27,13 +27,13 @@ _POWERS = 12  # products for an estimate of the largest eigenvalue, which is the
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """An operator with its diagonal (n,), and the interpolation (n, m) from the next level.
+    """An operator with the inverse of its diagonal, (n,), and (n, m) from the next level.
 
     top: largest eigenvalue of the operator over its diagonal.
     """
 
     apply: Apply
-    diagonal: Array
+    inverse: Array
     interpolation: csr_array
     top: float
 
@@ -41,24 +41,26 @@ class Level:
     def of(cls, apply: Apply, diagonal: Array, interpolation: csr_array) -> Level:
         """With an estimate of the largest eigenvalue."""
         safe = np.where(diagonal > 0.0, diagonal, 1.0)
-        return cls(apply, safe, interpolation, 1.1 * largest(apply, safe))
+        return cls(apply, 1.0 / safe, interpolation, 1.1 * largest(apply, safe))
 
     def smoothed(self, b: Array, x: Array | None) -> Array:
         """x after a smoothing of A x = b; None: from zero, which spares a product."""
         centre = 0.5 * self.top * (1.0 + 1.0 / RANGE)
         half = 0.5 * self.top * (1.0 - 1.0 / RANGE)
-        r = b if x is None else b - self.apply(x)
-        x = np.zeros_like(b) if x is None else x
-        step = r / self.diagonal / centre
-        rho = half / centre
-        for k in range(DEGREE):
-            x = x + step
-            if k == DEGREE - 1:
-                break
-            r = r - self.apply(step)
+        r = b.copy() if x is None else b - self.apply(x)
+        step = self.inverse * r
+        step /= centre
+        x = step.copy() if x is None else x + step
+        rho, scaled = half / centre, np.empty_like(r)
+        for _ in range(DEGREE - 1):
+            r -= self.apply(step)
             following = 1.0 / (2.0 * centre / half - rho)
-            step = following * rho * step + 2.0 * following / half * r / self.diagonal
+            np.multiply(self.inverse, r, out=scaled)
+            scaled *= 2.0 * following / half
+            step *= following * rho
+            step += scaled
             rho = following
+            x += step
         return x
 
 
