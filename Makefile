@@ -66,10 +66,10 @@ mpi:
 	done; \
 	echo "no Python >= 3.12 is installed (looked for: $(MPI_PYTHONS)): the tests of PETSc are left out"
 
-# the last line: cells of ours in DOLFINx, which the same wheel brings
+# the last line: cells and materials of ours in DOLFINx, which the same wheel brings
 mpi-tests: $(VENV)/.mpi $(VENV)/.kernels
 	$(BIN)/python -m pytest -m mpi tests/mpi
-	$(BIN)/python -m pytest tests/codegen/test_dolfinx.py
+	$(BIN)/python -m pytest tests/codegen/test_dolfinx.py tests/codegen/hosts/test_dolfinx_material.py
 
 # other programs: JAX and NGSolve from wheels in an environment of their own, CalculiX from source
 hosts:

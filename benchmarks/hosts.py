@@ -1,4 +1,4 @@
-"""Times of generated pages in other programs: a user element, JAX, NGSolve.
+"""Times of generated pages in other programs: a user element and material, JAX, NGSolve.
 
     python -m benchmarks.hosts        (in the environment of `make hosts`, ngscxx on the PATH)
 
@@ -21,7 +21,9 @@ from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
-PAGE = Path(__file__).parents[1] / "docs" / "models" / "neo_hooke.py"
+MODELS = Path(__file__).parents[1] / "docs" / "models"
+PAGE, LAW = MODELS / "neo_hooke.py", MODELS / "creep_law.py"
+LANES = "#define SOFTEHL_LANES 1\n"
 MU, LAME = 0.4, 1.2
 CELLS = 64
 """Cells a direction of the block."""
@@ -53,6 +55,34 @@ int main(void)
 }
 """
 
+UMAT_CALLER = """
+#include <stdio.h>
+#include <time.h>
+void umat_();
+void xit_(void) {}
+int main(void)
+{
+    double s[6], v[6] = {0}, c[36], o[9] = {0}, t[2] = {1, 1}, dt = 0.1, p[4] = {0.4, 2, 0.6, 2};
+    double F[9] = {1.1, 0.05, -0.1, 0.2, 0.9, 0.1, -0.1, 0.15, 1.2}, cut = 1, best = 1;
+    int three = 3, six = 6, four = 4, one = 1;
+    for (int run = 0; run < 50; ++run) {
+        struct timespec a, b;
+        clock_gettime(CLOCK_MONOTONIC, &a);
+        for (int i = 0; i < 1000; ++i) {
+            for (int k = 0; k < 6; ++k)
+                v[k] = 0.01 * k;
+            umat_(s, v, c, o, o, o, o, o, o, o, o, o, t, &dt, o, o, o, o, "CREEPING", &three,
+                &three, &six, &six, p, &four, o, o, &cut, o, F, F, &one, &one, &one, &one, &one,
+                &one, (size_t)8);
+        }
+        clock_gettime(CLOCK_MONOTONIC, &b);
+        const double seconds = (b.tv_sec - a.tv_sec) + 1e-9 * (b.tv_nsec - a.tv_nsec);
+        best = seconds / 1000 < best ? seconds / 1000 : best;
+    }
+    printf("%.9f", cut < 1 ? -1 : best);
+}
+"""
+
 
 def row(what: str, seconds: float, unit: float, name: str) -> None:
     print(f"| {what} | {seconds / unit:.3g} {name} |", flush=True)
@@ -79,15 +109,24 @@ def folder(host: str, place: Path, target: str, page: Path = PAGE) -> Path:
 
 def user_element(place: Path) -> None:
     folder("abaqus", place, "neo_hooke_uel.o")
-    (place / "caller.c").write_text(CALLER)
-    text = (place / "neo_hooke.c").read_text()
+    called(place, "UEL", "neo_hooke", CALLER)
+
+
+def user_material(place: Path) -> None:
+    folder("abaqus", place, "creeping_umat.o", LAW)
+    called(place, "UMAT with history and local unknowns", "creeping", UMAT_CALLER)
+
+
+def called(place: Path, subroutine: str, page: str, caller: str) -> None:
+    (place / "caller.c").write_text(caller)
+    text = (place / f"{page}.c").read_text()
     for what, source in {
-        "call of UEL, one lane": text,
-        "call of UEL, lanes of the processor": text.replace("#define SOFTEHL_LANES 1\n", ""),
+        f"call of {subroutine}, one lane": text,
+        f"call of {subroutine}, lanes of the processor": text.replace(LANES, ""),
     }.items():
-        (place / "neo_hooke.c").write_text(source)
+        (place / f"{page}.c").write_text(source)
         flags = ["-w", "-O2", "-march=native", "-fno-math-errno", "-ffp-contract=fast"]
-        files = ["caller.c", "uel.c", "neo_hooke.c"]
+        files = ["caller.c", f"{subroutine.split()[0].lower()}.c", f"{page}.c"]
         subprocess.run(["cc", *flags, *files, "-lm", "-o", "caller"], cwd=place, check=True)
         done = subprocess.run(["./caller"], cwd=place, check=True, capture_output=True, text=True)
         row(what, float(done.stdout), 1e-9, "ns")
@@ -241,7 +280,7 @@ def in_ngsolve(place: Path) -> None:
 
 def main() -> None:
     """All of them."""
-    needs = {user_element: "", in_jax: "jax", in_ngsolve: "ngsolve"}
+    needs = {user_element: "", user_material: "", in_jax: "jax", in_ngsolve: "ngsolve"}
     for measure, package in needs.items():
         if package and importlib.util.find_spec(package) is None:
             print(f"left out: {package} is not installed")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from softehl.codegen.graph.evaluate import State
-from softehl.codegen.hosts import abaqus, abaqus_material, c, calculix, jax, ngsolve
+from softehl.codegen.hosts import abaqus, abaqus_material, c, calculix, dolfinx, jax, ngsolve
 from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.hosts.material import point
 from softehl.codegen.hosts.solid import States
@@ -42,6 +42,7 @@ MATERIALS: dict[str, Callable[[Law, States], Files]] = {
     "c": _at_a_point(c.c),
     "cpp": _at_a_point(c.cpp),
     "jax": _at_a_point(jax.module),
+    "ufcx": dolfinx.module,
 }
 """Writers of the hosts that take a material, with a function that gives states for their tests."""
 HOSTS = tuple(dict.fromkeys([*ELEMENTS, *MATERIALS]))

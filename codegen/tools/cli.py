@@ -9,9 +9,10 @@ from pathlib import Path
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.hosts.all import HOSTS
+from softehl.codegen.language.material import Law
 from softehl.codegen.language.pages import On
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import cache, hosts, product, targets
+from softehl.codegen.tools import cache, hosts, product, targets, user
 from softehl.codegen.tools import files as cli_files
 from softehl.codegen.tools.build import GENERATED, BuildError
 from softehl.codegen.tools.location import CacheError
@@ -36,7 +37,7 @@ def generate(
     """See `_generate`; says what is wrong in one line.  on: cells and geometry of pages."""
     try:
         _require_printable(*models, *([out] if out else []))
-        if target in HOSTS:
+        if target in HOSTS and (target != Target.UFCX or _materials(models, On(*on))):
             if check or trace is not None:
                 return _refused(f"--check and --trace know target simd, not {target}")
             return hosts.generate(models, target, out, On(*on))
@@ -45,6 +46,12 @@ def generate(
         return _refused(str(error))
     except OSError as error:
         return _refused(f"cannot write {error.filename}: {error.strerror or error}")
+
+
+def _materials(models: Sequence[Path], on: On) -> bool:
+    """True for files of materials alone: target ufcx writes them otherwise than elements."""
+    found = [] if on.cells else [d for path in models for d in user.pages(path, on)]
+    return bool(found) and all(isinstance(d, Law) for d in found)
 
 
 def _require_printable(*paths: Path) -> None:

@@ -61,7 +61,7 @@ def files(d: Definition | Law, host: str) -> dict[str, str]:
     if host not in ELEMENTS:
         raise TargetError(
             f"{d.name} is an element: target {host} takes materials (@softehl.material), elements "
-            f"go to {', '.join(ELEMENTS)}"
+            f"go to {', '.join(ELEMENTS)}, ufcx"
         )
     page = Interface.of(d, host)
     return ELEMENTS[host](page, _states(page.definition))

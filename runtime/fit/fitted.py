@@ -14,6 +14,7 @@ from softehl.runtime.derivatives import asked
 from softehl.runtime.derivatives.asked import By
 from softehl.runtime.derivatives.inputs import Input, Key, varied
 from softehl.runtime.derivatives.quantities import quantity
+from softehl.runtime.fit.in_jax import Operation
 from softehl.runtime.fit.measured import Data, Measured
 from softehl.runtime.fit.scale import Bounds
 from softehl.runtime.fit.squares import Fit, LeastSquares
@@ -72,6 +73,14 @@ class Fitted:
         """
         items = asked.inputs(self._statement, by)
         return Objective(Trials(items, _runner(self, path)), quantity(what, at, reaction))
+
+    def in_jax(self: Solvable, *, by: By, **path: Any) -> Operation:
+        """All unknowns as a function of inputs (k,), for JAX: `solve = study.in_jax(by=...)`.
+
+        by: as in `Result.sensitivity`; inputs stand one after the other, `solve.start` has their
+        values. path: arguments of `solve`, or of `march` where there is a `dt`.
+        """
+        return Operation(Trials(asked.inputs(self._statement, by), _runner(self, path)))
 
     def fit(
         self: Solvable,

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import Target, TargetError
@@ -20,11 +21,13 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
+from softehl.codegen.tools import samples
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.kernels import load_kernel
 from tests.codegen.cell_kernels import TENSOR, CellKernels, Plane, cell_kernels, distorted
 from tests.codegen.element_states import MATERIALS, Case, all_cases
+from tests.codegen.hosts.random_pages import FEW, pages
 from tests.codegen.pages.maxwell import maxwell
 from tests.codegen.workshop import compiled
 from tests.shipped import SHIPPED
@@ -231,6 +234,29 @@ def test_local_unknowns_and_data_of_points(tmp_path: Path) -> None:
     assert close(A[np.ix_(at, at)], K[0])
     assert close(b[at], R[0])
     assert close(fields, batch.fields_at(X, u, **given)[0])
+
+
+@FEW
+@given(d=pages())
+def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Cells of two mixed fields with data and history, against the batched kernel."""
+    place = tmp_path_factory.mktemp("random")
+    kernels, batch = cell_kernels(d, place), compiled(d, place)
+    (s,) = samples.admissible(d, 1)
+    at, dim = emit_ufcx.places(d), len(d.coordinates)
+    w, vertices = np.empty(len(at)), np.zeros((d.nodes, 3))
+    w[at] = s.dofs
+    vertices[list(emit_ufcx.vertices(d)), :dim] = np.reshape(s.coordinates, (d.nodes, dim))
+    X, u, old = (np.array([v], dtype=float) for v in (s.coordinates, s.dofs, s.point_data))
+    known: dict[str, Any] = {"data": np.array([s.data]), "point_data": old}
+    known["parameters"] = np.array(s.parameters)
+    _, K = batch.tangent(X, u, **known)
+    expected = batch.fields_at(X, u, **known)[0]
+    A, fields = np.zeros(K.shape[1:]), np.zeros(expected.shape)
+    for task, out in (("tangent", A), ("fields", fields)):
+        kernels.add(task, out, [*w, *s.data, *old.ravel()], s.parameters, vertices)
+    np.testing.assert_allclose(A[np.ix_(at, at)], K[0], rtol=0, atol=1e-13 * np.abs(K).max())
+    np.testing.assert_allclose(fields, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
 def test_a_cell_without_a_solution_is_not_a_number(tmp_path: Path) -> None:

@@ -12,10 +12,13 @@ import pytest
 import sympy as sp
 
 import softehl
-from softehl.codegen.hosts import calculix
-from softehl.codegen.hosts.material import Measure, response
+from softehl.codegen.hosts import calculix, patch
+from softehl.codegen.hosts.material import Measure, response, solid
+from softehl.codegen.hosts.solid import PULL, TWIST
+from softehl.codegen.language.elements import cells
 from softehl.codegen.language.material import Material
 from softehl.runtime.arrays import Array
+from tests.codegen.hosts.test_material_history import creeping
 from tests.codegen.hosts.workshop import folder, made
 
 CCX = os.environ.get("SOFTEHL_CCX", "")
@@ -54,3 +57,29 @@ def test_a_twisted_block_is_that_of_its_own_law(tmp_path: Path) -> None:
     assert len(expected) == 3 * 9**3 + 6 * 8 * 8**3
     assert np.abs(found - expected).max() <= 1e-6 * np.abs(expected).max()
     assert sum(iterations) <= sum(own_iterations)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not CCX, reason="SOFTEHL_CCX names no CalculiX with external behaviours")
+def test_history_in_calculix_is_that_of_a_study(tmp_path: Path) -> None:
+    """A block that creeps while it is stretched and twisted, in four increments."""
+    values = {"mu": 0.4, "K": 2.0, "G": 0.6, "tau": 2.0}
+    place = folder(creeping, "calculix", tmp_path)
+    assert made(place, "libCREEPING.so").returncode == 0
+    text = calculix.deck(response(creeping, Measure.SECOND), list(values.values()))
+    direct = text.replace("*STATIC\n0.25", "*STATIC, DIRECT\n0.25")
+    found, iterations = run(place, "creeping", direct)
+    assert len(iterations) == 4
+    d = solid(creeping, "hex8")
+    mesh = patch.patch(cells.element("hex8"), 2)
+    points = np.array(mesh.points)
+    study = softehl.Study(softehl.Mesh(points, {"hex8": np.array(mesh.cells)}))
+    study.add("body", d, **values)  # type: ignore[arg-type]
+    study.fix(np.array(mesh.left), u_x=0, u_y=0, u_z=0)
+    right = np.array(mesh.right)
+    y, z = points[right, 1] - 1.5, points[right, 2] - 1.5
+    study.fix(right, u_x=lambda x, t: PULL * t)
+    study.fix(right, u_y=lambda x, t: -TWIST * z * t, u_z=lambda x, t: TWIST * y * t)
+    *_, last = study.march(dt=0.25, until=1)
+    expected = np.stack([last.values(n) for n in ("u_x", "u_y", "u_z")], 1).ravel()
+    assert np.abs(found[: len(expected)] - expected).max() <= 2e-6 * np.abs(expected).max()

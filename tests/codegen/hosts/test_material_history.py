@@ -21,8 +21,9 @@ from tests.codegen.hosts.materials import j2
 from tests.codegen.hosts.workshop import errors, folder, made
 
 ROOT = Path(__file__).parents[3]
-(creeping,) = user.pages(ROOT / "docs" / "models" / "creep_law.py")
-assert isinstance(creeping, Law)
+(_found,) = user.pages(ROOT / "docs" / "models" / "creep_law.py")
+assert isinstance(_found, Law)
+creeping: Law = _found
 VALUES = {
     "j2": {"G": 80.0, "K": 170.0, "sy": 0.5, "H": 10.0},
     "creeping": {"mu": 0.4, "K": 2.0, "G": 0.6, "tau": 2.0},

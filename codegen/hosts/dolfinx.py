@@ -1,0 +1,68 @@
+"""Target `ufcx` from a material: stress and modulus at the quadrature points of DOLFINx."""
+
+from __future__ import annotations
+
+import json
+
+from softehl.codegen.hosts import api
+from softehl.codegen.hosts.c import DIFFERENCE, LIMIT
+from softehl.codegen.hosts.interface import Interface
+from softehl.codegen.hosts.material import VOIGT, is_small, point
+from softehl.codegen.hosts.sample import Sample, samples
+from softehl.codegen.hosts.solid import States
+from softehl.codegen.language.material import Law
+
+
+def module(law: Law, states: States) -> dict[str, str]:
+    """Every file of a material for forms of DOLFINx."""
+    page, small = Interface(point(law)), is_small(law)
+    texts, kernel = api.files(page)
+    found = samples(page, kernel, states(page.definition))
+    words = _words(page, found[0], small)
+    texts[f"{law.name}_dolfinx.py"] = api.filled(api.template("dolfinx.py.in"), words)
+    texts[f"test_{law.name}.py"] = api.filled(api.template("dolfinx_test.py.in"), words)
+    texts["Makefile"] = api.filled(api.template("dolfinx.mk"), words)
+    texts["NOTES.md"] = api.filled(api.template("dolfinx.md"), words)
+    values = {
+        "p": [float(v) for v in found[0].state.parameters],
+        "states": [_state(page, s, small) for s in found],
+    }
+    texts["samples.json"] = json.dumps(values) + "\n"
+    return texts
+
+
+def _words(page: Interface, first: Sample, small: bool) -> dict[str, object]:
+    d = page.definition
+    pairs = zip(d.parameters, first.state.parameters, strict=True)
+    return {
+        "name": page.name,
+        "parameter_names": {a.name: a.meaning for a in d.parameters},
+        "parameters_given": ", ".join(f"{a.name}={float(v):.3g}" for a, v in pairs),
+        "state_names": {a.name: a.meaning for a in d.point_data},
+        "state": ", ".join(a.name for a in d.point_data) or "None",
+        "small": small,
+        "stress": "Stress of the small strain" if small else "First Piola-Kirchhoff stress P of F",
+        "field_count": len(d.fields),
+        "renewed": [0 if k is None else k for k in page.renewed],
+        "renewed_mask": [k is not None for k in page.renewed],
+        "limit": LIMIT,
+        "difference": DIFFERENCE,
+    }
+
+
+def _state(page: Interface, s: Sample, small: bool) -> dict[str, object]:
+    """A displacement gradient, the state, and what the law must give there."""
+    values, old = s.state.dofs, [float(v) for v in s.state.point_data[0]]
+    new = [v if k is None else s.fields[k] for k, v in zip(page.renewed, old, strict=True)]
+
+    def tensor(row: list[float], shear: float) -> list[list[float]]:
+        places = {p: v * (1 if p[0] == p[1] else shear) for p, v in zip(VOIGT, row, strict=True)}
+        return [[places[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
+
+    row = [float(v) for v in values]
+    if small:
+        gradient, stress = tensor(row, 0.5), tensor(s.residual, 1.0)
+    else:
+        gradient = [[row[3 * i + j] - (i == j) for j in range(3)] for i in range(3)]
+        stress = [s.residual[3 * i : 3 * i + 3] for i in range(3)]
+    return {"gradient": gradient, "state": old, "stress": stress, "new_state": new}
