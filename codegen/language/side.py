@@ -18,7 +18,7 @@ from softehl.codegen.language.nodal import Nodal
 
 
 class NeedsTraces(ModelError):  # noqa: N818 (named after what it is)
-    """Error of a page that asks for what is known on facets of cells (cell="quad4_side"), not on faces alone."""
+    """Error of a page on faces that asks for what only facets of cells know, as "quad4_side"."""
 
     traces = True
 
