@@ -129,7 +129,7 @@ class Factorisation:
         if factors is None:
             return None
         K = csc_array(self.matrix.T)
-        row_sums = np.asarray(abs(K).sum(axis=1)).ravel()
+        row_sums: Array = np.asarray(abs(K).sum(axis=1)).ravel()
         return replace(self, matrix=K, factors=factors, row_sums=row_sums)
 
     def pivots(self) -> Array | None:

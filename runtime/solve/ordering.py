@@ -125,7 +125,8 @@ class Transposed:
         order, made = self.factors.order, self.factors.factors
         assert isinstance(made, SuperLU)
         x = np.empty(len(b))
-        x[order.unknowns] = made.solve(b[order.unknowns], trans="T")
+        right = b[order.unknowns]
+        x[order.unknowns] = made.solve(right, trans="T")  # type: ignore[call-overload]
         return x
 
 
