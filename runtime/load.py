@@ -24,6 +24,9 @@ from softehl.runtime.stability import warn_unstable
 from softehl.runtime.system import Step, System
 
 _NAME = "load factor"
+_KEPT = 100_000
+"""Unknowns: the factors of fewer take some 200 MB at most, and an adjoint then costs an eighth of a
+nonlinear solution instead of a third."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +47,8 @@ class _Reached:
     """A study on its path: after each point history is committed, and `on_step` is told.
 
     x, histories: after the last point. results: all of them, or the last one. kept: the
-    linear solver of a path that is recorded. before: what the first step goes on from.
+    linear solver, whose last factors are kept. before: what the first step goes on from. record:
+    results know the steps before them.
     """
 
     system: System
@@ -54,6 +58,7 @@ class _Reached:
     keep_all: bool = False
     kept: Remembering | None = None
     before: Trail | None = None
+    record: bool = False
     results: list[Result] = field(default_factory=list)
 
     def problem_at(self, t: float) -> Problem:
@@ -68,8 +73,8 @@ class _Reached:
         self.x = point.solution.x
         self.histories = self.system.committed(problem, self.x, self.histories)
         problem = problem.at(self.x)
-        known = (before, self.kept) if self.kept else ()
-        trail = Trail(self.system, step, problem, self.x, *known)
+        earlier = before if self.record else None
+        trail = Trail(self.system, step, problem, self.x, earlier, self.kept)
         result = Result(self.system, problem, point, self.histories, trail)
         if not self.keep_all:
             self.results.clear()
@@ -102,8 +107,8 @@ class LoadSteps:
         """The result at load factor `until`.  Raises NotConverged."""
         begin, x0, histories = start
         first_step = FirstStep(self.newton)
-        kept = first_step.memory if self.record else None
-        at = _Reached(system, x0, histories, self.on_step, False, kept, self.before)
+        kept = first_step.memory if self.record or system.size <= _KEPT else None
+        at = _Reached(*(system, x0, histories, self.on_step, False, kept, self.before, self.record))
 
         def keep(point: Point) -> None:
             first_step.check(at.problem_at(point.parameter), point.solution)

@@ -63,7 +63,7 @@ class Paths:
         factorise; "amg" is algebraic multigrid (pyamg) for displacements or one scalar; "auto"
         takes it for large problems; "matrix-free" needs no matrix (docs/matrix-free.md). record:
         results keep the steps before them, which derivatives need where pages have history, and
-        the last factors, which saves time.
+        the last factors of large problems, which saves time.
         Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
         or None.
         """

@@ -13,7 +13,7 @@ from softehl.runtime.derivatives.elements import Elements
 from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.solve.backends import choose
-from softehl.runtime.solve.linear import Factors, SingularMatrix
+from softehl.runtime.solve.linear import Factorisation, Factors, SingularMatrix
 
 _EXACT, _ROUNDING = 1e-15, 1e-14
 """Errors of an equation relative to its terms: nothing is left, and only rounding can be left."""
@@ -94,12 +94,14 @@ class Linear:
         turned = transposed and not self._symmetric
         key = "transposed" if turned else "plain"
         if key not in memo:
-            if not turned and kept is not None and kept.last is not None:
-                found = refined(kept.last[1], self._reduced, b)
-                if found is not None:
-                    return found
             K = csc_array(self._reduced.T) if turned else self._reduced
-            memo[key] = choose("auto").factorise(K)
+            last = None if kept is None or kept.last is None else kept.last[1]
+            near = _turned(last) if turned else last
+            found = None if near is None else refined(near, K, b)
+            if found is not None:
+                return found
+            memo[key] = _turned(memo.get("plain")) if turned else None
+            memo[key] = memo[key] or choose("auto").factorise(K)
         return np.asarray(memo[key].solve(b))
 
     @property
@@ -108,6 +110,11 @@ class Linear:
         if "symmetric" not in memo:
             memo["symmetric"] = abs(K - K.T).max() <= _SYMMETRIC * abs(K).max()
         return bool(memo["symmetric"])
+
+
+def _turned(factors: Factors | None) -> Factors | None:
+    """Factors of the transpose by those of a matrix, None where they cannot be used so."""
+    return factors.transposed() if isinstance(factors, Factorisation) else None
 
 
 def refined(factors: Factors, K: csc_array[np.float64], b: Array) -> Array | None:

@@ -6,7 +6,7 @@ The backends are `solve.superlu` and `solve.pardiso`; `solve.backends` chooses.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
@@ -121,6 +121,16 @@ class Factorisation:
                 f"{self.accuracy:.1e}): the pivots were too weak"
             )
         return x
+
+    def transposed(self) -> Factorisation | None:
+        """Factors of the transpose by these; None where they cannot be used so."""
+        known = getattr(self.factors, "transposed", None)
+        factors = None if known is None else known()
+        if factors is None:
+            return None
+        K = csc_array(self.matrix.T)
+        row_sums: Array = np.asarray(abs(K).sum(axis=1)).ravel()
+        return replace(self, matrix=K, factors=factors, row_sums=row_sums)
 
     def pivots(self) -> Array | None:
         """Pivots (n,) where they are all on the diagonal, as in L D L'; None where not known."""

@@ -101,6 +101,10 @@ class Arranged:
         x[self.order.unknowns] = self.factors.solve(b[self.order.unknowns])
         return x
 
+    def transposed(self) -> Factors | None:
+        """Factors of the transpose, by those of SuperLU; None for others."""
+        return Transposed(self) if isinstance(self.factors, SuperLU) else None
+
     def pivots(self) -> Array | None:
         """Pivots of SuperLU, (n,), if they are all on the diagonal, else None."""
         made = self.factors
@@ -108,6 +112,22 @@ class Arranged:
             return None
         on_diagonal = np.array_equal(made.perm_r, made.perm_c)
         return np.asarray(made.U.diagonal()) if on_diagonal else None
+
+
+@dataclass(frozen=True)
+class Transposed:
+    """Factors of the transpose by those of SuperLU; satisfies `Factors`."""
+
+    factors: Arranged
+
+    def solve(self, b: Array) -> Array:
+        """x of K^T x = b, shapes (n,)."""
+        order, made = self.factors.order, self.factors.factors
+        assert isinstance(made, SuperLU)
+        x = np.empty(len(b))
+        right = b[order.unknowns]
+        x[order.unknowns] = made.solve(right, trans="T")  # type: ignore[call-overload]
+        return x
 
 
 def without_zeros(K: SparseMatrix) -> SparseMatrix:

@@ -368,6 +368,14 @@ def test_a_study_that_changed_has_no_derivatives() -> None:
         result.sensitivity("u_y", at=PLACE, by={"body": "mu"})
 
 
+def test_factors_solve_with_the_transpose() -> None:
+    rng = np.random.default_rng(3)
+    K = csc_array(np.diag(np.arange(4.0, 16.0)) + 0.3 * rng.normal(size=(12, 12)))
+    turned, b = SuperLU().factorise(K).transposed(), rng.normal(size=12)
+    assert turned is not None
+    assert turned.solve(b) == pytest.approx(np.linalg.solve(K.toarray().T, b), rel=1e-12)
+
+
 def test_factors_near_by_are_refined_or_refused() -> None:
     """Those of the last iteration give the digits of new ones; others are not taken."""
     generator = np.random.default_rng(0)
