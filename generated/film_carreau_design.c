@@ -89,514 +89,98 @@ static void softehl_film_carreau_level_lanes(
     for (int step = 0; step < 50 && softehl_any(active); ++step) {
         M failed = softehl_mask(0), far = failed;
         V g[7], A[49], B[56];
-        const V v1 = s[6] * s[6];
-        const V v2 = 1.0 + v1;
-        const V v3 = softehl_vlog(v2);
-        const V v4 = p[4] * v3;
-        const V v5 = softehl_vexp(v4);
-        const V v6 = p[3] * v5;
-        const V v7 = p[0] + v6;
-        const V v8 = 1.0 / v7;
-        const V v9 = 0.08566224618958518 * s[6];
-        const V v10 = v9 * v8;
-        const V v11 = s[1] * s[1];
-        const V v12 = 1.0 + v11;
-        const V v13 = softehl_vlog(v12);
-        const V v14 = p[4] * v13;
-        const V v15 = softehl_vexp(v14);
-        const V v16 = p[3] * v15;
-        const V v17 = p[0] + v16;
-        const V v18 = 1.0 / v17;
-        const V v19 = 0.08566224618958518 * s[1];
-        const V v20 = v19 * v18;
-        const V v21 = v20 + v10;
-        const V v22 = s[2] * s[2];
-        const V v23 = 1.0 + v22;
-        const V v24 = softehl_vlog(v23);
-        const V v25 = p[4] * v24;
-        const V v26 = softehl_vexp(v25);
-        const V v27 = p[3] * v26;
-        const V v28 = p[0] + v27;
-        const V v29 = 1.0 / v28;
-        const V v30 = 0.1803807865240693 * s[2];
-        const V v31 = v30 * v29;
-        const V v32 = v31 + v21;
-        const V v33 = s[5] * s[5];
-        const V v34 = 1.0 + v33;
-        const V v35 = softehl_vlog(v34);
-        const V v36 = p[4] * v35;
-        const V v37 = softehl_vexp(v36);
-        const V v38 = p[3] * v37;
-        const V v39 = p[0] + v38;
-        const V v40 = 1.0 / v39;
-        const V v41 = 0.1803807865240693 * s[5];
-        const V v42 = v41 * v40;
-        const V v43 = v42 + v32;
-        const V v44 = s[3] * s[3];
-        const V v45 = 1.0 + v44;
-        const V v46 = softehl_vlog(v45);
-        const V v47 = p[4] * v46;
-        const V v48 = softehl_vexp(v47);
-        const V v49 = p[3] * v48;
-        const V v50 = p[0] + v49;
-        const V v51 = 1.0 / v50;
-        const V v52 = 0.23395696728634552 * s[3];
-        const V v53 = v52 * v51;
-        const V v54 = v53 + v43;
-        const V v55 = s[4] * s[4];
-        const V v56 = 1.0 + v55;
-        const V v57 = softehl_vlog(v56);
-        const V v58 = p[4] * v57;
-        const V v59 = softehl_vexp(v58);
-        const V v60 = p[3] * v59;
-        const V v61 = p[0] + v60;
-        const V v62 = 1.0 / v61;
-        const V v63 = 0.23395696728634552 * s[4];
-        const V v64 = v63 * v62;
-        const V v65 = v64 + v54;
-        const V v66 = v65 - p[1];
-        const V v67 = v17 * v17;
-        const V v68 = 1.0 / v67;
-        const V v69 = v11 * v68;
-        const V v70 = 1.0 + v69;
-        const V v71 = softehl_vlog(v70);
-        const V v72 = p[2] * v71;
-        const V v73 = softehl_vexp(v72);
-        const V v74 = p[3] * v73;
-        const V v75 = p[0] + v74;
-        const V v76 = s[1] * v75;
-        const V v77 = v18 * v76;
-        const V v78 = s[0] + p[5];
-        const V v79 = v77 - v78;
-        const V v80 = v28 * v28;
-        const V v81 = 1.0 / v80;
-        const V v82 = v22 * v81;
-        const V v83 = 1.0 + v82;
-        const V v84 = softehl_vlog(v83);
-        const V v85 = p[2] * v84;
-        const V v86 = softehl_vexp(v85);
-        const V v87 = p[3] * v86;
-        const V v88 = p[0] + v87;
-        const V v89 = s[2] * v88;
-        const V v90 = v29 * v89;
-        const V v91 = s[0] + p[6];
-        const V v92 = v90 - v91;
-        const V v93 = v50 * v50;
-        const V v94 = 1.0 / v93;
-        const V v95 = v44 * v94;
-        const V v96 = 1.0 + v95;
-        const V v97 = softehl_vlog(v96);
-        const V v98 = p[2] * v97;
-        const V v99 = softehl_vexp(v98);
-        const V v100 = p[3] * v99;
-        const V v101 = p[0] + v100;
-        const V v102 = s[3] * v101;
-        const V v103 = v51 * v102;
-        const V v104 = s[0] + p[7];
-        const V v105 = v103 - v104;
-        const V v106 = v61 * v61;
-        const V v107 = 1.0 / v106;
-        const V v108 = v55 * v107;
-        const V v109 = 1.0 + v108;
-        const V v110 = softehl_vlog(v109);
-        const V v111 = p[2] * v110;
-        const V v112 = softehl_vexp(v111);
-        const V v113 = p[3] * v112;
-        const V v114 = p[0] + v113;
-        const V v115 = s[4] * v114;
-        const V v116 = v62 * v115;
-        const V v117 = p[7] - s[0];
-        const V v118 = v117 + v116;
-        const V v119 = v39 * v39;
-        const V v120 = 1.0 / v119;
-        const V v121 = v33 * v120;
-        const V v122 = 1.0 + v121;
-        const V v123 = softehl_vlog(v122);
-        const V v124 = p[2] * v123;
-        const V v125 = softehl_vexp(v124);
-        const V v126 = p[3] * v125;
-        const V v127 = p[0] + v126;
-        const V v128 = s[5] * v127;
-        const V v129 = v40 * v128;
-        const V v130 = p[6] - s[0];
-        const V v131 = v130 + v129;
-        const V v132 = v7 * v7;
-        const V v133 = 1.0 / v132;
-        const V v134 = v1 * v133;
-        const V v135 = 1.0 + v134;
-        const V v136 = softehl_vlog(v135);
-        const V v137 = p[2] * v136;
-        const V v138 = softehl_vexp(v137);
-        const V v139 = p[3] * v138;
-        const V v140 = p[0] + v139;
-        const V v141 = s[6] * v140;
-        const V v142 = v8 * v141;
-        const V v143 = p[5] - s[0];
-        const V v144 = v143 + v142;
-        const V v145 = 2.0 * s[1];
-        const V v146 = p[4] * v145;
-        const V v147 = 1.0 / v12;
-        const V v148 = v147 * v146;
-        const V v149 = v18 * v18;
-        const V v150 = v19 * v149;
-        const V v151 = v16 * v150;
-        const V v152 = v151 * v148;
-        const V v153 = 0.08566224618958518 * v18;
-        const V v154 = v153 - v152;
-        const V v155 = 2.0 * s[2];
-        const V v156 = p[4] * v155;
-        const V v157 = 1.0 / v23;
-        const V v158 = v157 * v156;
-        const V v159 = v29 * v29;
-        const V v160 = v30 * v159;
-        const V v161 = v27 * v160;
-        const V v162 = v161 * v158;
-        const V v163 = 0.1803807865240693 * v29;
-        const V v164 = v163 - v162;
-        const V v165 = 2.0 * s[3];
-        const V v166 = p[4] * v165;
-        const V v167 = 1.0 / v45;
-        const V v168 = v167 * v166;
-        const V v169 = v51 * v51;
-        const V v170 = v52 * v169;
-        const V v171 = v49 * v170;
-        const V v172 = v171 * v168;
-        const V v173 = 0.23395696728634552 * v51;
-        const V v174 = v173 - v172;
-        const V v175 = 2.0 * s[4];
-        const V v176 = p[4] * v175;
-        const V v177 = 1.0 / v56;
-        const V v178 = v177 * v176;
-        const V v179 = v62 * v62;
-        const V v180 = v63 * v179;
-        const V v181 = v60 * v180;
-        const V v182 = v181 * v178;
-        const V v183 = 0.23395696728634552 * v62;
-        const V v184 = v183 - v182;
-        const V v185 = 2.0 * s[5];
-        const V v186 = p[4] * v185;
-        const V v187 = 1.0 / v34;
-        const V v188 = v187 * v186;
-        const V v189 = v40 * v40;
-        const V v190 = v41 * v189;
-        const V v191 = v38 * v190;
-        const V v192 = v191 * v188;
-        const V v193 = 0.1803807865240693 * v40;
-        const V v194 = v193 - v192;
-        const V v195 = 2.0 * s[6];
-        const V v196 = p[4] * v195;
-        const V v197 = 1.0 / v2;
-        const V v198 = v197 * v196;
-        const V v199 = v8 * v8;
-        const V v200 = v9 * v199;
-        const V v201 = v6 * v200;
-        const V v202 = v201 * v198;
-        const V v203 = 0.08566224618958518 * v8;
-        const V v204 = v203 - v202;
-        const V v205 = 2.0 * v11;
-        const V v206 = v17 * v205;
-        const V v207 = v68 * v206;
-        const V v208 = v68 * v207;
-        const V v209 = 1.0 / v70;
-        const V v210 = p[2] * v209;
-        const V v211 = s[1] * v18;
-        const V v212 = v74 * v211;
-        const V v213 = v212 * v210;
-        const V v214 = v213 * v208;
-        const V v215 = v76 * v149;
-        const V v216 = v215 + v214;
-        const V v217 = v16 * v216;
-        const V v218 = p[4] * v147;
-        const V v219 = v218 * v217;
-        const V v220 = v68 * v213;
-        const V v221 = v220 - v219;
-        const V v222 = v145 * v221;
-        const V v223 = v18 * v75;
-        const V v224 = v223 + v222;
-        const V v225 = 2.0 * v22;
-        const V v226 = v28 * v225;
-        const V v227 = v81 * v226;
-        const V v228 = v81 * v227;
-        const V v229 = 1.0 / v83;
-        const V v230 = p[2] * v229;
-        const V v231 = s[2] * v29;
-        const V v232 = v87 * v231;
-        const V v233 = v232 * v230;
-        const V v234 = v233 * v228;
-        const V v235 = v89 * v159;
-        const V v236 = v235 + v234;
-        const V v237 = v27 * v236;
-        const V v238 = p[4] * v157;
-        const V v239 = v238 * v237;
-        const V v240 = v81 * v233;
-        const V v241 = v240 - v239;
-        const V v242 = v155 * v241;
-        const V v243 = v29 * v88;
-        const V v244 = v243 + v242;
-        const V v245 = 2.0 * v44;
-        const V v246 = v50 * v245;
-        const V v247 = v94 * v246;
-        const V v248 = v94 * v247;
-        const V v249 = 1.0 / v96;
-        const V v250 = p[2] * v249;
-        const V v251 = s[3] * v51;
-        const V v252 = v100 * v251;
-        const V v253 = v252 * v250;
-        const V v254 = v253 * v248;
-        const V v255 = v102 * v169;
-        const V v256 = v255 + v254;
-        const V v257 = v49 * v256;
-        const V v258 = p[4] * v167;
-        const V v259 = v258 * v257;
-        const V v260 = v94 * v253;
-        const V v261 = v260 - v259;
-        const V v262 = v165 * v261;
-        const V v263 = v51 * v101;
-        const V v264 = v263 + v262;
-        const V v265 = 2.0 * v55;
-        const V v266 = v61 * v265;
-        const V v267 = v107 * v266;
-        const V v268 = v107 * v267;
-        const V v269 = 1.0 / v109;
-        const V v270 = p[2] * v269;
-        const V v271 = s[4] * v62;
-        const V v272 = v113 * v271;
-        const V v273 = v272 * v270;
-        const V v274 = v273 * v268;
-        const V v275 = v115 * v179;
-        const V v276 = v275 + v274;
-        const V v277 = v60 * v276;
-        const V v278 = p[4] * v177;
-        const V v279 = v278 * v277;
-        const V v280 = v107 * v273;
-        const V v281 = v280 - v279;
-        const V v282 = v175 * v281;
-        const V v283 = v62 * v114;
-        const V v284 = v283 + v282;
-        const V v285 = 2.0 * v33;
-        const V v286 = v39 * v285;
-        const V v287 = v120 * v286;
-        const V v288 = v120 * v287;
-        const V v289 = 1.0 / v122;
-        const V v290 = p[2] * v289;
-        const V v291 = s[5] * v40;
-        const V v292 = v126 * v291;
-        const V v293 = v292 * v290;
-        const V v294 = v293 * v288;
-        const V v295 = v128 * v189;
-        const V v296 = v295 + v294;
-        const V v297 = v38 * v296;
-        const V v298 = p[4] * v187;
-        const V v299 = v298 * v297;
-        const V v300 = v120 * v293;
-        const V v301 = v300 - v299;
-        const V v302 = v185 * v301;
-        const V v303 = v40 * v127;
-        const V v304 = v303 + v302;
-        const V v305 = 2.0 * v1;
-        const V v306 = v7 * v305;
-        const V v307 = v133 * v306;
-        const V v308 = v133 * v307;
-        const V v309 = 1.0 / v135;
-        const V v310 = p[2] * v309;
-        const V v311 = s[6] * v8;
-        const V v312 = v139 * v311;
-        const V v313 = v312 * v310;
-        const V v314 = v313 * v308;
-        const V v315 = v141 * v199;
-        const V v316 = v315 + v314;
-        const V v317 = v6 * v316;
-        const V v318 = p[4] * v197;
-        const V v319 = v318 * v317;
-        const V v320 = v133 * v313;
-        const V v321 = v320 - v319;
-        const V v322 = v195 * v321;
-        const V v323 = v8 * v140;
-        const V v324 = v323 + v322;
-        const V v325 = v180 + v170;
-        const V v326 = v325 + v190;
-        const V v327 = v326 + v160;
-        const V v328 = v327 + v200;
-        const V v329 = v328 + v150;
-        const V v330 = -v329;
-        const V v331 = v48 * v170;
-        const V v332 = v59 * v180;
-        const V v333 = v332 + v331;
-        const V v334 = v37 * v190;
-        const V v335 = v333 + v334;
-        const V v336 = v26 * v160;
-        const V v337 = v335 + v336;
-        const V v338 = v5 * v200;
-        const V v339 = v337 + v338;
-        const V v340 = v15 * v150;
-        const V v341 = v339 + v340;
-        const V v342 = -v341;
-        const V v343 = v46 * v171;
-        const V v344 = v57 * v181;
-        const V v345 = v344 + v343;
-        const V v346 = v35 * v191;
-        const V v347 = v345 + v346;
-        const V v348 = v24 * v161;
-        const V v349 = v347 + v348;
-        const V v350 = v3 * v201;
-        const V v351 = v349 + v350;
-        const V v352 = v13 * v151;
-        const V v353 = v351 + v352;
-        const V v354 = -v353;
-        const V v355 = v211 - v216;
-        const V v356 = v71 * v212;
-        const V v357 = v15 * v216;
-        const V v358 = v73 * v211;
-        const V v359 = v358 - v357;
-        const V v360 = v13 * v217;
-        const V v361 = -v360;
-        const V v362 = v231 - v236;
-        const V v363 = v84 * v232;
-        const V v364 = v26 * v236;
-        const V v365 = v86 * v231;
-        const V v366 = v365 - v364;
-        const V v367 = v24 * v237;
-        const V v368 = -v367;
-        const V v369 = v251 - v256;
-        const V v370 = v97 * v252;
-        const V v371 = v48 * v256;
-        const V v372 = v99 * v251;
-        const V v373 = v372 - v371;
-        const V v374 = v46 * v257;
-        const V v375 = -v374;
-        const V v376 = v271 - v276;
-        const V v377 = v110 * v272;
-        const V v378 = v59 * v276;
-        const V v379 = v112 * v271;
-        const V v380 = v379 - v378;
-        const V v381 = v57 * v277;
-        const V v382 = -v381;
-        const V v383 = v291 - v296;
-        const V v384 = v123 * v292;
-        const V v385 = v37 * v296;
-        const V v386 = v125 * v291;
-        const V v387 = v386 - v385;
-        const V v388 = v35 * v297;
-        const V v389 = -v388;
-        const V v390 = v311 - v316;
-        const V v391 = v136 * v312;
-        const V v392 = v5 * v316;
-        const V v393 = v138 * v311;
-        const V v394 = v393 - v392;
-        const V v395 = v3 * v317;
-        const V v396 = -v395;
-        g[0] = v66;
-        g[1] = v79;
-        g[2] = v92;
-        g[3] = v105;
-        g[4] = v118;
-        g[5] = v131;
-        g[6] = v144;
-        A[0] = softehl_splat(0.0);
-        A[1] = v154;
-        A[2] = v164;
-        A[3] = v174;
-        A[4] = v184;
-        A[5] = v194;
-        A[6] = v204;
-        A[7] = softehl_splat((-1.0));
-        A[8] = v224;
-        A[9] = softehl_splat(0.0);
-        A[10] = softehl_splat(0.0);
-        A[11] = softehl_splat(0.0);
-        A[12] = softehl_splat(0.0);
-        A[13] = softehl_splat(0.0);
-        A[14] = softehl_splat((-1.0));
-        A[15] = softehl_splat(0.0);
-        A[16] = v244;
-        A[17] = softehl_splat(0.0);
-        A[18] = softehl_splat(0.0);
-        A[19] = softehl_splat(0.0);
-        A[20] = softehl_splat(0.0);
-        A[21] = softehl_splat((-1.0));
-        A[22] = softehl_splat(0.0);
-        A[23] = softehl_splat(0.0);
-        A[24] = v264;
-        A[25] = softehl_splat(0.0);
-        A[26] = softehl_splat(0.0);
-        A[27] = softehl_splat(0.0);
-        A[28] = softehl_splat((-1.0));
-        A[29] = softehl_splat(0.0);
-        A[30] = softehl_splat(0.0);
-        A[31] = softehl_splat(0.0);
-        A[32] = v284;
-        A[33] = softehl_splat(0.0);
-        A[34] = softehl_splat(0.0);
-        A[35] = softehl_splat((-1.0));
-        A[36] = softehl_splat(0.0);
-        A[37] = softehl_splat(0.0);
-        A[38] = softehl_splat(0.0);
-        A[39] = softehl_splat(0.0);
-        A[40] = v304;
-        A[41] = softehl_splat(0.0);
-        A[42] = softehl_splat((-1.0));
-        A[43] = softehl_splat(0.0);
-        A[44] = softehl_splat(0.0);
-        A[45] = softehl_splat(0.0);
-        A[46] = softehl_splat(0.0);
-        A[47] = softehl_splat(0.0);
-        A[48] = v324;
-        B[0] = v330;
-        B[1] = softehl_splat((-1.0));
-        B[2] = softehl_splat(0.0);
-        B[3] = v342;
-        B[4] = v354;
-        B[5] = softehl_splat(0.0);
-        B[6] = softehl_splat(0.0);
-        B[7] = softehl_splat(0.0);
-        B[8] = v355;
-        B[9] = softehl_splat(0.0);
-        B[10] = v356;
-        B[11] = v359;
-        B[12] = v361;
-        B[13] = softehl_splat((-1.0));
-        B[14] = softehl_splat(0.0);
-        B[15] = softehl_splat(0.0);
-        B[16] = v362;
-        B[17] = softehl_splat(0.0);
-        B[18] = v363;
-        B[19] = v366;
-        B[20] = v368;
-        B[21] = softehl_splat(0.0);
-        B[22] = softehl_splat((-1.0));
-        B[23] = softehl_splat(0.0);
-        B[24] = v369;
-        B[25] = softehl_splat(0.0);
-        B[26] = v370;
-        B[27] = v373;
-        B[28] = v375;
-        B[29] = softehl_splat(0.0);
-        B[30] = softehl_splat(0.0);
-        B[31] = softehl_splat((-1.0));
-        B[32] = v376;
-        B[33] = softehl_splat(0.0);
-        B[34] = v377;
-        B[35] = v380;
-        B[36] = v382;
-        B[37] = softehl_splat(0.0);
-        B[38] = softehl_splat(0.0);
-        B[39] = softehl_splat(1.0);
-        B[40] = v383;
-        B[41] = softehl_splat(0.0);
-        B[42] = v384;
-        B[43] = v387;
-        B[44] = v389;
-        B[45] = softehl_splat(0.0);
-        B[46] = softehl_splat(1.0);
-        B[47] = softehl_splat(0.0);
-        B[48] = v390;
-        B[49] = softehl_splat(0.0);
-        B[50] = v391;
-        B[51] = v394;
-        B[52] = v396;
-        B[53] = softehl_splat(1.0);
-        B[54] = softehl_splat(0.0);
-        B[55] = softehl_splat(0.0);
+        const V v1 = s[6] * s[6], v2 = 1.0 + v1, v3 = softehl_vlog(v2),
+            v4 = softehl_vexp(p[4] * v3), v5 = p[3] * v4, v6 = p[0] + v5, v7 = 1.0 / v6,
+            v8 = 0.08566224618958518 * s[6], v9 = s[1] * s[1], v10 = 1.0 + v9,
+            v11 = softehl_vlog(v10), v12 = softehl_vexp(p[4] * v11), v13 = p[3] * v12,
+            v14 = p[0] + v13, v15 = 1.0 / v14, v16 = 0.08566224618958518 * s[1], v17 = s[2] * s[2],
+            v18 = 1.0 + v17, v19 = softehl_vlog(v18), v20 = softehl_vexp(p[4] * v19),
+            v21 = p[3] * v20, v22 = p[0] + v21, v23 = 1.0 / v22, v24 = 0.1803807865240693 * s[2],
+            v25 = s[5] * s[5], v26 = 1.0 + v25, v27 = softehl_vlog(v26),
+            v28 = softehl_vexp(p[4] * v27), v29 = p[3] * v28, v30 = p[0] + v29, v31 = 1.0 / v30,
+            v32 = 0.1803807865240693 * s[5], v33 = s[3] * s[3], v34 = 1.0 + v33,
+            v35 = softehl_vlog(v34), v36 = softehl_vexp(p[4] * v35), v37 = p[3] * v36,
+            v38 = p[0] + v37, v39 = 1.0 / v38, v40 = 0.23395696728634552 * s[3], v41 = s[4] * s[4],
+            v42 = 1.0 + v41, v43 = softehl_vlog(v42), v44 = softehl_vexp(p[4] * v43),
+            v45 = p[3] * v44, v46 = p[0] + v45, v47 = 1.0 / v46, v48 = 0.23395696728634552 * s[4],
+            v49 = v48 * v47 + (v40 * v39 + (v32 * v31 + (v24 * v23 + (v16 * v15 + v8 * v7)))),
+            v50 = 1.0 / (v14 * v14), v51 = 1.0 + v9 * v50, v52 = softehl_vlog(v51),
+            v53 = softehl_vexp(p[2] * v52), v54 = p[3] * v53, v55 = p[0] + v54, v56 = s[1] * v55,
+            v57 = 1.0 / (v22 * v22), v58 = 1.0 + v17 * v57, v59 = softehl_vlog(v58),
+            v60 = softehl_vexp(p[2] * v59), v61 = p[3] * v60, v62 = p[0] + v61, v63 = s[2] * v62,
+            v64 = 1.0 / (v38 * v38), v65 = 1.0 + v33 * v64, v66 = softehl_vlog(v65),
+            v67 = softehl_vexp(p[2] * v66), v68 = p[3] * v67, v69 = p[0] + v68, v70 = s[3] * v69,
+            v71 = 1.0 / (v46 * v46), v72 = 1.0 + v41 * v71, v73 = softehl_vlog(v72),
+            v74 = softehl_vexp(p[2] * v73), v75 = p[3] * v74, v76 = p[0] + v75, v77 = s[4] * v76,
+            v78 = 1.0 / (v30 * v30), v79 = 1.0 + v25 * v78, v80 = softehl_vlog(v79),
+            v81 = softehl_vexp(p[2] * v80), v82 = p[3] * v81, v83 = p[0] + v82, v84 = s[5] * v83,
+            v85 = 1.0 / (v6 * v6), v86 = 1.0 + v1 * v85, v87 = softehl_vlog(v86),
+            v88 = softehl_vexp(p[2] * v87), v89 = p[3] * v88, v90 = p[0] + v89, v91 = s[6] * v90,
+            v92 = 2.0 * s[1], v93 = 1.0 / v10, v94 = v15 * v15, v95 = v16 * v94, v96 = v13 * v95,
+            v97 = 2.0 * s[2], v98 = 1.0 / v18, v99 = v23 * v23, v100 = v24 * v99, v101 = v21 * v100,
+            v102 = 2.0 * s[3], v103 = 1.0 / v34, v104 = v39 * v39, v105 = v40 * v104,
+            v106 = v37 * v105, v107 = 2.0 * s[4], v108 = 1.0 / v42, v109 = v47 * v47,
+            v110 = v48 * v109, v111 = v45 * v110, v112 = 2.0 * s[5], v113 = 1.0 / v26,
+            v114 = v31 * v31, v115 = v32 * v114, v116 = v29 * v115, v117 = 2.0 * s[6],
+            v118 = 1.0 / v2, v119 = v7 * v7, v120 = v8 * v119, v121 = v5 * v120, v122 = s[1] * v15,
+            v123 = v54 * v122, v124 = v123 * (p[2] * (1.0 / v51)),
+            v125 = v56 * v94 + v124 * (v50 * (v50 * (v14 * (2.0 * v9)))), v126 = v13 * v125,
+            v127 = s[2] * v23, v128 = v61 * v127, v129 = v128 * (p[2] * (1.0 / v58)),
+            v130 = v63 * v99 + v129 * (v57 * (v57 * (v22 * (2.0 * v17)))), v131 = v21 * v130,
+            v132 = s[3] * v39, v133 = v68 * v132, v134 = v133 * (p[2] * (1.0 / v65)),
+            v135 = v70 * v104 + v134 * (v64 * (v64 * (v38 * (2.0 * v33)))), v136 = v37 * v135,
+            v137 = s[4] * v47, v138 = v75 * v137, v139 = v138 * (p[2] * (1.0 / v72)),
+            v140 = v77 * v109 + v139 * (v71 * (v71 * (v46 * (2.0 * v41)))), v141 = v45 * v140,
+            v142 = s[5] * v31, v143 = v82 * v142, v144 = v143 * (p[2] * (1.0 / v79)),
+            v145 = v84 * v114 + v144 * (v78 * (v78 * (v30 * (2.0 * v25)))), v146 = v29 * v145,
+            v147 = s[6] * v7, v148 = v89 * v147, v149 = v148 * (p[2] * (1.0 / v86)),
+            v150 = v91 * v119 + v149 * (v85 * (v85 * (v6 * (2.0 * v1)))), v151 = v5 * v150,
+            v152 = v44 * v110 + v36 * v105 + v28 * v115 + v20 * v100 + v4 * v120 + v12 * v95,
+            v153 = v43 * v111 + v35 * v106 + v27 * v116 + v19 * v101 + v3 * v121 + v11 * v96;
+        g[0] = v49 - p[1]; g[1] = v15 * v56 - (s[0] + p[5]); g[2] = v23 * v63 - (s[0] + p[6]);
+        g[3] = v39 * v70 - (s[0] + p[7]); g[4] = p[7] - s[0] + v47 * v77;
+        g[5] = p[6] - s[0] + v31 * v84; g[6] = p[5] - s[0] + v7 * v91; A[0] = softehl_splat(0.0);
+        A[1] = 0.08566224618958518 * v15 - v96 * (v93 * (p[4] * v92));
+        A[2] = 0.1803807865240693 * v23 - v101 * (v98 * (p[4] * v97));
+        A[3] = 0.23395696728634552 * v39 - v106 * (v103 * (p[4] * v102));
+        A[4] = 0.23395696728634552 * v47 - v111 * (v108 * (p[4] * v107));
+        A[5] = 0.1803807865240693 * v31 - v116 * (v113 * (p[4] * v112));
+        A[6] = 0.08566224618958518 * v7 - v121 * (v118 * (p[4] * v117));
+        A[7] = softehl_splat((-1.0)); A[8] = v15 * v55 + v92 * (v50 * v124 - p[4] * v93 * v126);
+        A[9] = softehl_splat(0.0); A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0);
+        A[12] = softehl_splat(0.0); A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0));
+        A[15] = softehl_splat(0.0); A[16] = v23 * v62 + v97 * (v57 * v129 - p[4] * v98 * v131);
+        A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0); A[19] = softehl_splat(0.0);
+        A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0)); A[22] = softehl_splat(0.0);
+        A[23] = softehl_splat(0.0); A[24] = v39 * v69 + v102 * (v64 * v134 - p[4] * v103 * v136);
+        A[25] = softehl_splat(0.0); A[26] = softehl_splat(0.0); A[27] = softehl_splat(0.0);
+        A[28] = softehl_splat((-1.0)); A[29] = softehl_splat(0.0); A[30] = softehl_splat(0.0);
+        A[31] = softehl_splat(0.0); A[32] = v47 * v76 + v107 * (v71 * v139 - p[4] * v108 * v141);
+        A[33] = softehl_splat(0.0); A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0));
+        A[36] = softehl_splat(0.0); A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0);
+        A[39] = softehl_splat(0.0); A[40] = v31 * v83 + v112 * (v78 * v144 - p[4] * v113 * v146);
+        A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0)); A[43] = softehl_splat(0.0);
+        A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0); A[46] = softehl_splat(0.0);
+        A[47] = softehl_splat(0.0); A[48] = v7 * v90 + v117 * (v85 * v149 - p[4] * v118 * v151);
+        B[0] = -(v110 + v105 + v115 + v100 + v120 + v95); B[1] = softehl_splat((-1.0));
+        B[2] = softehl_splat(0.0); B[3] = -v152; B[4] = -v153; B[5] = softehl_splat(0.0);
+        B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0); B[8] = v122 - v125;
+        B[9] = softehl_splat(0.0); B[10] = v52 * v123; B[11] = v53 * v122 - v12 * v125;
+        B[12] = -(v11 * v126); B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0);
+        B[15] = softehl_splat(0.0); B[16] = v127 - v130; B[17] = softehl_splat(0.0);
+        B[18] = v59 * v128; B[19] = v60 * v127 - v20 * v130; B[20] = -(v19 * v131);
+        B[21] = softehl_splat(0.0); B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0);
+        B[24] = v132 - v135; B[25] = softehl_splat(0.0); B[26] = v66 * v133;
+        B[27] = v67 * v132 - v36 * v135; B[28] = -(v35 * v136); B[29] = softehl_splat(0.0);
+        B[30] = softehl_splat(0.0); B[31] = softehl_splat((-1.0)); B[32] = v137 - v140;
+        B[33] = softehl_splat(0.0); B[34] = v73 * v138; B[35] = v74 * v137 - v44 * v140;
+        B[36] = -(v43 * v141); B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0);
+        B[39] = softehl_splat(1.0); B[40] = v142 - v145; B[41] = softehl_splat(0.0);
+        B[42] = v80 * v143; B[43] = v81 * v142 - v28 * v145; B[44] = -(v27 * v146);
+        B[45] = softehl_splat(0.0); B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0);
+        B[48] = v147 - v150; B[49] = softehl_splat(0.0); B[50] = v87 * v148;
+        B[51] = v88 * v147 - v4 * v150; B[52] = -(v3 * v151); B[53] = softehl_splat(1.0);
+        B[54] = softehl_splat(0.0); B[55] = softehl_splat(0.0);
         V felt[7];
         for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
         for (int i = 0; i < 7; ++i) {
@@ -636,32 +220,17 @@ static void softehl_film_carreau_inverse_7_lanes(
     *lost |= spoilt;
 }
 
-static void softehl_film_carreau_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_carreau_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 14, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 14, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
-    softehl_load4(t + 8, 14, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13;
-    softehl_load2(t + 12, 14, &t12, &t13);
-    (void)t12; (void)t13;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13;
+    softehl_load4(t + 0, 14, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 14, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 14, &t8, &t9, &t10, &t11); softehl_load2(t + 12, 14, &t12, &t13);
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -677,1118 +246,210 @@ static void softehl_film_carreau_pseudo_load_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const double v1 = 6.283185307179586 * parameters[5];
-    const V v2 = parameters[2] * t7;
-    const double v3 = 1.0 - parameters[9];
-    const V v4 = X2 + d2;
-    const V v5 = 6.283185307179586 * t9;
-    const double v6 = 1.0 / parameters[7];
-    const double v7 = 0.5 * parameters[7];
-    const V v8 = t2 - t0;
-    const double v9 = 1.0 / parameters[8];
-    const V v10 = 0.5 * v8;
-    const double v11 = parameters[8] - 1.0;
-    const double v12 = 0.5 * v11;
-    const V v13 = v4 - X0;
-    const V v14 = v13 - d0;
-    const V v15 = X1 - parameters[0];
-    const V v16 = X3 - parameters[0];
-    const V v17 = 0.5 * v14;
-    const V v18 = v14 * v10;
-    const V v19 = parameters[4] * v10;
-    const V v20 = X3 + d3;
-    const V v21 = d3 + v16;
-    const double v22 = v9 * v12;
-    const V v23 = v17 * t8;
-    const V v24 = v19 + v23;
-    const V v25 = v17 * v17;
-    const V v26 = v6 * t11;
-    const V v27 = 0.5 * t11;
-    const V v28 = d1 + v15;
-    const V v29 = v20 - X1;
-    const V v30 = v29 - d1;
-    const V v31 = 0.5 * t12;
-    const V v32 = 0.5 * v30;
-    const double v33 = 0.5 * parameters[6];
-    const V v34 = 5.0 * v30;
-    const V v35 = v22 * t12;
-    const V v36 = v31 - v35;
-    const V v37 = v9 * v36;
-    const V v38 = v32 * v32;
-    const V v39 = t3 - t1;
-    const V v40 = t1 - t4;
-    const V v41 = t3 - t4;
-    const V v42 = 0.5 * v39;
-    const V v43 = v38 + v25;
-    const V v44 = v38 * v38;
-    const V v45 = v30 * v42;
-    const V v46 = v45 + v18;
-    const V v47 = v32 * v44;
-    const V v48 = v44 * v34;
-    const V v49 = v44 * v48;
-    const V v50 = v42 * v49;
-    const V v51 = softehl_vsqrt(v43);
-    const V v52 = v43 * v43;
-    const V v53 = 1.0 / v43;
-    const V v54 = 4.0 * v43;
-    const V v55 = v47 * v47;
-    const V v56 = v52 * v54;
-    const V v57 = v52 * v52;
-    const V v58 = 1.0 / v57;
-    const V v59 = parameters[6] * v51;
-    const V v60 = softehl_vsqrt(v53);
-    const V v61 = v60 * v33;
-    const V v62 = v58 * v56;
-    const V v63 = v55 * v62;
-    const V v64 = v58 * v55;
-    const V v65 = v25 + v64;
-    const V v66 = v46 * v63;
-    const V v67 = v50 - v66;
-    const V v68 = v58 * v67;
-    const V v69 = v18 + v68;
-    const V v70 = v46 * v61;
-    const V v71 = v51 * t10;
-    const V v72 = v71 + v70;
-    const V v73 = softehl_vsqrt(v65);
-    const V v74 = 1.0 / v73;
-    const V v75 = 1.0 / v65;
-    const V v76 = softehl_vsqrt(v75);
-    const V v77 = 0.5 * v74;
-    const V v78 = v74 * v77;
-    const V v79 = v76 * v78;
-    const V v80 = v69 * v79;
-    V s81 = softehl_splat(0.0);
-    V s82 = softehl_splat(0.0);
-    V s83 = softehl_splat(0.0);
-    V s84 = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5]; const V v2 = parameters[2] * t7;
+    const double v3 = 1.0 - parameters[9]; const V v4 = 6.283185307179586 * t9;
+    const double v5 = 1.0 / parameters[7], v6 = 0.5 * parameters[7], v7 = 1.0 / parameters[8];
+    const V v8 = 0.5 * (t2 - t0); const double v9 = 0.5 * (parameters[8] - 1.0);
+    const V v10 = X2 + d2 - X0 - d0, v11 = 0.5 * v10, v12 = v10 * v8,
+        v13 = d3 + (X3 - parameters[0]);
+    const double v14 = v7 * v9;
+    const V v15 = parameters[4] * v8 + v11 * t8, v16 = v11 * v11, v17 = v5 * t11, v18 = 0.5 * t11,
+        v19 = d1 + (X1 - parameters[0]), v20 = X3 + d3 - X1 - d1, v21 = 0.5 * t12, v22 = 0.5 * v20,
+        v23 = v7 * (v21 - v14 * t12), v24 = v22 * v22, v25 = t1 - t4, v26 = t3 - t4,
+        v27 = 0.5 * (t3 - t1), v28 = v24 + v16, v29 = v24 * v24, v30 = v20 * v27 + v12,
+        v31 = v22 * v29, v32 = softehl_vsqrt(v28), v33 = v28 * v28, v34 = v31 * v31,
+        v35 = 1.0 / (v33 * v33), v36 = parameters[6] * v32, v37 = softehl_vsqrt(1.0 / v28),
+        v38 = v16 + v35 * v34,
+        v39 = v27 * (v29 * (v29 * (5.0 * v20))) - v30 * (v34 * (v35 * (v33 * (4.0 * v28)))),
+        v40 = v32 * t10 + v30 * (v37 * (0.5 * parameters[6])), v41 = softehl_vsqrt(v38),
+        v42 = 1.0 / v41, v43 = softehl_vsqrt(1.0 / v38),
+        v44 = (v12 + v35 * v39) * (v43 * (v42 * (0.5 * v42)));
+    V s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v85 = 0.5 * w[0];
-        const V v86 = p1 * v74;
-        const double v87 = 0.5 - v85;
-        const double v88 = 0.5 + v85;
-        const V v89 = p0 * parameters[3];
-        const V v90 = softehl_vexp(v89);
-        const V v91 = v87 * v28;
-        const V v92 = v87 * v40;
-        const V v93 = v88 * v21;
-        const V v94 = v91 + v93;
-        const V v95 = parameters[0] + v94;
-        const V v96 = v88 * v41;
-        const V v97 = v92 + v96;
-        const V v98 = t4 + v97;
-        const V v99 = 0.5 * v94;
-        const V v100 = parameters[7] * v94;
-        const V v101 = v99 * v86;
-        const V v102 = parameters[2] * v90;
-        const V v103 = 1.0 / v100;
-        const V v104 = parameters[1] * v102;
-        const V v105 = v104 * v103;
-        const V v106 = v6 * v101;
-        const V v107 = v1 * v98;
-        const V v108 = v95 * v1;
-        const V v109 = v95 * v5;
-        const V v110 = v107 + v109;
-        const V v111 = v105 * v105;
-        const V v112 = 1.0 + v111;
-        const V v113 = softehl_vlog(v112);
-        const V v114 = v113 * v12;
-        const V v115 = v108 * v10;
-        const V v116 = softehl_vexp(v114);
-        const V v117 = v3 * v116;
-        const V v118 = parameters[9] + v117;
-        const V v119 = v105 * v118;
-        const V v120 = v17 * v110;
-        const V v121 = v115 + v120;
-        const V v122 = p0 * v121;
-        const V v123 = w[1] * v122;
-        const V v124 = v88 * v123;
-        s81 += v124;
-        const V v125 = v87 * v123;
-        s82 += v125;
-        const V v126 = 0.932469514203152 * v106;
-        const V v127 = 0.6612093864662645 * v106;
-        const V v128 = 0.2386191860831969 * v106;
-        const V v129 = v119 + v126;
-        const V v130 = v119 + v127;
-        const V v131 = v119 + v128;
-        const V v132 = v119 - v128;
-        const V v133 = v119 - v127;
-        const V v134 = v119 - v126;
-        V v135[7];
-        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v105, softehl_splat(v12), softehl_splat(v3), softehl_splat(v22), v126, v127, v128, v119, v129, v130, v131, v132, v133, v134}, v135, &failed);
-        const V v136 = v135[1];
-        const V v137 = v135[2];
-        const V v138 = v135[3];
-        const V v139 = v135[4];
-        const V v140 = v135[5];
-        const V v141 = v135[6];
-        const V v142 = v136 * v136;
-        const V v143 = v137 * v137;
-        const V v144 = v138 * v138;
-        const V v145 = v139 * v139;
-        const V v146 = v140 * v140;
-        const V v147 = v141 * v141;
-        const V v148 = 1.0 + v142;
-        const V v149 = 1.0 + v143;
-        const V v150 = 1.0 + v144;
-        const V v151 = 1.0 + v145;
-        const V v152 = 1.0 + v146;
-        const V v153 = 1.0 + v147;
-        const V v154 = softehl_vlog(v148);
-        const V v155 = softehl_vlog(v149);
-        const V v156 = softehl_vlog(v150);
-        const V v157 = softehl_vlog(v151);
-        const V v158 = softehl_vlog(v152);
-        const V v159 = softehl_vlog(v153);
-        const V v160 = 2.0 * v139;
-        const V v161 = 2.0 * v138;
-        const V v162 = 2.0 * v140;
-        const V v163 = 2.0 * v137;
-        const V v164 = 2.0 * v141;
-        const V v165 = 2.0 * v136;
-        const V v166 = 1.0 / v151;
-        const V v167 = 1.0 / v150;
-        const V v168 = 1.0 / v152;
-        const V v169 = 1.0 / v149;
-        const V v170 = 1.0 / v153;
-        const V v171 = 1.0 / v148;
-        const V v172 = v22 * v155;
-        const V v173 = v22 * v156;
-        const V v174 = v22 * v154;
-        const V v175 = v22 * v159;
-        const V v176 = v22 * v157;
-        const V v177 = softehl_vexp(v172);
-        const V v178 = softehl_vexp(v173);
-        const V v179 = softehl_vexp(v174);
-        const V v180 = softehl_vexp(v175);
-        const V v181 = softehl_vexp(v176);
-        const V v182 = v22 * v158;
-        const V v183 = softehl_vexp(v182);
-        const V v184 = v22 * v166;
-        const V v185 = v22 * v167;
-        const V v186 = v22 * v168;
-        const V v187 = v22 * v169;
-        const V v188 = v22 * v170;
-        const V v189 = v22 * v171;
-        const V v190 = v163 * v187;
-        const V v191 = v165 * v189;
-        const V v192 = v160 * v184;
-        const V v193 = v161 * v185;
-        const V v194 = v164 * v188;
-        const V v195 = v162 * v186;
-        const V v196 = v3 * v177;
-        const V v197 = v3 * v178;
-        const V v198 = v3 * v179;
-        const V v199 = v3 * v180;
-        const V v200 = v3 * v181;
-        const V v201 = v3 * v183;
-        const V v202 = 0.08566224618958518 * v136;
-        const V v203 = parameters[9] + v196;
-        const V v204 = parameters[9] + v197;
-        const V v205 = parameters[9] + v198;
-        const V v206 = parameters[9] + v199;
-        const V v207 = parameters[9] + v200;
-        const V v208 = parameters[9] + v201;
-        const V v209 = 1.0 / v203;
-        const V v210 = v203 * v203;
-        const V v211 = 1.0 / v204;
-        const V v212 = v204 * v204;
-        const V v213 = 1.0 / v205;
-        const V v214 = v205 * v205;
-        const V v215 = 1.0 / v206;
-        const V v216 = v206 * v206;
-        const V v217 = 1.0 / v210;
-        const V v218 = 1.0 / v212;
-        const V v219 = 1.0 / v214;
-        const V v220 = 1.0 / v207;
-        const V v221 = v207 * v207;
-        const V v222 = 1.0 / v216;
-        const V v223 = 1.0 / v208;
-        const V v224 = v208 * v208;
-        const V v225 = 1.0 / v221;
-        const V v226 = 1.0 / v224;
-        const V v227 = 0.08566224618958518 * v141;
-        const V v228 = 0.1803807865240693 * v137;
-        const V v229 = 0.1803807865240693 * v140;
-        const V v230 = 0.23395696728634552 * v138;
-        const V v231 = 0.23395696728634552 * v139;
-        const V v232 = v137 * v209;
-        const V v233 = v209 * v209;
-        const V v234 = 0.1803807865240693 * v209;
-        const V v235 = v138 * v211;
-        const V v236 = v211 * v211;
-        const V v237 = 0.23395696728634552 * v211;
-        const V v238 = v233 * v228;
-        const V v239 = v236 * v230;
-        const V v240 = v141 * v215;
-        const V v241 = v215 * v215;
-        const V v242 = 0.08566224618958518 * v215;
-        const V v243 = v241 * v227;
-        const V v244 = v213 * v213;
-        const V v245 = v136 * v213;
-        const V v246 = 0.08566224618958518 * v213;
-        const V v247 = v139 * v220;
-        const V v248 = v220 * v220;
-        const V v249 = 0.23395696728634552 * v220;
-        const V v250 = v244 * v202;
-        const V v251 = v248 * v231;
-        const V v252 = v196 * v238;
-        const V v253 = v197 * v239;
-        const V v254 = v199 * v243;
-        const V v255 = v190 * v252;
-        const V v256 = v234 - v255;
-        const V v257 = v198 * v250;
-        const V v258 = v193 * v253;
-        const V v259 = v237 - v258;
-        const V v260 = v223 * v223;
-        const V v261 = v140 * v223;
-        const V v262 = 0.1803807865240693 * v223;
-        const V v263 = v194 * v254;
-        const V v264 = v242 - v263;
-        const V v265 = v200 * v251;
-        const V v266 = v260 * v229;
-        const V v267 = v191 * v257;
-        const V v268 = v246 - v267;
-        const V v269 = v142 * v219;
-        const V v270 = 1.0 + v269;
-        const V v271 = v192 * v265;
-        const V v272 = v249 - v271;
-        const V v273 = softehl_vlog(v270);
-        const V v274 = v143 * v217;
-        const V v275 = 1.0 + v274;
-        const V v276 = v201 * v266;
-        const V v277 = softehl_vlog(v275);
-        const V v278 = v144 * v218;
-        const V v279 = 1.0 + v278;
-        const V v280 = v145 * v225;
-        const V v281 = 1.0 + v280;
-        const V v282 = softehl_vlog(v279);
-        const V v283 = softehl_vlog(v281);
-        const V v284 = v146 * v226;
-        const V v285 = 1.0 + v284;
-        const V v286 = v195 * v276;
-        const V v287 = v262 - v286;
-        const V v288 = softehl_vlog(v285);
-        const V v289 = v147 * v222;
-        const V v290 = 1.0 + v289;
-        const V v291 = softehl_vlog(v290);
-        const V v292 = 2.0 * v142;
-        const V v293 = 2.0 * v143;
-        const V v294 = 2.0 * v144;
-        const V v295 = 2.0 * v145;
-        const V v296 = 2.0 * v146;
-        const V v297 = v292 * v205;
-        const V v298 = v293 * v203;
-        const V v299 = v294 * v204;
-        const V v300 = 2.0 * v147;
-        const V v301 = v295 * v207;
-        const V v302 = v296 * v208;
-        const V v303 = v136 * v244;
-        const V v304 = v137 * v233;
-        const V v305 = v300 * v206;
-        const V v306 = v138 * v236;
-        const V v307 = v139 * v248;
-        const V v308 = v219 * v297;
-        const V v309 = v217 * v298;
-        const V v310 = v218 * v299;
-        const V v311 = v225 * v301;
-        const V v312 = v226 * v302;
-        const V v313 = v219 * v308;
-        const V v314 = v217 * v309;
-        const V v315 = v218 * v310;
-        const V v316 = v225 * v311;
-        const V v317 = v226 * v312;
-        const V v318 = v140 * v260;
-        const V v319 = v222 * v305;
-        const V v320 = v141 * v241;
-        const V v321 = 1.0 / v270;
-        const V v322 = 1.0 / v275;
-        const V v323 = 1.0 / v279;
-        const V v324 = v222 * v319;
-        const V v325 = 1.0 / v281;
-        const V v326 = 1.0 / v285;
-        const V v327 = 1.0 / v290;
-        const V v328 = v12 * v273;
-        const V v329 = v12 * v277;
-        const V v330 = v12 * v282;
-        const V v331 = v12 * v283;
-        const V v332 = v12 * v288;
-        const V v333 = softehl_vexp(v328);
-        const V v334 = softehl_vexp(v329);
-        const V v335 = softehl_vexp(v330);
-        const V v336 = softehl_vexp(v331);
-        const V v337 = softehl_vexp(v332);
-        const V v338 = v12 * v291;
-        const V v339 = softehl_vexp(v338);
-        const V v340 = v12 * v321;
-        const V v341 = v12 * v322;
-        const V v342 = v12 * v323;
-        const V v343 = v12 * v325;
-        const V v344 = v12 * v326;
-        const V v345 = v12 * v327;
-        const V v346 = v3 * v335;
-        const V v347 = v3 * v337;
-        const V v348 = v3 * v339;
-        const V v349 = parameters[9] + v346;
-        const V v350 = v346 * v235;
-        const V v351 = v350 * v342;
-        const V v352 = parameters[9] + v347;
-        const V v353 = v347 * v261;
-        const V v354 = v353 * v344;
-        const V v355 = parameters[9] + v348;
-        const V v356 = v348 * v240;
-        const V v357 = v356 * v345;
-        const V v358 = v3 * v333;
-        const V v359 = parameters[9] + v358;
-        const V v360 = v358 * v245;
-        const V v361 = v360 * v340;
-        const V v362 = v3 * v334;
-        const V v363 = v3 * v336;
-        const V v364 = parameters[9] + v362;
-        const V v365 = v362 * v232;
-        const V v366 = v365 * v341;
-        const V v367 = parameters[9] + v363;
-        const V v368 = v363 * v247;
-        const V v369 = v368 * v343;
-        const V v370 = v213 * v359;
-        const V v371 = v303 * v359;
-        const V v372 = v313 * v361;
-        const V v373 = v371 + v372;
-        const V v374 = v198 * v373;
-        const V v375 = v219 * v361;
-        const V v376 = v189 * v374;
-        const V v377 = v375 - v376;
-        const V v378 = v165 * v377;
-        const V v379 = v370 + v378;
-        const V v380 = v209 * v364;
-        const V v381 = v304 * v364;
-        const V v382 = v314 * v366;
-        const V v383 = v381 + v382;
-        const V v384 = v196 * v383;
-        const V v385 = v217 * v366;
-        const V v386 = v187 * v384;
-        const V v387 = v385 - v386;
-        const V v388 = v163 * v387;
-        const V v389 = v380 + v388;
-        const V v390 = v211 * v349;
-        const V v391 = v306 * v349;
-        const V v392 = v315 * v351;
-        const V v393 = v391 + v392;
-        const V v394 = v197 * v393;
-        const V v395 = v218 * v351;
-        const V v396 = v185 * v394;
-        const V v397 = v395 - v396;
-        const V v398 = v161 * v397;
-        const V v399 = v390 + v398;
-        const V v400 = v220 * v367;
-        const V v401 = v307 * v367;
-        const V v402 = v316 * v369;
-        const V v403 = v401 + v402;
-        const V v404 = v200 * v403;
-        const V v405 = v225 * v369;
-        const V v406 = v184 * v404;
-        const V v407 = v405 - v406;
-        const V v408 = v160 * v407;
-        const V v409 = v400 + v408;
-        const V v410 = v223 * v352;
-        const V v411 = v318 * v352;
-        const V v412 = v317 * v354;
-        const V v413 = v411 + v412;
-        const V v414 = v201 * v413;
-        const V v415 = v226 * v354;
-        const V v416 = v186 * v414;
-        const V v417 = v415 - v416;
-        const V v418 = v162 * v417;
-        const V v419 = v410 + v418;
-        const V v420 = v215 * v355;
-        const V v421 = v320 * v355;
-        const V v422 = v324 * v357;
-        const V v423 = v421 + v422;
-        const V v424 = v199 * v423;
-        const V v425 = v222 * v357;
-        const V v426 = v188 * v424;
-        const V v427 = v425 - v426;
-        const V v428 = v164 * v427;
-        const V v429 = v420 + v428;
-        V v430[49];
-        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v268, v256, v259, v272, v287, v264, softehl_splat((-1.0)), v379, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v389, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v399, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v409, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v419, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v429}, v430, &failed);
-        const V v431 = v135[0];
-        const V v432 = p1 * v80;
-        const V v433 = v102 * t5;
-        const V v434 = v273 * v360;
-        const V v435 = v99 * v432;
-        const V v436 = v277 * v365;
-        const V v437 = v282 * v350;
-        const V v438 = v283 * v368;
-        const V v439 = v288 * v353;
-        const V v440 = v291 * v356;
-        const V v441 = p0 * v2;
-        const V v442 = t6 + v441;
-        const V v443 = -p0;
-        const V v444 = p0 * v32;
-        const V v445 = p0 * v42;
-        const V v446 = v90 * v442;
-        const M v447 = softehl_lt(softehl_splat(0.0), v443);
-        const V v448 = 0.5 * v97;
-        const V v449 = parameters[7] * v97;
-        const V v450 = v86 * v448;
-        const V v451 = parameters[7] * v431;
-        const V v452 = v431 * t11;
-        const V v453 = v435 + v452;
-        const V v454 = v94 * t11;
-        const V v455 = v449 + v454;
-        const V v456 = parameters[1] * v446;
-        const V v457 = v433 + v456;
-        const V v458 = v105 * v455;
-        const V v459 = v457 - v458;
-        const V v460 = v451 - v101;
-        const V v461 = v154 * v374;
-        const V v462 = v154 * v257;
-        const V v463 = v181 * v251;
-        const V v464 = v251 - v463;
-        const V v465 = v453 - v450;
-        const V v466 = v460 * v72;
-        const V v467 = v445 - v466;
-        const V v468 = v59 * v460;
-        const V v469 = v444 - v468;
-        const V v470 = v103 * v459;
-        const V v471 = v450 - v435;
-        const V v472 = v101 * v26;
-        const V v473 = v471 - v472;
-        const V v474 = v239 + v464;
-        const V v475 = v6 * v473;
-        const V v476 = v469 * v110;
-        const V v477 = v157 * v265;
-        const V v478 = v477 + v462;
-        const V v479 = v157 * v404;
-        const V v480 = v178 * v239;
-        const V v481 = v474 - v480;
-        const V v482 = v155 * v384;
-        const V v483 = v155 * v252;
-        const V v484 = v483 + v478;
-        const V v485 = v156 * v394;
-        const V v486 = v156 * v253;
-        const V v487 = v486 + v484;
-        const V v488 = v158 * v414;
-        const V v489 = v158 * v276;
-        const V v490 = v489 + v487;
-        const V v491 = 0.932469514203152 * v475;
-        const V v492 = 0.6612093864662645 * v475;
-        const V v493 = 0.2386191860831969 * v475;
-        const V v494 = v266 + v481;
-        const V v495 = v159 * v424;
-        const V v496 = v159 * v254;
-        const V v497 = v496 + v490;
-        const V v498 = v430[0];
-        const V v499 = v430[1];
-        const V v500 = v430[2];
-        const V v501 = v430[3];
-        const V v502 = v183 * v266;
-        const V v503 = v494 - v502;
-        const V v504 = v430[4];
-        const V v505 = v498 * v497;
-        const V v506 = v430[5];
-        const V v507 = v430[6];
-        const V v508 = v495 * v507;
-        const V v509 = v508 + v505;
-        const V v510 = v434 * v499;
-        const V v511 = v499 - v507;
-        const V v512 = v500 - v506;
-        const V v513 = v501 - v504;
-        const V v514 = v492 * v512;
-        const V v515 = v238 + v503;
-        const V v516 = v436 * v500;
-        const V v517 = v510 + v516;
-        const V v518 = v333 * v245;
-        const V v519 = v518 - v245;
-        const V v520 = v461 * v499;
-        const V v521 = v520 + v509;
-        const V v522 = v177 * v238;
-        const V v523 = v515 - v522;
-        const V v524 = v437 * v501;
-        const V v525 = v524 + v517;
-        const V v526 = v491 * v511;
-        const V v527 = v526 + v514;
-        const V v528 = v334 * v232;
-        const V v529 = v528 - v232;
-        const V v530 = v482 * v500;
-        const V v531 = v530 + v521;
-        const V v532 = v493 * v513;
-        const V v533 = v532 + v527;
-        const V v534 = v438 * v504;
-        const V v535 = v534 + v525;
-        const V v536 = v243 + v523;
-        const V v537 = v177 * v383;
-        const V v538 = v529 - v537;
-        const V v539 = v383 + v538;
-        const V v540 = v500 * v539;
-        const V v541 = v485 * v501;
-        const V v542 = v541 + v531;
-        const V v543 = v470 * v498;
-        const V v544 = v543 + v533;
-        const V v545 = v180 * v243;
-        const V v546 = v536 - v545;
-        const V v547 = v439 * v506;
-        const V v548 = v547 + v535;
-        const V v549 = v373 + v519;
-        const V v550 = v479 * v504;
-        const V v551 = v550 + v542;
-        const V v552 = v335 * v235;
-        const V v553 = v552 - v235;
-        const V v554 = v440 * v507;
-        const V v555 = v554 + v548;
-        const V v556 = v179 * v373;
-        const V v557 = v549 - v556;
-        const V v558 = v179 * v250;
-        const V v559 = v546 - v558;
-        const V v560 = v499 * v557;
-        const V v561 = v540 + v560;
-        const V v562 = v250 + v559;
-        const V v563 = v488 * v506;
-        const V v564 = v563 + v551;
-        const V v565 = v31 * v555;
-        const V v566 = v544 - v565;
-        const V v567 = v393 + v553;
-        const V v568 = v178 * v393;
-        const V v569 = v567 - v568;
-        const V v570 = v501 * v569;
-        const V v571 = v561 + v570;
-        const V v572 = v37 * v564;
-        const V v573 = v566 + v572;
-        const V v574 = v336 * v247;
-        const V v575 = v574 - v247;
-        const V v576 = v337 * v261;
-        const V v577 = v576 - v261;
-        const V v578 = v498 * v562;
-        const V v579 = v571 + v578;
-        const V v580 = v339 * v240;
-        const V v581 = v580 - v240;
-        const V v582 = v403 + v575;
-        const V v583 = v181 * v403;
-        const V v584 = v582 - v583;
-        const V v585 = v504 * v584;
-        const V v586 = v579 + v585;
-        const V v587 = v180 * v423;
-        const V v588 = v581 - v587;
-        const V v589 = v423 + v588;
-        const V v590 = v413 + v577;
-        const V v591 = v183 * v413;
-        const V v592 = v590 - v591;
-        const V v593 = v506 * v592;
-        const V v594 = v586 + v593;
-        const V v595 = v507 * v589;
-        const V v596 = v594 + v595;
-        const V v597 = t13 * v596;
-        const V v598 = v573 + v597;
-        const V v599 = parameters[7] * v598;
-        const V v600 = v465 + v599;
-        const V v601 = v59 * v600;
-        const V v602 = v467 - v601;
-        const V v603 = v108 * v602;
-        const V v604 = v476 + v603;
-        const V v605 = w[1] * v604;
-        const V v606 = v88 * v605;
-        s83 += v606;
-        const V v607 = v87 * v605;
-        s84 += v607;
-        V v608 = softehl_splat(0.0);
-        const M m609 = v447;
-        if (softehl_any(m609)) {
-            const V v610 = p0 * v24;
-            const V v611 = w[1] * v610;
-            const V v612 = -v611;
-            v608 = softehl_blend(m609, v612, v608);
+        (void)p0, (void)p1; const double v49 = 0.5 * w[0]; const V v50 = p1 * v42;
+        const double v51 = 0.5 - v49, v52 = 0.5 + v49;
+        const V v53 = softehl_vexp(p0 * parameters[3]), v54 = v51 * v19 + v52 * v13,
+            v55 = parameters[0] + v54, v56 = v51 * v25 + v52 * v26, v57 = 0.5 * v54,
+            v58 = parameters[7] * v54, v59 = v57 * v50, v60 = parameters[2] * v53, v61 = 1.0 / v58,
+            v62 = parameters[1] * v60 * v61, v63 = v5 * v59, v64 = v55 * v1,
+            v65 = v1 * (t4 + v56) + v55 * v4, v66 = softehl_vlog(1.0 + v62 * v62),
+            v67 = softehl_vexp(v66 * v9), v68 = v62 * (parameters[9] + v3 * v67),
+            v69 = w[1] * (p0 * (v64 * v8 + v11 * v65));
+        s45 += v52 * v69; s46 += v51 * v69;
+        const V v70 = 0.932469514203152 * v63, v71 = 0.6612093864662645 * v63,
+            v72 = 0.2386191860831969 * v63, v73 = v68 + v70, v74 = v68 + v71, v75 = v68 + v72,
+            v76 = v68 - v72, v77 = v68 - v71, v78 = v68 - v70;
+        V v79[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v62, softehl_splat(v9), softehl_splat(v3), softehl_splat(v14), v70, v71, v72, v68, v73, v74, v75, v76, v77, v78}, v79, &failed);
+        const V v80 = v79[1], v81 = v79[2], v82 = v79[3], v83 = v79[4], v84 = v79[5], v85 = v79[6],
+            v86 = v80 * v80, v87 = v81 * v81, v88 = v82 * v82, v89 = v83 * v83, v90 = v84 * v84,
+            v91 = v85 * v85, v92 = 1.0 + v86, v93 = 1.0 + v87, v94 = 1.0 + v88, v95 = 1.0 + v89,
+            v96 = 1.0 + v90, v97 = 1.0 + v91, v98 = softehl_vlog(v92), v99 = softehl_vlog(v93),
+            v100 = softehl_vlog(v94), v101 = softehl_vlog(v95), v102 = softehl_vlog(v96),
+            v103 = softehl_vlog(v97), v104 = 2.0 * v83, v105 = 2.0 * v82, v106 = 2.0 * v84,
+            v107 = 2.0 * v81, v108 = 2.0 * v85, v109 = 2.0 * v80, v110 = softehl_vexp(v14 * v99),
+            v111 = softehl_vexp(v14 * v100), v112 = softehl_vexp(v14 * v98),
+            v113 = softehl_vexp(v14 * v103), v114 = softehl_vexp(v14 * v101),
+            v115 = softehl_vexp(v14 * v102), v116 = v14 * (1.0 / v95), v117 = v14 * (1.0 / v94),
+            v118 = v14 * (1.0 / v96), v119 = v14 * (1.0 / v93), v120 = v14 * (1.0 / v97),
+            v121 = v14 * (1.0 / v92), v122 = v107 * v119, v123 = v109 * v121, v124 = v104 * v116,
+            v125 = v105 * v117, v126 = v108 * v120, v127 = v106 * v118, v128 = v3 * v110,
+            v129 = v3 * v111, v130 = v3 * v112, v131 = v3 * v113, v132 = v3 * v114,
+            v133 = v3 * v115, v134 = parameters[9] + v128, v135 = parameters[9] + v129,
+            v136 = parameters[9] + v130, v137 = parameters[9] + v131, v138 = parameters[9] + v132,
+            v139 = parameters[9] + v133, v140 = 1.0 / v134, v141 = 1.0 / v135, v142 = 1.0 / v136,
+            v143 = 1.0 / v137, v144 = 1.0 / (v134 * v134), v145 = 1.0 / (v135 * v135),
+            v146 = 1.0 / (v136 * v136), v147 = 1.0 / v138, v148 = 1.0 / (v137 * v137),
+            v149 = 1.0 / v139, v150 = 1.0 / (v138 * v138), v151 = 1.0 / (v139 * v139),
+            v152 = v81 * v140, v153 = v140 * v140, v154 = v82 * v141, v155 = v141 * v141,
+            v156 = v153 * (0.1803807865240693 * v81), v157 = v155 * (0.23395696728634552 * v82),
+            v158 = v85 * v143, v159 = v143 * v143, v160 = v159 * (0.08566224618958518 * v85),
+            v161 = v142 * v142, v162 = v80 * v142, v163 = v83 * v147, v164 = v147 * v147,
+            v165 = v161 * (0.08566224618958518 * v80), v166 = v164 * (0.23395696728634552 * v83),
+            v167 = v128 * v156, v168 = v129 * v157, v169 = v131 * v160,
+            v170 = 0.1803807865240693 * v140 - v122 * v167, v171 = v130 * v165,
+            v172 = 0.23395696728634552 * v141 - v125 * v168, v173 = v149 * v149, v174 = v84 * v149,
+            v175 = 0.08566224618958518 * v143 - v126 * v169, v176 = v132 * v166,
+            v177 = v173 * (0.1803807865240693 * v84),
+            v178 = 0.08566224618958518 * v142 - v123 * v171, v179 = 1.0 + v86 * v146,
+            v180 = 0.23395696728634552 * v147 - v124 * v176, v181 = softehl_vlog(v179),
+            v182 = 1.0 + v87 * v144, v183 = v133 * v177, v184 = softehl_vlog(v182),
+            v185 = 1.0 + v88 * v145, v186 = 1.0 + v89 * v150, v187 = softehl_vlog(v185),
+            v188 = softehl_vlog(v186), v189 = 1.0 + v90 * v151,
+            v190 = 0.1803807865240693 * v149 - v127 * v183, v191 = softehl_vlog(v189),
+            v192 = 1.0 + v91 * v148, v193 = softehl_vlog(v192), v194 = softehl_vexp(v9 * v181),
+            v195 = softehl_vexp(v9 * v184), v196 = softehl_vexp(v9 * v187),
+            v197 = softehl_vexp(v9 * v188), v198 = softehl_vexp(v9 * v191),
+            v199 = softehl_vexp(v9 * v193), v200 = v3 * v196, v201 = v3 * v198, v202 = v3 * v199,
+            v203 = parameters[9] + v200, v204 = v200 * v154, v205 = v204 * (v9 * (1.0 / v185)),
+            v206 = parameters[9] + v201, v207 = v201 * v174, v208 = v207 * (v9 * (1.0 / v189)),
+            v209 = parameters[9] + v202, v210 = v202 * v158, v211 = v210 * (v9 * (1.0 / v192)),
+            v212 = v3 * v194, v213 = parameters[9] + v212, v214 = v212 * v162,
+            v215 = v214 * (v9 * (1.0 / v179)), v216 = v3 * v195, v217 = v3 * v197,
+            v218 = parameters[9] + v216, v219 = v216 * v152, v220 = v219 * (v9 * (1.0 / v182)),
+            v221 = parameters[9] + v217, v222 = v217 * v163, v223 = v222 * (v9 * (1.0 / v186)),
+            v224 = v80 * v161 * v213 + v146 * (v146 * (2.0 * v86 * v136)) * v215,
+            v225 = v130 * v224, v226 = v142 * v213 + v109 * (v146 * v215 - v121 * v225),
+            v227 = v81 * v153 * v218 + v144 * (v144 * (2.0 * v87 * v134)) * v220,
+            v228 = v128 * v227, v229 = v140 * v218 + v107 * (v144 * v220 - v119 * v228),
+            v230 = v82 * v155 * v203 + v145 * (v145 * (2.0 * v88 * v135)) * v205,
+            v231 = v129 * v230, v232 = v141 * v203 + v105 * (v145 * v205 - v117 * v231),
+            v233 = v83 * v164 * v221 + v150 * (v150 * (2.0 * v89 * v138)) * v223,
+            v234 = v132 * v233, v235 = v147 * v221 + v104 * (v150 * v223 - v116 * v234),
+            v236 = v84 * v173 * v206 + v151 * (v151 * (2.0 * v90 * v139)) * v208,
+            v237 = v133 * v236, v238 = v149 * v206 + v106 * (v151 * v208 - v118 * v237),
+            v239 = v85 * v159 * v209 + v148 * (v148 * (2.0 * v91 * v137)) * v211,
+            v240 = v131 * v239, v241 = v143 * v209 + v108 * (v148 * v211 - v120 * v240);
+        V v242[49];
+        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v178, v170, v172, v180, v190, v175, softehl_splat((-1.0)), v226, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v229, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v232, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v235, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v238, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v241}, v242, &failed);
+        const V v243 = v79[0], v244 = v181 * v214, v245 = v57 * (p1 * v44), v246 = v184 * v219,
+            v247 = v187 * v204, v248 = v188 * v222, v249 = v191 * v207, v250 = v193 * v210,
+            v251 = v53 * (t6 + p0 * v2);
+        const M v252 = softehl_lt(softehl_splat(0.0), -p0);
+        const V v253 = 0.5 * v56, v254 = v50 * v253,
+            v255 = v60 * t5 + parameters[1] * v251 - v62 * (parameters[7] * v56 + v54 * t11),
+            v256 = parameters[7] * v243 - v59, v257 = v98 * v225, v258 = v61 * v255,
+            v259 = v5 * (v254 - v245 - v59 * v17), v260 = v101 * v234, v261 = v99 * v228,
+            v262 = v100 * v231, v263 = v102 * v237,
+            v264 = v102 * v183 + (v100 * v168 + (v99 * v167 + (v101 * v176 + v98 * v171))),
+            v265 = 0.932469514203152 * v259, v266 = 0.6612093864662645 * v259,
+            v267 = 0.2386191860831969 * v259, v268 = v103 * v240, v269 = v103 * v169 + v264,
+            v270 = v242[0], v271 = v242[1], v272 = v242[2], v273 = v242[3], v274 = v242[4],
+            v275 = v242[5], v276 = v242[6],
+            v277 = v156 + (v177 + (v157 + (v166 - v114 * v166) - v111 * v157) - v115 * v177),
+            v278 = v267 * (v273 - v274) + (v265 * (v271 - v276) + v266 * (v272 - v275)),
+            v279 = v227 + (v195 * v152 - v152 - v110 * v227),
+            v280 = v262 * v273 + (v261 * v272 + (v257 * v271 + (v268 * v276 + v270 * v269))),
+            v281 = v249 * v275 + (v248 * v274 + (v247 * v273 + (v244 * v271 + v246 * v272))),
+            v282 = v224 + (v194 * v162 - v162) - v112 * v224,
+            v283 = v165 + (v160 + (v277 - v110 * v156) - v113 * v160 - v112 * v165),
+            v284 = v230 + (v196 * v154 - v154) - v111 * v230,
+            v285 = v258 * v270 + v278 - v21 * (v250 * v276 + v281) + v23 * (v263 * v275 + (v260 * v274 + v280)),
+            v286 = v233 + (v197 * v163 - v163) - v114 * v233,
+            v287 = v272 * v279 + v271 * v282 + v273 * v284 + v270 * v283 + v274 * v286,
+            v288 = v239 + (v199 * v158 - v158 - v113 * v239),
+            v289 = v236 + (v198 * v174 - v174) - v115 * v236,
+            v290 = parameters[7] * (v285 + t13 * (v287 + v275 * v289 + v276 * v288)),
+            v291 = v64 * (p0 * v27 - v256 * v40 - v36 * (v245 + v243 * t11 - v254 + v290)),
+            v292 = w[1] * ((p0 * v22 - v36 * v256) * v65 + v291), v293 = v52 * v292;
+        s47 += v293; const V v294 = v51 * v292; s48 += v294; V v295 = softehl_splat(0.0);
+        const M m296 = v252;
+        if (softehl_any(m296)) {
+            const V v297 = -(w[1] * (p0 * v15)); v295 = softehl_blend(m296, v297, v295);
         }
-        const V v613 = 1.0 / v102;
-        const V v614 = v94 * v94;
-        const V v615 = 0.1192694691878821 * v137;
-        const V v616 = 0.05582662111236089 * v138;
-        const V v617 = 0.07987743308995329 * v136;
-        const V v618 = 0.07987743308995329 * v141;
-        const V v619 = 0.05582662111236089 * v139;
-        const V v620 = 0.1192694691878821 * v140;
-        const V v621 = v7 * v614;
-        const V v622 = v614 * v27;
-        const V v623 = v615 * v233;
-        const V v624 = v616 * v236;
-        const V v625 = v617 * v244;
-        const V v626 = v618 * v241;
-        const V v627 = 1.0 - v177;
-        const V v628 = v619 * v248;
-        const V v629 = v100 * v97;
-        const V v630 = v622 + v629;
-        const V v631 = v620 * v260;
-        const V v632 = v618 * v215;
-        const V v633 = 1.0 - v178;
-        const V v634 = 1.0 - v179;
-        const V v635 = 1.0 - v180;
-        const V v636 = 1.0 - v181;
-        const V v637 = 1.0 - v183;
-        const V v638 = parameters[1] * v448;
-        const V v639 = v619 * v220;
-        const V v640 = v632 + v639;
-        const V v641 = v430[7];
-        const V v642 = v430[8];
-        const V v643 = v430[9];
-        const V v644 = v430[10];
-        const V v645 = v430[11];
-        const V v646 = v430[12];
-        const V v647 = v99 * t5;
-        const V v648 = v638 + v647;
-        const V v649 = v430[13];
-        const V v650 = v430[14];
-        const V v651 = v430[15];
-        const V v652 = v430[16];
-        const V v653 = v430[17];
-        const V v654 = v430[18];
-        const V v655 = v430[19];
-        const V v656 = v430[20];
-        const V v657 = v430[21];
-        const V v658 = v430[22];
-        const V v659 = v430[23];
-        const V v660 = v430[24];
-        const V v661 = v430[25];
-        const V v662 = v430[26];
-        const V v663 = v430[27];
-        const V v664 = v430[28];
-        const V v665 = v430[29];
-        const V v666 = v430[30];
-        const V v667 = v430[31];
-        const V v668 = v430[32];
-        const V v669 = v430[33];
-        const V v670 = v430[34];
-        const V v671 = v430[35];
-        const V v672 = v430[36];
-        const V v673 = v430[37];
-        const V v674 = v430[38];
-        const V v675 = v430[39];
-        const V v676 = v430[40];
-        const V v677 = v430[41];
-        const V v678 = v430[42];
-        const V v679 = v430[43];
-        const V v680 = v430[44];
-        const V v681 = v430[45];
-        const V v682 = v430[46];
-        const V v683 = v430[47];
-        const V v684 = v430[48];
-        const V v685 = v679 - v684;
-        const V v686 = v672 - v677;
-        const V v687 = v680 - v683;
-        const V v688 = v673 - v676;
-        const V v689 = v674 - v675;
-        const V v690 = v155 * v37;
-        const V v691 = v156 * v37;
-        const V v692 = v154 * v37;
-        const V v693 = v159 * v37;
-        const V v694 = v157 * v37;
-        const V v695 = v158 * v37;
-        const V v696 = v491 * v686;
-        const V v697 = v491 * v685;
-        const V v698 = v642 - v649;
-        const V v699 = v643 - v646;
-        const V v700 = v644 - v645;
-        const V v701 = v651 - v656;
-        const V v702 = v652 - v655;
-        const V v703 = v653 - v654;
-        const V v704 = v491 * v698;
-        const V v705 = v491 * v701;
-        const V v706 = v658 - v663;
-        const V v707 = v659 - v662;
-        const V v708 = v491 * v706;
-        const V v709 = v660 - v661;
-        const V v710 = v665 - v670;
-        const V v711 = v491 * v710;
-        const V v712 = v666 - v669;
-        const V v713 = v667 - v668;
-        const V v714 = t13 * v627;
-        const V v715 = t13 * v633;
-        const V v716 = t13 * v634;
-        const V v717 = t13 * v635;
-        const V v718 = t13 * v636;
-        const V v719 = t13 * v637;
-        const V v720 = v493 * v709;
-        const V v721 = v708 + v720;
-        const V v722 = v493 * v713;
-        const V v723 = v711 + v722;
-        const V v724 = v438 * v661;
-        const V v725 = v438 * v668;
-        const V v726 = v438 * v645;
-        const V v727 = v479 * v645;
-        const V v728 = v479 * v661;
-        const V v729 = v479 * v668;
-        const V v730 = v645 * v584;
-        const V v731 = v661 * v584;
-        const V v732 = v668 * v584;
-        const V v733 = v438 * v654;
-        const V v734 = v479 * v654;
-        const V v735 = v654 * v584;
-        const V v736 = v492 * v712;
-        const V v737 = v736 + v723;
-        const V v738 = v438 * v675;
-        const V v739 = v479 * v675;
-        const V v740 = v675 * v584;
-        const V v741 = v438 * v682;
-        const V v742 = v479 * v682;
-        const V v743 = v682 * v584;
-        const V v744 = v681 - v682;
-        const V v745 = v492 * v699;
-        const V v746 = v704 + v745;
-        const V v747 = v492 * v702;
-        const V v748 = v705 + v747;
-        const V v749 = v492 * v707;
-        const V v750 = v749 + v721;
-        const V v751 = v492 * v688;
-        const V v752 = v696 + v751;
-        const V v753 = v492 * v687;
-        const V v754 = v697 + v753;
-        const V v755 = v434 * v651;
-        const V v756 = v755 + v733;
-        const V v757 = v434 * v672;
-        const V v758 = v757 + v738;
-        const V v759 = v461 * v672;
-        const V v760 = v759 + v739;
-        const V v761 = v434 * v679;
-        const V v762 = v761 + v741;
-        const V v763 = v679 * v557;
-        const V v764 = v763 + v743;
-        const V v765 = v461 * v679;
-        const V v766 = v765 + v742;
-        const V v767 = v672 * v557;
-        const V v768 = v767 + v740;
-        const V v769 = v493 * v700;
-        const V v770 = v769 + v746;
-        const V v771 = v493 * v689;
-        const V v772 = v771 + v752;
-        const V v773 = v493 * v744;
-        const V v774 = v773 + v754;
-        const V v775 = v493 * v703;
-        const V v776 = v775 + v748;
-        const V v777 = v461 * v651;
-        const V v778 = v777 + v734;
-        const V v779 = v651 * v557;
-        const V v780 = v779 + v735;
-        const V v781 = v436 * v652;
-        const V v782 = v781 + v756;
-        const V v783 = v436 * v680;
-        const V v784 = v783 + v762;
-        const V v785 = v482 * v680;
-        const V v786 = v785 + v766;
-        const V v787 = v482 * v652;
-        const V v788 = v787 + v778;
-        const V v789 = v652 * v539;
-        const V v790 = v789 + v780;
-        const V v791 = v680 * v539;
-        const V v792 = v791 + v764;
-        const V v793 = v673 * v539;
-        const V v794 = v793 + v768;
-        const V v795 = v436 * v673;
-        const V v796 = v795 + v758;
-        const V v797 = v482 * v673;
-        const V v798 = v797 + v760;
-        const V v799 = v437 * v653;
-        const V v800 = v799 + v782;
-        const V v801 = v437 * v681;
-        const V v802 = v801 + v784;
-        const V v803 = v485 * v653;
-        const V v804 = v803 + v788;
-        const V v805 = v485 * v681;
-        const V v806 = v805 + v786;
-        const V v807 = v653 * v569;
-        const V v808 = v807 + v790;
-        const V v809 = v681 * v569;
-        const V v810 = v809 + v792;
-        const V v811 = v437 * v674;
-        const V v812 = v811 + v796;
-        const V v813 = v485 * v674;
-        const V v814 = v813 + v798;
-        const V v815 = v674 * v569;
-        const V v816 = v815 + v794;
-        const V v817 = v439 * v655;
-        const V v818 = v817 + v800;
-        const V v819 = v488 * v655;
-        const V v820 = v819 + v804;
-        const V v821 = v655 * v592;
-        const V v822 = v821 + v808;
-        const V v823 = v439 * v683;
-        const V v824 = v823 + v802;
-        const V v825 = v488 * v683;
-        const V v826 = v825 + v806;
-        const V v827 = v683 * v592;
-        const V v828 = v827 + v810;
-        const V v829 = v439 * v676;
-        const V v830 = v829 + v812;
-        const V v831 = v488 * v676;
-        const V v832 = v831 + v814;
-        const V v833 = v676 * v592;
-        const V v834 = v833 + v816;
-        const V v835 = v440 * v656;
-        const V v836 = v835 + v818;
-        const V v837 = v440 * v684;
-        const V v838 = v837 + v824;
-        const V v839 = v495 * v656;
-        const V v840 = v839 + v820;
-        const V v841 = v495 * v684;
-        const V v842 = v841 + v826;
-        const V v843 = v656 * v589;
-        const V v844 = v843 + v822;
-        const V v845 = v684 * v589;
-        const V v846 = v845 + v828;
-        const V v847 = v440 * v677;
-        const V v848 = v847 + v830;
-        const V v849 = v495 * v677;
-        const V v850 = v849 + v832;
-        const V v851 = v677 * v589;
-        const V v852 = v851 + v834;
-        const V v853 = v497 * v650;
-        const V v854 = v853 + v840;
-        const V v855 = v497 * v678;
-        const V v856 = v855 + v842;
-        const V v857 = v650 * v562;
-        const V v858 = v857 + v844;
-        const V v859 = v678 * v562;
-        const V v860 = v859 + v846;
-        const V v861 = v497 * v671;
-        const V v862 = v861 + v850;
-        const V v863 = v671 * v562;
-        const V v864 = v863 + v852;
-        const V v865 = v470 * v650;
-        const V v866 = v865 + v776;
-        const V v867 = v470 * v671;
-        const V v868 = v867 + v772;
-        const V v869 = v470 * v678;
-        const V v870 = v869 + v774;
-        const V v871 = t13 * v858;
-        const V v872 = v866 + v871;
-        const V v873 = t13 * v864;
-        const V v874 = v868 + v873;
-        const V v875 = t13 * v860;
-        const V v876 = v870 + v875;
-        const V v877 = v615 * v209;
-        const V v878 = v640 - v877;
-        const V v879 = v37 * v854;
-        const V v880 = v872 + v879;
-        const V v881 = v37 * v856;
-        const V v882 = v876 + v881;
-        const V v883 = v37 * v862;
-        const V v884 = v874 + v883;
-        const V v885 = v616 * v211;
-        const V v886 = v878 - v885;
-        const V v887 = v31 * v848;
-        const V v888 = v884 - v887;
-        const V v889 = v31 * v836;
-        const V v890 = v880 - v889;
-        const V v891 = v31 * v838;
-        const V v892 = v882 - v891;
-        const V v893 = v617 * v213;
-        const V v894 = v886 - v893;
-        const V v895 = v620 * v223;
-        const V v896 = v895 + v894;
-        const V v897 = v223 * v888;
-        const V v898 = v195 * v888;
-        const V v899 = v695 + v898;
-        const V v900 = v630 * v896;
-        const V v901 = v215 * v892;
-        const V v902 = v194 * v892;
-        const V v903 = v693 + v902;
-        const V v904 = v209 * v890;
-        const V v905 = v897 - v904;
-        const V v906 = v190 * v890;
-        const V v907 = v690 + v906;
-        const V v908 = v613 * v896;
-        const V v909 = 0.1192694691878821 * v905;
-        const V v910 = v201 * v899;
-        const V v911 = v719 + v910;
-        const V v912 = v199 * v903;
-        const V v913 = v717 + v912;
-        const V v914 = v196 * v907;
-        const V v915 = v714 + v914;
-        const V v916 = v626 * v913;
-        const V v917 = v909 - v916;
-        const V v918 = v470 * v641;
-        const V v919 = v918 + v770;
-        const V v920 = v641 * v562;
-        const V v921 = v730 + v920;
-        const V v922 = v497 * v641;
-        const V v923 = v922 + v727;
-        const V v924 = v497 * v657;
-        const V v925 = v924 + v728;
-        const V v926 = v497 * v664;
-        const V v927 = v926 + v729;
-        const V v928 = v470 * v657;
-        const V v929 = v928 + v750;
-        const V v930 = v470 * v664;
-        const V v931 = v930 + v737;
-        const V v932 = v657 * v562;
-        const V v933 = v731 + v932;
-        const V v934 = v664 * v562;
-        const V v935 = v732 + v934;
-        const V v936 = v623 * v915;
-        const V v937 = v917 + v936;
-        const V v938 = v631 * v911;
-        const V v939 = v937 - v938;
-        const V v940 = v446 * v908;
-        const V v941 = v939 - v940;
-        const V v942 = v461 * v642;
-        const V v943 = v942 + v923;
-        const V v944 = v461 * v658;
-        const V v945 = v944 + v925;
-        const V v946 = v461 * v665;
-        const V v947 = v946 + v927;
-        const V v948 = v642 * v557;
-        const V v949 = v948 + v921;
-        const V v950 = v658 * v557;
-        const V v951 = v950 + v933;
-        const V v952 = v665 * v557;
-        const V v953 = v952 + v935;
-        const V v954 = v434 * v642;
-        const V v955 = v954 + v726;
-        const V v956 = v434 * v658;
-        const V v957 = v956 + v724;
-        const V v958 = v434 * v665;
-        const V v959 = v958 + v725;
-        const V v960 = v482 * v643;
-        const V v961 = v960 + v943;
-        const V v962 = v482 * v659;
-        const V v963 = v962 + v945;
-        const V v964 = v482 * v666;
-        const V v965 = v964 + v947;
-        const V v966 = v643 * v539;
-        const V v967 = v966 + v949;
-        const V v968 = v436 * v643;
-        const V v969 = v968 + v955;
-        const V v970 = v659 * v539;
-        const V v971 = v970 + v951;
-        const V v972 = v436 * v659;
-        const V v973 = v972 + v957;
-        const V v974 = v436 * v666;
-        const V v975 = v974 + v959;
-        const V v976 = v666 * v539;
-        const V v977 = v976 + v953;
-        const V v978 = v485 * v644;
-        const V v979 = v978 + v961;
-        const V v980 = v485 * v660;
-        const V v981 = v980 + v963;
-        const V v982 = v485 * v667;
-        const V v983 = v982 + v965;
-        const V v984 = v437 * v644;
-        const V v985 = v984 + v969;
-        const V v986 = v644 * v569;
-        const V v987 = v986 + v967;
-        const V v988 = v437 * v660;
-        const V v989 = v988 + v973;
-        const V v990 = v437 * v667;
-        const V v991 = v990 + v975;
-        const V v992 = v660 * v569;
-        const V v993 = v992 + v971;
-        const V v994 = v667 * v569;
-        const V v995 = v994 + v977;
-        const V v996 = v488 * v646;
-        const V v997 = v996 + v979;
-        const V v998 = v488 * v662;
-        const V v999 = v998 + v981;
-        const V v1000 = v488 * v669;
-        const V v1001 = v1000 + v983;
-        const V v1002 = v439 * v646;
-        const V v1003 = v1002 + v985;
-        const V v1004 = v439 * v662;
-        const V v1005 = v1004 + v989;
-        const V v1006 = v439 * v669;
-        const V v1007 = v1006 + v991;
-        const V v1008 = v646 * v592;
-        const V v1009 = v1008 + v987;
-        const V v1010 = v662 * v592;
-        const V v1011 = v1010 + v993;
-        const V v1012 = v669 * v592;
-        const V v1013 = v1012 + v995;
-        const V v1014 = v495 * v649;
-        const V v1015 = v1014 + v997;
-        const V v1016 = v495 * v663;
-        const V v1017 = v1016 + v999;
-        const V v1018 = v495 * v670;
-        const V v1019 = v1018 + v1001;
-        const V v1020 = v440 * v649;
-        const V v1021 = v1020 + v1003;
-        const V v1022 = v440 * v663;
-        const V v1023 = v1022 + v1005;
-        const V v1024 = v440 * v670;
-        const V v1025 = v1024 + v1007;
-        const V v1026 = v649 * v589;
-        const V v1027 = v1026 + v1009;
-        const V v1028 = v663 * v589;
-        const V v1029 = v1028 + v1011;
-        const V v1030 = v670 * v589;
-        const V v1031 = v1030 + v1013;
-        const V v1032 = v37 * v1019;
-        const V v1033 = v931 + v1032;
-        const V v1034 = v37 * v1015;
-        const V v1035 = v919 + v1034;
-        const V v1036 = v37 * v1017;
-        const V v1037 = v929 + v1036;
-        const V v1038 = v31 * v1021;
-        const V v1039 = v1035 - v1038;
-        const V v1040 = v31 * v1025;
-        const V v1041 = v1033 - v1040;
-        const V v1042 = v31 * v1023;
-        const V v1043 = v1037 - v1042;
-        const V v1044 = t13 * v1027;
-        const V v1045 = v1039 + v1044;
-        const V v1046 = t13 * v1031;
-        const V v1047 = v1041 + v1046;
-        const V v1048 = t13 * v1029;
-        const V v1049 = v1043 + v1048;
-        const V v1050 = v220 * v1047;
-        const V v1051 = v192 * v1047;
-        const V v1052 = v694 + v1051;
-        const V v1053 = v191 * v1045;
-        const V v1054 = v692 + v1053;
-        const V v1055 = v213 * v1045;
-        const V v1056 = v901 - v1055;
-        const V v1057 = 0.07987743308995329 * v1056;
-        const V v1058 = v941 + v1057;
-        const V v1059 = v193 * v1049;
-        const V v1060 = v691 + v1059;
-        const V v1061 = v211 * v1049;
-        const V v1062 = v1050 - v1061;
-        const V v1063 = v198 * v1054;
-        const V v1064 = v716 + v1063;
-        const V v1065 = v200 * v1052;
-        const V v1066 = v718 + v1065;
-        const V v1067 = v197 * v1060;
-        const V v1068 = v715 + v1067;
-        const V v1069 = v625 * v1064;
-        const V v1070 = v1058 + v1069;
-        const V v1071 = v624 * v1068;
-        const V v1072 = v1070 + v1071;
-        const V v1073 = v628 * v1066;
-        const V v1074 = v1072 - v1073;
-        const V v1075 = 0.05582662111236089 * v1062;
-        const V v1076 = v1074 + v1075;
-        const V v1077 = v621 * v1076;
-        const V v1078 = v900 + v1077;
-        const V v1079 = v613 * v1078;
-        const V v1080 = v648 + v1079;
-        const V v1081 = w[1] * v1080;
+        const V v298 = 1.0 / v60, v299 = v54 * v54, v300 = 0.1192694691878821 * v81,
+            v301 = 0.05582662111236089 * v82, v302 = 0.07987743308995329 * v80,
+            v303 = 0.07987743308995329 * v85, v304 = 0.05582662111236089 * v83,
+            v305 = 0.1192694691878821 * v84, v306 = v242[7], v307 = v242[8], v308 = v242[9],
+            v309 = v242[10], v310 = v242[11], v311 = v242[12], v312 = v242[13], v313 = v242[14],
+            v314 = v242[15], v315 = v242[16], v316 = v242[17], v317 = v242[18], v318 = v242[19],
+            v319 = v242[20], v320 = v242[21], v321 = v242[22], v322 = v242[23], v323 = v242[24],
+            v324 = v242[25], v325 = v242[26], v326 = v242[27], v327 = v242[28], v328 = v242[29],
+            v329 = v242[30], v330 = v242[31], v331 = v242[32], v332 = v242[33], v333 = v242[34],
+            v334 = v242[35], v335 = v242[36], v336 = v242[37], v337 = v242[38], v338 = v242[39],
+            v339 = v242[40], v340 = v242[41], v341 = v242[42], v342 = v242[43], v343 = v242[44],
+            v344 = v242[45], v345 = v242[46], v346 = v242[47], v347 = v242[48],
+            v348 = v266 * (v329 - v332) + (v265 * (v328 - v333) + v267 * (v330 - v331)),
+            v349 = v266 * (v322 - v325) + (v265 * (v321 - v326) + v267 * (v323 - v324)),
+            v350 = v267 * (v309 - v310) + (v265 * (v307 - v312) + v266 * (v308 - v311)),
+            v351 = v267 * (v337 - v338) + (v265 * (v335 - v340) + v266 * (v336 - v339)),
+            v352 = v267 * (v344 - v345) + (v265 * (v342 - v347) + v266 * (v343 - v346)),
+            v353 = v267 * (v316 - v317) + (v265 * (v314 - v319) + v266 * (v315 - v318)),
+            v354 = v249 * v318 + (v247 * v316 + (v246 * v315 + (v244 * v314 + v248 * v317))),
+            v355 = v263 * v318 + (v262 * v316 + (v261 * v315 + (v257 * v314 + v260 * v317))),
+            v356 = v318 * v289 + (v316 * v284 + (v315 * v279 + (v314 * v282 + v317 * v286))),
+            v357 = v249 * v346 + (v247 * v344 + (v246 * v343 + (v244 * v342 + v248 * v345))),
+            v358 = v263 * v346 + (v262 * v344 + (v261 * v343 + (v257 * v342 + v260 * v345))),
+            v359 = v346 * v289 + (v344 * v284 + (v343 * v279 + (v342 * v282 + v345 * v286))),
+            v360 = v249 * v339 + (v247 * v337 + (v246 * v336 + (v244 * v335 + v248 * v338))),
+            v361 = v263 * v339 + (v262 * v337 + (v261 * v336 + (v257 * v335 + v260 * v338))),
+            v362 = v339 * v289 + (v337 * v284 + (v336 * v279 + (v335 * v282 + v338 * v286))),
+            v363 = v258 * v313 + v353 + t13 * (v313 * v283 + (v319 * v288 + v356)) + v23 * (v269 * v313 + (v268 * v319 + v355)),
+            v364 = v258 * v341 + v352 + t13 * (v341 * v283 + (v347 * v288 + v359)) + v23 * (v269 * v341 + (v268 * v347 + v358)),
+            v365 = v258 * v334 + v351 + t13 * (v334 * v283 + (v340 * v288 + v362)) + v23 * (v269 * v334 + (v268 * v340 + v361)),
+            v366 = v365 - v21 * (v250 * v340 + v360), v367 = v363 - v21 * (v250 * v319 + v354),
+            v368 = v364 - v21 * (v250 * v347 + v357),
+            v369 = v303 * v143 + v304 * v147 - v300 * v140 - v301 * v141 - v302 * v142,
+            v370 = v305 * v149 + v369,
+            v371 = v303 * v159 * (t13 * (1.0 - v113) + v131 * (v103 * v23 + v126 * v368)),
+            v372 = v300 * v153 * (t13 * (1.0 - v110) + v128 * (v99 * v23 + v122 * v367)),
+            v373 = v305 * v173 * (t13 * (1.0 - v115) + v133 * (v102 * v23 + v127 * v366)),
+            v374 = 0.1192694691878821 * (v149 * v366 - v140 * v367) - v371 + v372 - v373,
+            v375 = v262 * v309 + (v261 * v308 + (v257 * v307 + (v269 * v306 + v260 * v310))),
+            v376 = v262 * v323 + (v261 * v322 + (v257 * v321 + (v269 * v320 + v260 * v324))),
+            v377 = v262 * v330 + (v261 * v329 + (v257 * v328 + (v269 * v327 + v260 * v331))),
+            v378 = v309 * v284 + (v308 * v279 + (v307 * v282 + (v310 * v286 + v306 * v283))),
+            v379 = v323 * v284 + (v322 * v279 + (v321 * v282 + (v324 * v286 + v320 * v283))),
+            v380 = v330 * v284 + (v329 * v279 + (v328 * v282 + (v331 * v286 + v327 * v283))),
+            v381 = v249 * v311 + (v247 * v309 + (v246 * v308 + (v244 * v307 + v248 * v310))),
+            v382 = v249 * v325 + (v247 * v323 + (v246 * v322 + (v244 * v321 + v248 * v324))),
+            v383 = v249 * v332 + (v247 * v330 + (v246 * v329 + (v244 * v328 + v248 * v331))),
+            v384 = v258 * v306 + v350 + v23 * (v268 * v312 + (v263 * v311 + v375)) - v21 * (v250 * v312 + v381),
+            v385 = v258 * v327 + v348 + v23 * (v268 * v333 + (v263 * v332 + v377)) - v21 * (v250 * v333 + v383),
+            v386 = v258 * v320 + v349 + v23 * (v268 * v326 + (v263 * v325 + v376)) - v21 * (v250 * v326 + v382),
+            v387 = v384 + t13 * (v312 * v288 + (v311 * v289 + v378)),
+            v388 = v385 + t13 * (v333 * v288 + (v332 * v289 + v380)),
+            v389 = v386 + t13 * (v326 * v288 + (v325 * v289 + v379)),
+            v390 = v374 - v251 * (v298 * v370) + 0.07987743308995329 * (v143 * v368 - v142 * v387),
+            v391 = v302 * v161 * (t13 * (1.0 - v112) + v130 * (v98 * v23 + v123 * v387)),
+            v392 = v301 * v155 * (t13 * (1.0 - v111) + v129 * (v100 * v23 + v125 * v389)),
+            v393 = v304 * v164 * (t13 * (1.0 - v114) + v132 * (v101 * v23 + v124 * v388)),
+            v394 = v390 + v391 + v392 - v393 + 0.05582662111236089 * (v147 * v388 - v141 * v389),
+            v395 = parameters[1] * v253 + v57 * t5 + v298 * ((v299 * v18 + v58 * v56) * v370 + v6 * v299 * v394),
+            v396 = w[1] * v395;
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v608 + D * v1081;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v295 + D * v396;
         }
     }
-    const V v1082 = -s81;
-    const V v1083 = -s82;
-    R_lanes[0] = s84;
-    R_lanes[1] = v1083;
-    R_lanes[2] = s83;
-    R_lanes[3] = v1082;
+    const V v397 = -s45, v398 = -s46;
+    R_lanes[0] = s48; R_lanes[1] = v398; R_lanes[2] = s47; R_lanes[3] = v397;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
@@ -1796,65 +457,22 @@ static void softehl_film_carreau_pseudo_load_group(
         softehl_spoil(failed, R, (4 + modes));
     }
 }
+SOFTEHL_BATCH(softehl_film_carreau_pseudo_load, 4, (4 + modes), 0, 14, (4 + modes), 0)
 
-void softehl_film_carreau_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_carreau_fields_rate)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_carreau_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + 14 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_carreau_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + 14 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double t[SOFTEHL_LANES * 14];
-    softehl_pad(t, direction, 14, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_carreau_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_carreau_fields_rate_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17;
     softehl_load4(t + 0, (14 + (4 + modes)), &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
     softehl_load4(t + 4, (14 + (4 + modes)), &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
     softehl_load4(t + 8, (14 + (4 + modes)), &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
     softehl_load4(t + 12, (14 + (4 + modes)), &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
-    V t16, t17;
-    softehl_load2(t + 16, (14 + (4 + modes)), &t16, &t17);
-    (void)t16; (void)t17;
+    softehl_load2(t + 16, (14 + (4 + modes)), &t16, &t17); (void)t8; (void)t9; (void)t10;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1872,1105 +490,199 @@ static void softehl_film_carreau_fields_rate_group(
     softehl_gather(t_lanes, t, (14 + (4 + modes)));
 #endif
     const double v1 = 1.0 - parameters[9];
-    const V v2 = X2 + d2;
-    const V v3 = t1 + t15;
-    const V v4 = t2 + t16;
-    const V v5 = t3 + t17;
-    const double v6 = 1.0 / parameters[7];
-    const double v7 = 0.5 * parameters[7];
-    const double v8 = 6.0 * parameters[7];
-    const double v9 = 1.0 / parameters[8];
-    const V v10 = v2 - X0;
-    const double v11 = parameters[8] - 1.0;
-    const V v12 = v5 - v3;
-    const V v13 = v10 - d0;
-    const double v14 = 0.5 * v11;
-    const V v15 = v3 - t4;
-    const V v16 = v5 - t4;
-    const V v17 = 0.5 * v12;
-    const V v18 = 0.5 * v13;
-    const V v19 = v18 * v18;
-    const V v20 = X3 + d3;
-    const V v21 = X1 - parameters[0];
-    const V v22 = X3 - parameters[0];
-    const V v23 = d1 + v21;
-    const double v24 = v9 * v14;
-    const V v25 = d3 + v22;
-    const V v26 = v4 - t0;
-    const V v27 = v20 - X1;
-    const V v28 = v27 - d1;
-    const V v29 = 0.5 * t12;
-    const V v30 = 0.5 * v28;
-    const V v31 = v26 - t14;
-    const V v32 = t0 + t14;
-    const V v33 = 5.0 * v28;
-    const V v34 = v28 * v17;
-    const V v35 = 0.5 * v31;
-    const V v36 = v24 * t12;
-    const V v37 = v29 - v36;
-    const V v38 = v9 * v37;
-    const V v39 = v30 * v30;
-    const V v40 = v13 * v35;
-    const V v41 = 0.5 * t11;
-    const V v42 = v6 * t11;
-    const V v43 = 6.0 * t11;
-    const V v44 = v39 + v19;
-    const V v45 = v39 * v39;
-    const V v46 = v30 * v45;
-    const V v47 = v40 + v34;
-    const V v48 = v45 * v33;
-    const V v49 = v45 * v48;
-    const V v50 = v44 * v44;
-    const V v51 = 4.0 * v44;
-    const V v52 = v49 * v17;
-    const V v53 = v46 * v46;
-    const V v54 = v50 * v51;
-    const V v55 = v50 * v50;
-    const V v56 = 1.0 / v55;
-    const V v57 = v56 * v54;
-    const V v58 = v53 * v57;
-    const V v59 = v58 * v47;
-    const V v60 = v52 - v59;
-    const V v61 = v56 * v53;
-    const V v62 = v19 + v61;
-    const V v63 = v56 * v60;
-    const V v64 = v40 + v63;
-    const V v65 = softehl_vsqrt(v62);
-    const V v66 = 1.0 / v65;
-    const V v67 = 1.0 / v62;
-    const V v68 = softehl_vsqrt(v67);
-    const V v69 = 0.5 * v66;
-    const V v70 = v68 * v69;
-    const V v71 = v70 * v64;
+    const V v2 = t1 + t15, v3 = t2 + t16, v4 = t3 + t17;
+    const double v5 = 1.0 / parameters[7], v6 = 0.5 * parameters[7], v7 = 6.0 * parameters[7],
+        v8 = 1.0 / parameters[8];
+    const V v9 = X2 + d2 - X0 - d0; const double v10 = 0.5 * (parameters[8] - 1.0);
+    const V v11 = v2 - t4, v12 = v4 - t4, v13 = 0.5 * (v4 - v2), v14 = 0.5 * v9, v15 = v14 * v14,
+        v16 = d1 + (X1 - parameters[0]);
+    const double v17 = v8 * v10;
+    const V v18 = d3 + (X3 - parameters[0]), v19 = X3 + d3 - X1 - d1, v20 = 0.5 * t12,
+        v21 = 0.5 * v19, v22 = t0 + t14, v23 = 0.5 * (v3 - t0 - t14), v24 = v8 * (v20 - v17 * t12),
+        v25 = v21 * v21, v26 = v9 * v23, v27 = 0.5 * t11, v28 = v5 * t11, v29 = 6.0 * t11,
+        v30 = v25 + v15, v31 = v25 * v25, v32 = v21 * v31, v33 = v30 * v30, v34 = v32 * v32,
+        v35 = 1.0 / (v33 * v33),
+        v36 = v31 * (v31 * (5.0 * v19)) * v13 - v34 * (v35 * (v33 * (4.0 * v30))) * (v26 + v19 * v13),
+        v37 = v15 + v35 * v34, v38 = softehl_vsqrt(v37), v39 = 1.0 / v38,
+        v40 = softehl_vsqrt(1.0 / v37), v41 = v40 * (0.5 * v39) * (v26 + v35 * v36);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
+        (void)p0, (void)p1; V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            tp0 += B[2 * i] * t_lanes[18 + i];
-            tp1 += B[2 * i + 1] * t_lanes[18 + i];
+            tp0 += B[2 * i] * t_lanes[18 + i]; tp1 += B[2 * i + 1] * t_lanes[18 + i];
         }
-        (void)tp0, (void)tp1;
-        const double v72 = 0.5 * w[0];
-        const V v73 = p0 * parameters[3];
-        const V v74 = softehl_vexp(v73);
-        const V v75 = p1 * v66;
-        const double v76 = 0.5 - v72;
-        const double v77 = 0.5 + v72;
-        const V v78 = w[1] * v35;
-        const V v79 = v76 * v23;
-        const V v80 = v76 * v32;
-        const V v81 = v76 * v15;
-        const V v82 = v77 * v25;
-        const V v83 = v79 + v82;
-        const V v84 = parameters[2] * v74;
-        const V v85 = v77 * v4;
-        const V v86 = v85 + v80;
-        const V v87 = v77 * v16;
-        const V v88 = v81 + v87;
-        const V v89 = 0.5 * v83;
-        const V v90 = parameters[7] * v83;
-        const V v91 = v89 * v75;
-        const V v92 = parameters[1] * v84;
-        const V v93 = 1.0 / v90;
-        const V v94 = v92 * v93;
-        const V v95 = v6 * v91;
-        const V v96 = v94 * v94;
-        const V v97 = 1.0 + v96;
-        const V v98 = softehl_vlog(v97);
-        const V v99 = v98 * v14;
-        const V v100 = softehl_vexp(v99);
-        const V v101 = v1 * v100;
-        const V v102 = parameters[9] + v101;
-        const V v103 = v94 * v102;
-        const V v104 = 0.932469514203152 * v95;
-        const V v105 = 0.6612093864662645 * v95;
-        const V v106 = 0.2386191860831969 * v95;
-        const V v107 = v103 + v104;
-        const V v108 = v103 + v105;
-        const V v109 = v103 + v106;
-        const V v110 = v103 - v106;
-        const V v111 = v103 - v105;
-        const V v112 = v103 - v104;
-        V v113[7];
-        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v94, softehl_splat(v14), softehl_splat(v1), softehl_splat(v24), v104, v105, v106, v103, v107, v108, v109, v110, v111, v112}, v113, &failed);
-        const V v114 = v113[1];
-        const V v115 = v113[2];
-        const V v116 = v113[3];
-        const V v117 = v113[4];
-        const V v118 = v113[5];
-        const V v119 = v113[6];
-        const V v120 = v114 * v114;
-        const V v121 = v115 * v115;
-        const V v122 = v116 * v116;
-        const V v123 = v117 * v117;
-        const V v124 = v118 * v118;
-        const V v125 = v119 * v119;
-        const V v126 = 1.0 + v120;
-        const V v127 = 1.0 + v121;
-        const V v128 = 1.0 + v122;
-        const V v129 = 1.0 + v123;
-        const V v130 = 1.0 + v124;
-        const V v131 = 1.0 + v125;
-        const V v132 = softehl_vlog(v126);
-        const V v133 = softehl_vlog(v127);
-        const V v134 = softehl_vlog(v128);
-        const V v135 = softehl_vlog(v129);
-        const V v136 = softehl_vlog(v130);
-        const V v137 = softehl_vlog(v131);
-        const V v138 = 2.0 * v117;
-        const V v139 = 2.0 * v116;
-        const V v140 = 2.0 * v118;
-        const V v141 = 2.0 * v115;
-        const V v142 = 2.0 * v119;
-        const V v143 = 2.0 * v114;
-        const V v144 = 1.0 / v129;
-        const V v145 = 1.0 / v128;
-        const V v146 = 1.0 / v130;
-        const V v147 = 1.0 / v127;
-        const V v148 = 1.0 / v131;
-        const V v149 = 1.0 / v126;
-        const V v150 = v24 * v133;
-        const V v151 = v24 * v134;
-        const V v152 = v24 * v132;
-        const V v153 = v24 * v137;
-        const V v154 = v24 * v135;
-        const V v155 = softehl_vexp(v150);
-        const V v156 = softehl_vexp(v151);
-        const V v157 = softehl_vexp(v152);
-        const V v158 = softehl_vexp(v153);
-        const V v159 = softehl_vexp(v154);
-        const V v160 = v24 * v136;
-        const V v161 = softehl_vexp(v160);
-        const V v162 = v24 * v144;
-        const V v163 = v24 * v145;
-        const V v164 = v24 * v146;
-        const V v165 = v24 * v147;
-        const V v166 = v24 * v148;
-        const V v167 = v24 * v149;
-        const V v168 = v141 * v165;
-        const V v169 = v143 * v167;
-        const V v170 = v138 * v162;
-        const V v171 = v139 * v163;
-        const V v172 = v142 * v166;
-        const V v173 = v140 * v164;
-        const V v174 = v1 * v155;
-        const V v175 = v1 * v156;
-        const V v176 = v1 * v157;
-        const V v177 = v1 * v158;
-        const V v178 = v1 * v159;
-        const V v179 = v1 * v161;
-        const V v180 = 0.08566224618958518 * v114;
-        const V v181 = parameters[9] + v174;
-        const V v182 = parameters[9] + v175;
-        const V v183 = parameters[9] + v176;
-        const V v184 = parameters[9] + v177;
-        const V v185 = parameters[9] + v178;
-        const V v186 = parameters[9] + v179;
-        const V v187 = 1.0 / v181;
-        const V v188 = v181 * v181;
-        const V v189 = 1.0 / v182;
-        const V v190 = v182 * v182;
-        const V v191 = 1.0 / v183;
-        const V v192 = v183 * v183;
-        const V v193 = 1.0 / v184;
-        const V v194 = v184 * v184;
-        const V v195 = 1.0 / v188;
-        const V v196 = 1.0 / v190;
-        const V v197 = 1.0 / v192;
-        const V v198 = 1.0 / v185;
-        const V v199 = v185 * v185;
-        const V v200 = 1.0 / v194;
-        const V v201 = 1.0 / v186;
-        const V v202 = v186 * v186;
-        const V v203 = 1.0 / v199;
-        const V v204 = 1.0 / v202;
-        const V v205 = 0.08566224618958518 * v119;
-        const V v206 = 0.1803807865240693 * v115;
-        const V v207 = 0.1803807865240693 * v118;
-        const V v208 = 0.23395696728634552 * v116;
-        const V v209 = 0.23395696728634552 * v117;
-        const V v210 = v115 * v187;
-        const V v211 = v187 * v187;
-        const V v212 = 0.1803807865240693 * v187;
-        const V v213 = v116 * v189;
-        const V v214 = v189 * v189;
-        const V v215 = 0.23395696728634552 * v189;
-        const V v216 = v211 * v206;
-        const V v217 = v214 * v208;
-        const V v218 = v119 * v193;
-        const V v219 = v193 * v193;
-        const V v220 = 0.08566224618958518 * v193;
-        const V v221 = v219 * v205;
-        const V v222 = v191 * v191;
-        const V v223 = v114 * v191;
-        const V v224 = 0.08566224618958518 * v191;
-        const V v225 = v117 * v198;
-        const V v226 = v198 * v198;
-        const V v227 = 0.23395696728634552 * v198;
-        const V v228 = v222 * v180;
-        const V v229 = v226 * v209;
-        const V v230 = v174 * v216;
-        const V v231 = v175 * v217;
-        const V v232 = v177 * v221;
-        const V v233 = v168 * v230;
-        const V v234 = v212 - v233;
-        const V v235 = v176 * v228;
-        const V v236 = v171 * v231;
-        const V v237 = v215 - v236;
-        const V v238 = v201 * v201;
-        const V v239 = v118 * v201;
-        const V v240 = 0.1803807865240693 * v201;
-        const V v241 = v172 * v232;
-        const V v242 = v220 - v241;
-        const V v243 = v178 * v229;
-        const V v244 = v238 * v207;
-        const V v245 = v169 * v235;
-        const V v246 = v224 - v245;
-        const V v247 = v120 * v197;
-        const V v248 = 1.0 + v247;
-        const V v249 = v170 * v243;
-        const V v250 = v227 - v249;
-        const V v251 = softehl_vlog(v248);
-        const V v252 = v121 * v195;
-        const V v253 = 1.0 + v252;
-        const V v254 = v179 * v244;
-        const V v255 = softehl_vlog(v253);
-        const V v256 = v122 * v196;
-        const V v257 = 1.0 + v256;
-        const V v258 = v123 * v203;
-        const V v259 = 1.0 + v258;
-        const V v260 = softehl_vlog(v257);
-        const V v261 = softehl_vlog(v259);
-        const V v262 = v124 * v204;
-        const V v263 = 1.0 + v262;
-        const V v264 = v173 * v254;
-        const V v265 = v240 - v264;
-        const V v266 = softehl_vlog(v263);
-        const V v267 = v125 * v200;
-        const V v268 = 1.0 + v267;
-        const V v269 = softehl_vlog(v268);
-        const V v270 = 2.0 * v120;
-        const V v271 = 2.0 * v121;
-        const V v272 = 2.0 * v122;
-        const V v273 = 2.0 * v123;
-        const V v274 = 2.0 * v124;
-        const V v275 = v270 * v183;
-        const V v276 = v271 * v181;
-        const V v277 = v272 * v182;
-        const V v278 = 2.0 * v125;
-        const V v279 = v273 * v185;
-        const V v280 = v274 * v186;
-        const V v281 = v114 * v222;
-        const V v282 = v115 * v211;
-        const V v283 = v278 * v184;
-        const V v284 = v116 * v214;
-        const V v285 = v117 * v226;
-        const V v286 = v197 * v275;
-        const V v287 = v195 * v276;
-        const V v288 = v196 * v277;
-        const V v289 = v203 * v279;
-        const V v290 = v204 * v280;
-        const V v291 = v197 * v286;
-        const V v292 = v195 * v287;
-        const V v293 = v196 * v288;
-        const V v294 = v203 * v289;
-        const V v295 = v204 * v290;
-        const V v296 = v118 * v238;
-        const V v297 = v200 * v283;
-        const V v298 = v119 * v219;
-        const V v299 = 1.0 / v248;
-        const V v300 = 1.0 / v253;
-        const V v301 = 1.0 / v257;
-        const V v302 = v200 * v297;
-        const V v303 = 1.0 / v259;
-        const V v304 = 1.0 / v263;
-        const V v305 = 1.0 / v268;
-        const V v306 = v14 * v251;
-        const V v307 = v14 * v255;
-        const V v308 = v14 * v260;
-        const V v309 = v14 * v261;
-        const V v310 = v14 * v266;
-        const V v311 = softehl_vexp(v306);
-        const V v312 = softehl_vexp(v307);
-        const V v313 = softehl_vexp(v308);
-        const V v314 = softehl_vexp(v309);
-        const V v315 = softehl_vexp(v310);
-        const V v316 = v14 * v269;
-        const V v317 = softehl_vexp(v316);
-        const V v318 = v14 * v299;
-        const V v319 = v14 * v300;
-        const V v320 = v14 * v301;
-        const V v321 = v14 * v303;
-        const V v322 = v14 * v304;
-        const V v323 = v14 * v305;
-        const V v324 = v1 * v313;
-        const V v325 = v1 * v315;
-        const V v326 = v1 * v317;
-        const V v327 = parameters[9] + v324;
-        const V v328 = v324 * v213;
-        const V v329 = v328 * v320;
-        const V v330 = parameters[9] + v325;
-        const V v331 = v325 * v239;
-        const V v332 = v331 * v322;
-        const V v333 = parameters[9] + v326;
-        const V v334 = v326 * v218;
-        const V v335 = v334 * v323;
-        const V v336 = v1 * v311;
-        const V v337 = parameters[9] + v336;
-        const V v338 = v336 * v223;
-        const V v339 = v338 * v318;
-        const V v340 = v1 * v312;
-        const V v341 = v1 * v314;
-        const V v342 = parameters[9] + v340;
-        const V v343 = v340 * v210;
-        const V v344 = v343 * v319;
-        const V v345 = parameters[9] + v341;
-        const V v346 = v341 * v225;
-        const V v347 = v346 * v321;
-        const V v348 = v191 * v337;
-        const V v349 = v281 * v337;
-        const V v350 = v291 * v339;
-        const V v351 = v349 + v350;
-        const V v352 = v176 * v351;
-        const V v353 = v197 * v339;
-        const V v354 = v167 * v352;
-        const V v355 = v353 - v354;
-        const V v356 = v143 * v355;
-        const V v357 = v348 + v356;
-        const V v358 = v187 * v342;
-        const V v359 = v282 * v342;
-        const V v360 = v292 * v344;
-        const V v361 = v359 + v360;
-        const V v362 = v174 * v361;
-        const V v363 = v195 * v344;
-        const V v364 = v165 * v362;
-        const V v365 = v363 - v364;
-        const V v366 = v141 * v365;
-        const V v367 = v358 + v366;
-        const V v368 = v189 * v327;
-        const V v369 = v284 * v327;
-        const V v370 = v293 * v329;
-        const V v371 = v369 + v370;
-        const V v372 = v175 * v371;
-        const V v373 = v196 * v329;
-        const V v374 = v163 * v372;
-        const V v375 = v373 - v374;
-        const V v376 = v139 * v375;
-        const V v377 = v368 + v376;
-        const V v378 = v198 * v345;
-        const V v379 = v285 * v345;
-        const V v380 = v294 * v347;
-        const V v381 = v379 + v380;
-        const V v382 = v178 * v381;
-        const V v383 = v203 * v347;
-        const V v384 = v162 * v382;
-        const V v385 = v383 - v384;
-        const V v386 = v138 * v385;
-        const V v387 = v378 + v386;
-        const V v388 = v201 * v330;
-        const V v389 = v296 * v330;
-        const V v390 = v295 * v332;
-        const V v391 = v389 + v390;
-        const V v392 = v179 * v391;
-        const V v393 = v204 * v332;
-        const V v394 = v164 * v392;
-        const V v395 = v393 - v394;
-        const V v396 = v140 * v395;
-        const V v397 = v388 + v396;
-        const V v398 = v193 * v333;
-        const V v399 = v298 * v333;
-        const V v400 = v302 * v335;
-        const V v401 = v399 + v400;
-        const V v402 = v177 * v401;
-        const V v403 = v200 * v335;
-        const V v404 = v166 * v402;
-        const V v405 = v403 - v404;
-        const V v406 = v142 * v405;
-        const V v407 = v398 + v406;
-        V v408[49];
-        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v246, v234, v237, v250, v265, v242, softehl_splat((-1.0)), v357, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v367, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v377, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v387, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v397, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v407}, v408, &failed);
-        const V v409 = p0 * t7;
-        const V v410 = v74 * t6;
-        const V v411 = parameters[3] * tp0;
-        const V v412 = v409 + v411;
-        const V v413 = v84 * v412;
-        const V v414 = v410 + v413;
-        const V v415 = v113[0];
-        const V v416 = v251 * v338;
-        const V v417 = v255 * v343;
-        const V v418 = v84 * t5;
-        const V v419 = v260 * v328;
-        const V v420 = v261 * v346;
-        const V v421 = v266 * v331;
-        const V v422 = v269 * v334;
-        const V v423 = v415 * t11;
-        const V v424 = v83 * t11;
-        const V v425 = parameters[1] * v414;
-        const V v426 = v418 + v425;
-        const V v427 = v132 * v352;
-        const V v428 = v132 * v235;
-        const V v429 = p1 * v71;
-        const V v430 = tp1 - v429;
-        const V v431 = v159 * v229;
-        const V v432 = v229 - v431;
-        const V v433 = v133 * v362;
-        const V v434 = v133 * v230;
-        const V v435 = v434 + v428;
-        const V v436 = v66 * v430;
-        const V v437 = v134 * v372;
-        const V v438 = v134 * v231;
-        const V v439 = v438 + v435;
-        const V v440 = v135 * v382;
-        const V v441 = v135 * v243;
-        const V v442 = v441 + v439;
-        const V v443 = v217 + v432;
-        const V v444 = v136 * v392;
-        const V v445 = v136 * v254;
-        const V v446 = v445 + v442;
-        const V v447 = v89 * v436;
-        const V v448 = v156 * v217;
-        const V v449 = v443 - v448;
-        const V v450 = v137 * v402;
-        const V v451 = v137 * v232;
-        const V v452 = v451 + v446;
-        const V v453 = v408[0];
-        const V v454 = v408[1];
-        const V v455 = v408[2];
-        const V v456 = v408[3];
-        const V v457 = v408[4];
-        const V v458 = v408[5];
-        const V v459 = v408[6];
-        const V v460 = v453 * v452;
-        const V v461 = v244 + v449;
-        const V v462 = v416 * v454;
-        const V v463 = v450 * v459;
-        const V v464 = v463 + v460;
-        const V v465 = v161 * v244;
-        const V v466 = v461 - v465;
-        const V v467 = v454 - v459;
-        const V v468 = v455 - v458;
-        const V v469 = v456 - v457;
-        const V v470 = v417 * v455;
-        const V v471 = v462 + v470;
-        const V v472 = v311 * v223;
-        const V v473 = v472 - v223;
-        const V v474 = v427 * v454;
-        const V v475 = v474 + v464;
-        const V v476 = v216 + v466;
-        const V v477 = v419 * v456;
-        const V v478 = v477 + v471;
-        const V v479 = v312 * v210;
-        const V v480 = v479 - v210;
-        const V v481 = v155 * v216;
-        const V v482 = v476 - v481;
-        const V v483 = v433 * v455;
-        const V v484 = v483 + v475;
-        const V v485 = v351 + v473;
-        const V v486 = v420 * v457;
-        const V v487 = v486 + v478;
-        const V v488 = v155 * v361;
-        const V v489 = v480 - v488;
-        const V v490 = v361 + v489;
-        const V v491 = v157 * v351;
-        const V v492 = v485 - v491;
-        const V v493 = v157 * v228;
-        const V v494 = v482 - v493;
-        const V v495 = v455 * v490;
-        const V v496 = v437 * v456;
-        const V v497 = v496 + v484;
-        const V v498 = v228 + v494;
-        const V v499 = v421 * v458;
-        const V v500 = v499 + v487;
-        const V v501 = v454 * v492;
-        const V v502 = v495 + v501;
-        const V v503 = v313 * v213;
-        const V v504 = v503 - v213;
-        const V v505 = v440 * v457;
-        const V v506 = v505 + v497;
-        const V v507 = v314 * v225;
-        const V v508 = v507 - v225;
-        const V v509 = v221 + v498;
-        const V v510 = v422 * v459;
-        const V v511 = v510 + v500;
-        const V v512 = v444 * v458;
-        const V v513 = v512 + v506;
-        const V v514 = v158 * v221;
-        const V v515 = v509 - v514;
-        const V v516 = v371 + v504;
-        const V v517 = v156 * v371;
-        const V v518 = v516 - v517;
-        const V v519 = v456 * v518;
-        const V v520 = v502 + v519;
-        const V v521 = v38 * v513;
-        const V v522 = v381 + v508;
-        const V v523 = v159 * v381;
-        const V v524 = v522 - v523;
-        const V v525 = v315 * v239;
-        const V v526 = v525 - v239;
-        const V v527 = v457 * v524;
-        const V v528 = v520 + v527;
-        const V v529 = v29 * v511;
-        const V v530 = v521 - v529;
-        const V v531 = v317 * v218;
-        const V v532 = v531 - v218;
-        const V v533 = 0.5 * v88;
-        const V v534 = parameters[7] * v88;
-        const V v535 = v424 + v534;
-        const V v536 = v391 + v526;
-        const V v537 = v161 * v391;
-        const V v538 = v536 - v537;
-        const V v539 = v458 * v538;
-        const V v540 = v539 + v528;
-        const V v541 = v158 * v401;
-        const V v542 = v532 - v541;
-        const V v543 = v401 + v542;
-        const V v544 = v75 * v533;
-        const V v545 = v544 + v447;
-        const V v546 = v94 * v535;
-        const V v547 = v426 - v546;
-        const V v548 = v459 * v543;
-        const V v549 = v548 + v540;
-        const V v550 = v93 * v547;
-        const V v551 = v91 * v42;
-        const V v552 = v545 - v551;
-        const V v553 = v6 * v552;
-        const V v554 = v453 * v515;
-        const V v555 = v549 + v554;
-        const V v556 = v453 * v550;
-        const V v557 = v556 + v530;
-        const V v558 = t13 * v555;
-        const V v559 = v557 + v558;
-        const V v560 = 0.932469514203152 * v553;
-        const V v561 = v467 * v560;
-        const V v562 = v561 + v559;
-        const V v563 = 0.6612093864662645 * v553;
-        const V v564 = 0.2386191860831969 * v553;
-        const V v565 = v468 * v563;
-        const V v566 = v565 + v562;
-        const V v567 = v469 * v564;
-        const V v568 = v567 + v566;
-        const V v569 = parameters[7] * v568;
-        const V v570 = v423 + v569;
-        const V v571 = v545 + v570;
-        const V v572 = v570 - v545;
-        const V v573 = 1.0 / v84;
-        const V v574 = v83 * v83;
-        const V v575 = 0.1192694691878821 * v115;
-        const V v576 = 0.05582662111236089 * v116;
-        const V v577 = 0.07987743308995329 * v114;
-        const V v578 = 0.07987743308995329 * v119;
-        const V v579 = 0.05582662111236089 * v117;
-        const V v580 = 0.1192694691878821 * v118;
-        const V v581 = v7 * v574;
-        const V v582 = v574 * v41;
-        const V v583 = v575 * v211;
-        const V v584 = v576 * v214;
-        const V v585 = v577 * v222;
-        const V v586 = v578 * v219;
-        const V v587 = 1.0 - v155;
-        const V v588 = v579 * v226;
-        const V v589 = v580 * v238;
-        const V v590 = v578 * v193;
-        const V v591 = 1.0 - v156;
-        const V v592 = 1.0 - v157;
-        const V v593 = 1.0 - v158;
-        const V v594 = 1.0 - v159;
-        const V v595 = 1.0 - v161;
-        const V v596 = v89 * t5;
-        const V v597 = v577 * v191;
-        const V v598 = v590 - v597;
-        const V v599 = v408[7];
-        const V v600 = v408[8];
-        const V v601 = v408[9];
-        const V v602 = v408[10];
-        const V v603 = v408[11];
-        const V v604 = v408[12];
-        const V v605 = v408[13];
-        const V v606 = v408[14];
-        const V v607 = v408[15];
-        const V v608 = v408[16];
-        const V v609 = v408[17];
-        const V v610 = v408[18];
-        const V v611 = v408[19];
-        const V v612 = v408[20];
-        const V v613 = v408[21];
-        const V v614 = v408[22];
-        const V v615 = v408[23];
-        const V v616 = v408[24];
-        const V v617 = v408[25];
-        const V v618 = v408[26];
-        const V v619 = v408[27];
-        const V v620 = v408[28];
-        const V v621 = v408[29];
-        const V v622 = v408[30];
-        const V v623 = v408[31];
-        const V v624 = v408[32];
-        const V v625 = v408[33];
-        const V v626 = v408[34];
-        const V v627 = v408[35];
-        const V v628 = v408[36];
-        const V v629 = v408[37];
-        const V v630 = v408[38];
-        const V v631 = v408[39];
-        const V v632 = v408[40];
-        const V v633 = v408[41];
-        const V v634 = v408[42];
-        const V v635 = v408[43];
-        const V v636 = v408[44];
-        const V v637 = v408[45];
-        const V v638 = v408[46];
-        const V v639 = v408[47];
-        const V v640 = v408[48];
-        const V v641 = v635 - v640;
-        const V v642 = v628 - v633;
-        const V v643 = v636 - v639;
-        const V v644 = v629 - v632;
-        const V v645 = v630 - v631;
-        const V v646 = v133 * v38;
-        const V v647 = v134 * v38;
-        const V v648 = v132 * v38;
-        const V v649 = v137 * v38;
-        const V v650 = v135 * v38;
-        const V v651 = v136 * v38;
-        const V v652 = v642 * v560;
-        const V v653 = v641 * v560;
-        const V v654 = v600 - v605;
-        const V v655 = v601 - v604;
-        const V v656 = v602 - v603;
-        const V v657 = v607 - v612;
-        const V v658 = v608 - v611;
-        const V v659 = v609 - v610;
-        const V v660 = v654 * v560;
-        const V v661 = v657 * v560;
-        const V v662 = v614 - v619;
-        const V v663 = v615 - v618;
-        const V v664 = v616 - v617;
-        const V v665 = v662 * v560;
-        const V v666 = v621 - v626;
-        const V v667 = v666 * v560;
-        const V v668 = v622 - v625;
-        const V v669 = v623 - v624;
-        const V v670 = t13 * v587;
-        const V v671 = t13 * v591;
-        const V v672 = t13 * v592;
-        const V v673 = t13 * v593;
-        const V v674 = t13 * v594;
-        const V v675 = v663 * v563;
-        const V v676 = v665 + v675;
-        const V v677 = t13 * v595;
-        const V v678 = v668 * v563;
-        const V v679 = v667 + v678;
-        const V v680 = v420 * v624;
-        const V v681 = v420 * v603;
-        const V v682 = v440 * v603;
-        const V v683 = v440 * v624;
-        const V v684 = v603 * v524;
-        const V v685 = v624 * v524;
-        const V v686 = v420 * v610;
-        const V v687 = v440 * v610;
-        const V v688 = v610 * v524;
-        const V v689 = v420 * v617;
-        const V v690 = v440 * v617;
-        const V v691 = v617 * v524;
-        const V v692 = v90 * v88;
-        const V v693 = v582 + v692;
-        const V v694 = v420 * v631;
-        const V v695 = v440 * v631;
-        const V v696 = v631 * v524;
-        const V v697 = v420 * v638;
-        const V v698 = v440 * v638;
-        const V v699 = v638 * v524;
-        const V v700 = v637 - v638;
-        const V v701 = parameters[1] * v533;
-        const V v702 = v596 + v701;
-        const V v703 = v416 * v607;
-        const V v704 = v703 + v686;
-        const V v705 = v416 * v614;
-        const V v706 = v705 + v689;
-        const V v707 = v427 * v614;
-        const V v708 = v707 + v690;
-        const V v709 = v416 * v628;
-        const V v710 = v709 + v694;
-        const V v711 = v427 * v628;
-        const V v712 = v711 + v695;
-        const V v713 = v628 * v492;
-        const V v714 = v713 + v696;
-        const V v715 = v614 * v492;
-        const V v716 = v715 + v691;
-        const V v717 = v416 * v635;
-        const V v718 = v717 + v697;
-        const V v719 = v635 * v492;
-        const V v720 = v719 + v699;
-        const V v721 = v427 * v635;
-        const V v722 = v721 + v698;
-        const V v723 = v427 * v607;
-        const V v724 = v723 + v687;
-        const V v725 = v607 * v492;
-        const V v726 = v725 + v688;
-        const V v727 = v417 * v608;
-        const V v728 = v727 + v704;
-        const V v729 = v417 * v629;
-        const V v730 = v729 + v710;
-        const V v731 = v433 * v629;
-        const V v732 = v731 + v712;
-        const V v733 = v433 * v608;
-        const V v734 = v733 + v724;
-        const V v735 = v608 * v490;
-        const V v736 = v735 + v726;
-        const V v737 = v629 * v490;
-        const V v738 = v737 + v714;
-        const V v739 = v417 * v636;
-        const V v740 = v739 + v718;
-        const V v741 = v433 * v636;
-        const V v742 = v741 + v722;
-        const V v743 = v636 * v490;
-        const V v744 = v743 + v720;
-        const V v745 = v419 * v609;
-        const V v746 = v745 + v728;
-        const V v747 = v419 * v630;
-        const V v748 = v747 + v730;
-        const V v749 = v437 * v609;
-        const V v750 = v749 + v734;
-        const V v751 = v437 * v630;
-        const V v752 = v751 + v732;
-        const V v753 = v609 * v518;
-        const V v754 = v753 + v736;
-        const V v755 = v630 * v518;
-        const V v756 = v755 + v738;
-        const V v757 = v419 * v637;
-        const V v758 = v757 + v740;
-        const V v759 = v437 * v637;
-        const V v760 = v759 + v742;
-        const V v761 = v637 * v518;
-        const V v762 = v761 + v744;
-        const V v763 = v421 * v611;
-        const V v764 = v763 + v746;
-        const V v765 = v444 * v611;
-        const V v766 = v765 + v750;
-        const V v767 = v611 * v538;
-        const V v768 = v767 + v754;
-        const V v769 = v421 * v632;
-        const V v770 = v769 + v748;
-        const V v771 = v444 * v632;
-        const V v772 = v771 + v752;
-        const V v773 = v632 * v538;
-        const V v774 = v773 + v756;
-        const V v775 = v421 * v639;
-        const V v776 = v775 + v758;
-        const V v777 = v444 * v639;
-        const V v778 = v777 + v760;
-        const V v779 = v639 * v538;
-        const V v780 = v779 + v762;
-        const V v781 = v422 * v612;
-        const V v782 = v781 + v764;
-        const V v783 = v422 * v633;
-        const V v784 = v783 + v770;
-        const V v785 = v450 * v612;
-        const V v786 = v785 + v766;
-        const V v787 = v450 * v633;
-        const V v788 = v787 + v772;
-        const V v789 = v612 * v543;
-        const V v790 = v789 + v768;
-        const V v791 = v633 * v543;
-        const V v792 = v791 + v774;
-        const V v793 = v422 * v640;
-        const V v794 = v793 + v776;
-        const V v795 = v450 * v640;
-        const V v796 = v795 + v778;
-        const V v797 = v640 * v543;
-        const V v798 = v797 + v780;
-        const V v799 = v452 * v606;
-        const V v800 = v799 + v786;
-        const V v801 = v452 * v627;
-        const V v802 = v801 + v788;
-        const V v803 = v606 * v515;
-        const V v804 = v803 + v790;
-        const V v805 = v627 * v515;
-        const V v806 = v805 + v792;
-        const V v807 = v452 * v634;
-        const V v808 = v807 + v796;
-        const V v809 = v634 * v515;
-        const V v810 = v809 + v798;
-        const V v811 = v29 * v784;
-        const V v812 = v652 - v811;
-        const V v813 = v29 * v794;
-        const V v814 = v653 - v813;
-        const V v815 = v29 * v782;
-        const V v816 = v661 - v815;
-        const V v817 = t13 * v806;
-        const V v818 = v817 + v812;
-        const V v819 = t13 * v810;
-        const V v820 = v819 + v814;
-        const V v821 = t13 * v804;
-        const V v822 = v821 + v816;
-        const V v823 = v575 * v187;
-        const V v824 = v598 - v823;
-        const V v825 = v38 * v800;
-        const V v826 = v825 + v822;
-        const V v827 = v38 * v802;
-        const V v828 = v827 + v818;
-        const V v829 = v38 * v808;
-        const V v830 = v829 + v820;
-        const V v831 = v576 * v189;
-        const V v832 = v824 - v831;
-        const V v833 = v606 * v550;
-        const V v834 = v833 + v826;
-        const V v835 = v627 * v550;
-        const V v836 = v835 + v828;
-        const V v837 = v634 * v550;
-        const V v838 = v837 + v830;
-        const V v839 = v579 * v198;
-        const V v840 = v839 + v832;
-        const V v841 = v580 * v201;
-        const V v842 = v841 + v840;
-        const V v843 = v658 * v563;
-        const V v844 = v843 + v834;
-        const V v845 = v644 * v563;
-        const V v846 = v845 + v836;
-        const V v847 = v643 * v563;
-        const V v848 = v847 + v838;
-        const V v849 = v655 * v563;
-        const V v850 = v660 + v849;
-        const V v851 = v693 * v842;
-        const V v852 = v573 * v842;
-        const V v853 = v659 * v564;
-        const V v854 = v853 + v844;
-        const V v855 = v645 * v564;
-        const V v856 = v855 + v846;
-        const V v857 = v700 * v564;
-        const V v858 = v857 + v848;
-        const V v859 = v656 * v564;
-        const V v860 = v859 + v850;
-        const V v861 = v201 * v856;
-        const V v862 = v173 * v856;
-        const V v863 = v651 + v862;
-        const V v864 = v664 * v564;
-        const V v865 = v864 + v676;
-        const V v866 = v669 * v564;
-        const V v867 = v866 + v679;
-        const V v868 = v193 * v858;
-        const V v869 = v172 * v858;
-        const V v870 = v649 + v869;
-        const V v871 = v168 * v854;
-        const V v872 = v646 + v871;
-        const V v873 = v187 * v854;
-        const V v874 = v861 - v873;
-        const V v875 = v599 * v550;
-        const V v876 = v875 + v860;
-        const V v877 = 0.1192694691878821 * v874;
-        const V v878 = v613 * v550;
-        const V v879 = v878 + v865;
-        const V v880 = v620 * v550;
-        const V v881 = v880 + v867;
-        const V v882 = v179 * v863;
-        const V v883 = v677 + v882;
-        const V v884 = v174 * v872;
-        const V v885 = v670 + v884;
-        const V v886 = v177 * v870;
-        const V v887 = v673 + v886;
-        const V v888 = v583 * v885;
-        const V v889 = v877 + v888;
-        const V v890 = v452 * v599;
-        const V v891 = v890 + v682;
-        const V v892 = v452 * v613;
-        const V v893 = v892 + v708;
-        const V v894 = v452 * v620;
-        const V v895 = v894 + v683;
-        const V v896 = v599 * v515;
-        const V v897 = v684 + v896;
-        const V v898 = v613 * v515;
-        const V v899 = v898 + v716;
-        const V v900 = v620 * v515;
-        const V v901 = v685 + v900;
-        const V v902 = v586 * v887;
-        const V v903 = v889 - v902;
-        const V v904 = v589 * v883;
-        const V v905 = v903 - v904;
-        const V v906 = v427 * v600;
-        const V v907 = v906 + v891;
-        const V v908 = v427 * v621;
-        const V v909 = v908 + v895;
-        const V v910 = v600 * v492;
-        const V v911 = v910 + v897;
-        const V v912 = v621 * v492;
-        const V v913 = v912 + v901;
-        const V v914 = v416 * v600;
-        const V v915 = v914 + v681;
-        const V v916 = v416 * v621;
-        const V v917 = v916 + v680;
-        const V v918 = v433 * v615;
-        const V v919 = v918 + v893;
-        const V v920 = v615 * v490;
-        const V v921 = v920 + v899;
-        const V v922 = v433 * v601;
-        const V v923 = v922 + v907;
-        const V v924 = v433 * v622;
-        const V v925 = v924 + v909;
-        const V v926 = v601 * v490;
-        const V v927 = v926 + v911;
-        const V v928 = v622 * v490;
-        const V v929 = v928 + v913;
-        const V v930 = v417 * v601;
-        const V v931 = v930 + v915;
-        const V v932 = v417 * v622;
-        const V v933 = v932 + v917;
-        const V v934 = v417 * v615;
-        const V v935 = v934 + v706;
-        const V v936 = v437 * v616;
-        const V v937 = v936 + v919;
-        const V v938 = v437 * v602;
-        const V v939 = v938 + v923;
-        const V v940 = v437 * v623;
-        const V v941 = v940 + v925;
-        const V v942 = v602 * v518;
-        const V v943 = v942 + v927;
-        const V v944 = v616 * v518;
-        const V v945 = v944 + v921;
-        const V v946 = v623 * v518;
-        const V v947 = v946 + v929;
-        const V v948 = v419 * v602;
-        const V v949 = v948 + v931;
-        const V v950 = v419 * v616;
-        const V v951 = v950 + v935;
-        const V v952 = v419 * v623;
-        const V v953 = v952 + v933;
-        const V v954 = v444 * v604;
-        const V v955 = v954 + v939;
-        const V v956 = v444 * v618;
-        const V v957 = v956 + v937;
-        const V v958 = v444 * v625;
-        const V v959 = v958 + v941;
-        const V v960 = v604 * v538;
-        const V v961 = v960 + v943;
-        const V v962 = v618 * v538;
-        const V v963 = v962 + v945;
-        const V v964 = v625 * v538;
-        const V v965 = v964 + v947;
-        const V v966 = v421 * v604;
-        const V v967 = v966 + v949;
-        const V v968 = v421 * v618;
-        const V v969 = v968 + v951;
-        const V v970 = v421 * v625;
-        const V v971 = v970 + v953;
-        const V v972 = v450 * v605;
-        const V v973 = v972 + v955;
-        const V v974 = v450 * v619;
-        const V v975 = v974 + v957;
-        const V v976 = v450 * v626;
-        const V v977 = v976 + v959;
-        const V v978 = v605 * v543;
-        const V v979 = v978 + v961;
-        const V v980 = v619 * v543;
-        const V v981 = v980 + v963;
-        const V v982 = v626 * v543;
-        const V v983 = v982 + v965;
-        const V v984 = v422 * v605;
-        const V v985 = v984 + v967;
-        const V v986 = v422 * v619;
-        const V v987 = v986 + v969;
-        const V v988 = v422 * v626;
-        const V v989 = v988 + v971;
-        const V v990 = v38 * v975;
-        const V v991 = v879 + v990;
-        const V v992 = v38 * v977;
-        const V v993 = v992 + v881;
-        const V v994 = v38 * v973;
-        const V v995 = v994 + v876;
-        const V v996 = v29 * v987;
-        const V v997 = v991 - v996;
-        const V v998 = v29 * v989;
-        const V v999 = v993 - v998;
-        const V v1000 = v29 * v985;
-        const V v1001 = v995 - v1000;
-        const V v1002 = t13 * v979;
-        const V v1003 = v1002 + v1001;
-        const V v1004 = t13 * v981;
-        const V v1005 = v997 + v1004;
-        const V v1006 = t13 * v983;
-        const V v1007 = v1006 + v999;
-        const V v1008 = v198 * v1007;
-        const V v1009 = v170 * v1007;
-        const V v1010 = v650 + v1009;
-        const V v1011 = v169 * v1003;
-        const V v1012 = v648 + v1011;
-        const V v1013 = v191 * v1003;
-        const V v1014 = v868 - v1013;
-        const V v1015 = v171 * v1005;
-        const V v1016 = v647 + v1015;
-        const V v1017 = 0.07987743308995329 * v1014;
-        const V v1018 = v905 + v1017;
-        const V v1019 = v189 * v1005;
-        const V v1020 = v1008 - v1019;
-        const V v1021 = v176 * v1012;
-        const V v1022 = v672 + v1021;
-        const V v1023 = v175 * v1016;
-        const V v1024 = v671 + v1023;
-        const V v1025 = v178 * v1010;
-        const V v1026 = v674 + v1025;
-        const V v1027 = v585 * v1022;
-        const V v1028 = v1018 + v1027;
-        const V v1029 = v584 * v1024;
-        const V v1030 = v1028 + v1029;
-        const V v1031 = v588 * v1026;
-        const V v1032 = v1030 - v1031;
-        const V v1033 = 0.05582662111236089 * v1020;
-        const V v1034 = v1032 + v1033;
-        const V v1035 = v414 * v852;
-        const V v1036 = v1034 - v1035;
-        const V v1037 = v581 * v1036;
-        const V v1038 = v851 + v1037;
-        const V v1039 = v573 * v1038;
-        const V v1040 = v702 + v1039;
-        const V v1041 = 1.0 / v83;
-        const V v1042 = v842 * v1041;
-        const V v1043 = v88 * v1042;
-        const V v1044 = v1043 - v1034;
-        const V v1045 = v8 * v1044;
-        const V v1046 = v842 * v43;
-        const V v1047 = v1045 - v1046;
-        const V v1048 = v1041 * v1047;
-        softehl_store4(R + 9 * q + 0, (9 * points), v86, v78, v88, tp0);
-        softehl_store4(R + 9 * q + 4, (9 * points), v572, v1040, v571, v414);
-        softehl_store1(R + 9 * q + 8, (9 * points), v1048);
+        (void)tp0, (void)tp1; const double v42 = 0.5 * w[0];
+        const V v43 = softehl_vexp(p0 * parameters[3]), v44 = p1 * v39;
+        const double v45 = 0.5 - v42, v46 = 0.5 + v42;
+        const V v47 = w[1] * v23, v48 = v45 * v16 + v46 * v18, v49 = parameters[2] * v43,
+            v50 = v46 * v3 + v45 * v22, v51 = v45 * v11 + v46 * v12, v52 = 0.5 * v48,
+            v53 = parameters[7] * v48, v54 = v52 * v44, v55 = 1.0 / v53,
+            v56 = parameters[1] * v49 * v55, v57 = v5 * v54, v58 = softehl_vlog(1.0 + v56 * v56),
+            v59 = softehl_vexp(v58 * v10), v60 = v56 * (parameters[9] + v1 * v59),
+            v61 = 0.932469514203152 * v57, v62 = 0.6612093864662645 * v57,
+            v63 = 0.2386191860831969 * v57, v64 = v60 + v61, v65 = v60 + v62, v66 = v60 + v63,
+            v67 = v60 - v63, v68 = v60 - v62, v69 = v60 - v61;
+        V v70[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v56, softehl_splat(v10), softehl_splat(v1), softehl_splat(v17), v61, v62, v63, v60, v64, v65, v66, v67, v68, v69}, v70, &failed);
+        const V v71 = v70[1], v72 = v70[2], v73 = v70[3], v74 = v70[4], v75 = v70[5], v76 = v70[6],
+            v77 = v71 * v71, v78 = v72 * v72, v79 = v73 * v73, v80 = v74 * v74, v81 = v75 * v75,
+            v82 = v76 * v76, v83 = 1.0 + v77, v84 = 1.0 + v78, v85 = 1.0 + v79, v86 = 1.0 + v80,
+            v87 = 1.0 + v81, v88 = 1.0 + v82, v89 = softehl_vlog(v83), v90 = softehl_vlog(v84),
+            v91 = softehl_vlog(v85), v92 = softehl_vlog(v86), v93 = softehl_vlog(v87),
+            v94 = softehl_vlog(v88), v95 = 2.0 * v74, v96 = 2.0 * v73, v97 = 2.0 * v75,
+            v98 = 2.0 * v72, v99 = 2.0 * v76, v100 = 2.0 * v71, v101 = softehl_vexp(v17 * v90),
+            v102 = softehl_vexp(v17 * v91), v103 = softehl_vexp(v17 * v89),
+            v104 = softehl_vexp(v17 * v94), v105 = softehl_vexp(v17 * v92),
+            v106 = softehl_vexp(v17 * v93), v107 = v17 * (1.0 / v86), v108 = v17 * (1.0 / v85),
+            v109 = v17 * (1.0 / v87), v110 = v17 * (1.0 / v84), v111 = v17 * (1.0 / v88),
+            v112 = v17 * (1.0 / v83), v113 = v98 * v110, v114 = v100 * v112, v115 = v95 * v107,
+            v116 = v96 * v108, v117 = v99 * v111, v118 = v97 * v109, v119 = v1 * v101,
+            v120 = v1 * v102, v121 = v1 * v103, v122 = v1 * v104, v123 = v1 * v105,
+            v124 = v1 * v106, v125 = parameters[9] + v119, v126 = parameters[9] + v120,
+            v127 = parameters[9] + v121, v128 = parameters[9] + v122, v129 = parameters[9] + v123,
+            v130 = parameters[9] + v124, v131 = 1.0 / v125, v132 = 1.0 / v126, v133 = 1.0 / v127,
+            v134 = 1.0 / v128, v135 = 1.0 / (v125 * v125), v136 = 1.0 / (v126 * v126),
+            v137 = 1.0 / (v127 * v127), v138 = 1.0 / v129, v139 = 1.0 / (v128 * v128),
+            v140 = 1.0 / v130, v141 = 1.0 / (v129 * v129), v142 = 1.0 / (v130 * v130),
+            v143 = v72 * v131, v144 = v131 * v131, v145 = v73 * v132, v146 = v132 * v132,
+            v147 = v144 * (0.1803807865240693 * v72), v148 = v146 * (0.23395696728634552 * v73),
+            v149 = v76 * v134, v150 = v134 * v134, v151 = v150 * (0.08566224618958518 * v76),
+            v152 = v133 * v133, v153 = v71 * v133, v154 = v74 * v138, v155 = v138 * v138,
+            v156 = v152 * (0.08566224618958518 * v71), v157 = v155 * (0.23395696728634552 * v74),
+            v158 = v119 * v147, v159 = v120 * v148, v160 = v122 * v151,
+            v161 = 0.1803807865240693 * v131 - v113 * v158, v162 = v121 * v156,
+            v163 = 0.23395696728634552 * v132 - v116 * v159, v164 = v140 * v140, v165 = v75 * v140,
+            v166 = 0.08566224618958518 * v134 - v117 * v160, v167 = v123 * v157,
+            v168 = v164 * (0.1803807865240693 * v75),
+            v169 = 0.08566224618958518 * v133 - v114 * v162, v170 = 1.0 + v77 * v137,
+            v171 = 0.23395696728634552 * v138 - v115 * v167, v172 = softehl_vlog(v170),
+            v173 = 1.0 + v78 * v135, v174 = v124 * v168, v175 = softehl_vlog(v173),
+            v176 = 1.0 + v79 * v136, v177 = 1.0 + v80 * v141, v178 = softehl_vlog(v176),
+            v179 = softehl_vlog(v177), v180 = 1.0 + v81 * v142,
+            v181 = 0.1803807865240693 * v140 - v118 * v174, v182 = softehl_vlog(v180),
+            v183 = 1.0 + v82 * v139, v184 = softehl_vlog(v183), v185 = softehl_vexp(v10 * v172),
+            v186 = softehl_vexp(v10 * v175), v187 = softehl_vexp(v10 * v178),
+            v188 = softehl_vexp(v10 * v179), v189 = softehl_vexp(v10 * v182),
+            v190 = softehl_vexp(v10 * v184), v191 = v1 * v187, v192 = v1 * v189, v193 = v1 * v190,
+            v194 = parameters[9] + v191, v195 = v191 * v145, v196 = v195 * (v10 * (1.0 / v176)),
+            v197 = parameters[9] + v192, v198 = v192 * v165, v199 = v198 * (v10 * (1.0 / v180)),
+            v200 = parameters[9] + v193, v201 = v193 * v149, v202 = v201 * (v10 * (1.0 / v183)),
+            v203 = v1 * v185, v204 = parameters[9] + v203, v205 = v203 * v153,
+            v206 = v205 * (v10 * (1.0 / v170)), v207 = v1 * v186, v208 = v1 * v188,
+            v209 = parameters[9] + v207, v210 = v207 * v143, v211 = v210 * (v10 * (1.0 / v173)),
+            v212 = parameters[9] + v208, v213 = v208 * v154, v214 = v213 * (v10 * (1.0 / v177)),
+            v215 = v71 * v152 * v204 + v137 * (v137 * (2.0 * v77 * v127)) * v206,
+            v216 = v121 * v215, v217 = v133 * v204 + v100 * (v137 * v206 - v112 * v216),
+            v218 = v72 * v144 * v209 + v135 * (v135 * (2.0 * v78 * v125)) * v211,
+            v219 = v119 * v218, v220 = v131 * v209 + v98 * (v135 * v211 - v110 * v219),
+            v221 = v73 * v146 * v194 + v136 * (v136 * (2.0 * v79 * v126)) * v196,
+            v222 = v120 * v221, v223 = v132 * v194 + v96 * (v136 * v196 - v108 * v222),
+            v224 = v74 * v155 * v212 + v141 * (v141 * (2.0 * v80 * v129)) * v214,
+            v225 = v123 * v224, v226 = v138 * v212 + v95 * (v141 * v214 - v107 * v225),
+            v227 = v75 * v164 * v197 + v142 * (v142 * (2.0 * v81 * v130)) * v199,
+            v228 = v124 * v227, v229 = v140 * v197 + v97 * (v142 * v199 - v109 * v228),
+            v230 = v76 * v150 * v200 + v139 * (v139 * (2.0 * v82 * v128)) * v202,
+            v231 = v122 * v230, v232 = v134 * v200 + v99 * (v139 * v202 - v111 * v231);
+        V v233[49];
+        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v169, v161, v163, v171, v181, v166, softehl_splat((-1.0)), v217, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v220, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v223, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v226, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v229, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v232}, v233, &failed);
+        const V v234 = v43 * t6 + v49 * (p0 * t7 + parameters[3] * tp0), v235 = v70[0],
+            v236 = v172 * v205, v237 = v175 * v210, v238 = v178 * v195, v239 = v179 * v213,
+            v240 = v182 * v198, v241 = v184 * v201, v242 = v89 * v216, v243 = v90 * v219,
+            v244 = v91 * v222, v245 = v92 * v225, v246 = v93 * v228,
+            v247 = v93 * v174 + (v92 * v167 + (v91 * v159 + (v90 * v158 + v89 * v162))),
+            v248 = v94 * v231, v249 = v94 * v160 + v247, v250 = v233[0], v251 = v233[1],
+            v252 = v233[2], v253 = v233[3], v254 = v233[4], v255 = v233[5], v256 = v233[6],
+            v257 = v147 + (v168 + (v148 + (v157 - v105 * v157) - v102 * v148) - v106 * v168),
+            v258 = v218 + (v186 * v143 - v143 - v101 * v218),
+            v259 = v215 + (v185 * v153 - v153) - v103 * v215,
+            v260 = v244 * v253 + (v243 * v252 + (v242 * v251 + (v248 * v256 + v250 * v249))),
+            v261 = v240 * v255 + (v239 * v254 + (v238 * v253 + (v236 * v251 + v237 * v252))),
+            v262 = v151 + (v156 + (v257 - v101 * v147 - v103 * v156)) - v104 * v151,
+            v263 = v221 + (v187 * v145 - v145) - v102 * v221,
+            v264 = v224 + (v188 * v154 - v154) - v105 * v224,
+            v265 = v24 * (v246 * v255 + (v245 * v254 + v260)) - v20 * (v241 * v256 + v261),
+            v266 = 0.5 * v51, v267 = v227 + (v189 * v165 - v165) - v106 * v227,
+            v268 = v255 * v267 + (v252 * v258 + v251 * v259 + v253 * v263 + v254 * v264),
+            v269 = v230 + (v190 * v149 - v149 - v104 * v230),
+            v270 = v44 * v266 + v52 * (v39 * (tp1 - p1 * v41)),
+            v271 = v49 * t5 + parameters[1] * v234 - v56 * (v48 * t11 + parameters[7] * v51),
+            v272 = v55 * v271, v273 = v5 * (v270 - v54 * v28), v274 = 0.932469514203152 * v273,
+            v275 = (v251 - v256) * v274 + (v250 * v272 + v265 + t13 * (v256 * v269 + v268 + v250 * v262)),
+            v276 = 0.6612093864662645 * v273, v277 = 0.2386191860831969 * v273,
+            v278 = parameters[7] * ((v253 - v254) * v277 + ((v252 - v255) * v276 + v275)),
+            v279 = v235 * t11 + v278, v280 = v270 + v279, v281 = v279 - v270, v282 = 1.0 / v49,
+            v283 = v48 * v48, v284 = 0.1192694691878821 * v72, v285 = 0.05582662111236089 * v73,
+            v286 = 0.07987743308995329 * v71, v287 = 0.07987743308995329 * v76,
+            v288 = 0.05582662111236089 * v74, v289 = 0.1192694691878821 * v75, v290 = v233[7],
+            v291 = v233[8], v292 = v233[9], v293 = v233[10], v294 = v233[11], v295 = v233[12],
+            v296 = v233[13], v297 = v233[14], v298 = v233[15], v299 = v233[16], v300 = v233[17],
+            v301 = v233[18], v302 = v233[19], v303 = v233[20], v304 = v233[21], v305 = v233[22],
+            v306 = v233[23], v307 = v233[24], v308 = v233[25], v309 = v233[26], v310 = v233[27],
+            v311 = v233[28], v312 = v233[29], v313 = v233[30], v314 = v233[31], v315 = v233[32],
+            v316 = v233[33], v317 = v233[34], v318 = v233[35], v319 = v233[36], v320 = v233[37],
+            v321 = v233[38], v322 = v233[39], v323 = v233[40], v324 = v233[41], v325 = v233[42],
+            v326 = v233[43], v327 = v233[44], v328 = v233[45], v329 = v233[46], v330 = v233[47],
+            v331 = v233[48],
+            v332 = v240 * v302 + (v238 * v300 + (v237 * v299 + (v236 * v298 + v239 * v301))),
+            v333 = v246 * v302 + (v244 * v300 + (v243 * v299 + (v242 * v298 + v245 * v301))),
+            v334 = v302 * v267 + (v300 * v263 + (v299 * v258 + (v298 * v259 + v301 * v264))),
+            v335 = v240 * v323 + (v238 * v321 + (v237 * v320 + (v236 * v319 + v239 * v322))),
+            v336 = v246 * v323 + (v244 * v321 + (v243 * v320 + (v242 * v319 + v245 * v322))),
+            v337 = v323 * v267 + (v321 * v263 + (v320 * v258 + (v319 * v259 + v322 * v264))),
+            v338 = v240 * v330 + (v238 * v328 + (v237 * v327 + (v236 * v326 + v239 * v329))),
+            v339 = v246 * v330 + (v244 * v328 + (v243 * v327 + (v242 * v326 + v245 * v329))),
+            v340 = v330 * v267 + (v328 * v263 + (v327 * v258 + (v326 * v259 + v329 * v264))),
+            v341 = t13 * (v318 * v262 + (v324 * v269 + v337)) + ((v319 - v324) * v274 - v20 * (v241 * v324 + v335)),
+            v342 = t13 * (v325 * v262 + (v331 * v269 + v340)) + ((v326 - v331) * v274 - v20 * (v241 * v331 + v338)),
+            v343 = t13 * (v297 * v262 + (v303 * v269 + v334)) + ((v298 - v303) * v274 - v20 * (v241 * v303 + v332)),
+            v344 = v297 * v272 + (v24 * (v249 * v297 + (v248 * v303 + v333)) + v343),
+            v345 = v318 * v272 + (v24 * (v249 * v318 + (v248 * v324 + v336)) + v341),
+            v346 = v325 * v272 + (v24 * (v249 * v325 + (v248 * v331 + v339)) + v342),
+            v347 = v288 * v138 + (v287 * v134 - v286 * v133 - v284 * v131 - v285 * v132),
+            v348 = v289 * v140 + v347, v349 = (v300 - v301) * v277 + ((v299 - v302) * v276 + v344),
+            v350 = (v321 - v322) * v277 + ((v320 - v323) * v276 + v345),
+            v351 = (v328 - v329) * v277 + ((v327 - v330) * v276 + v346),
+            v352 = (v293 - v294) * v277 + ((v291 - v296) * v274 + (v292 - v295) * v276),
+            v353 = (v307 - v308) * v277 + ((v305 - v310) * v274 + (v306 - v309) * v276),
+            v354 = (v314 - v315) * v277 + ((v312 - v317) * v274 + (v313 - v316) * v276),
+            v355 = v284 * v144 * (t13 * (1.0 - v101) + v119 * (v90 * v24 + v113 * v349)),
+            v356 = v287 * v150 * (t13 * (1.0 - v104) + v122 * (v94 * v24 + v117 * v351)),
+            v357 = v289 * v164 * (t13 * (1.0 - v106) + v124 * (v93 * v24 + v118 * v350)),
+            v358 = 0.1192694691878821 * (v140 * v350 - v131 * v349) + v355 - v356 - v357,
+            v359 = v244 * v307 + (v243 * v306 + (v249 * v304 + (v242 * v305 + v245 * v308))),
+            v360 = v244 * v293 + (v243 * v292 + (v242 * v291 + (v249 * v290 + v245 * v294))),
+            v361 = v244 * v314 + (v243 * v313 + (v242 * v312 + (v249 * v311 + v245 * v315))),
+            v362 = v293 * v263 + (v292 * v258 + (v291 * v259 + (v294 * v264 + v290 * v262))),
+            v363 = v307 * v263 + (v306 * v258 + (v304 * v262 + (v305 * v259 + v308 * v264))),
+            v364 = v314 * v263 + (v313 * v258 + (v312 * v259 + (v315 * v264 + v311 * v262))),
+            v365 = v240 * v295 + (v238 * v293 + (v237 * v292 + (v236 * v291 + v239 * v294))),
+            v366 = v240 * v309 + (v238 * v307 + (v237 * v306 + (v236 * v305 + v239 * v308))),
+            v367 = v240 * v316 + (v238 * v314 + (v237 * v313 + (v236 * v312 + v239 * v315))),
+            v368 = v24 * (v248 * v317 + (v246 * v316 + v361)) + (v311 * v272 + v354),
+            v369 = v24 * (v248 * v296 + (v246 * v295 + v360)) + (v290 * v272 + v352),
+            v370 = v304 * v272 + v353 + v24 * (v248 * v310 + (v246 * v309 + v359)) - v20 * (v241 * v310 + v366),
+            v371 = t13 * (v296 * v269 + (v295 * v267 + v362)) + (v369 - v20 * (v241 * v296 + v365)),
+            v372 = v370 + t13 * (v310 * v269 + (v309 * v267 + v363)),
+            v373 = t13 * (v317 * v269 + (v316 * v267 + v364)) + (v368 - v20 * (v241 * v317 + v367)),
+            v374 = v286 * v152 * (t13 * (1.0 - v103) + v121 * (v89 * v24 + v114 * v371)),
+            v375 = v285 * v146 * (t13 * (1.0 - v102) + v120 * (v91 * v24 + v116 * v372)),
+            v376 = v358 + 0.07987743308995329 * (v134 * v351 - v133 * v371) + v374 + v375,
+            v377 = v288 * v155 * (t13 * (1.0 - v105) + v123 * (v92 * v24 + v115 * v373)),
+            v378 = v376 - v377 + 0.05582662111236089 * (v138 * v373 - v132 * v372),
+            v379 = (v283 * v27 + v53 * v51) * v348 + v6 * v283 * (v378 - v234 * (v282 * v348)),
+            v380 = v52 * t5 + parameters[1] * v266 + v282 * v379, v381 = 1.0 / v48,
+            v382 = v381 * (v7 * (v51 * (v348 * v381) - v378) - v348 * v29);
+        softehl_store4(R + 9 * q + 0, (9 * points), v50, v47, v51, tp0);
+        softehl_store4(R + 9 * q + 4, (9 * points), v281, v380, v280, v234);
+        softehl_store1(R + 9 * q + 8, (9 * points), v382);
     }
     if (softehl_any(failed)) {
         softehl_spoil(failed, R, (9 * points));
     }
 }
-
-void softehl_film_carreau_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_carreau_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + (14 + (4 + modes)) * e, parameters, rule, basis, values + (9 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_carreau_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + (14 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (9 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double t[SOFTEHL_LANES * (14 + (4 + modes))];
-    softehl_pad(t, direction, (14 + (4 + modes)), n);
-    double R[SOFTEHL_LANES * (9 * points)];
-    softehl_film_carreau_fields_rate(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (9 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_carreau_fields_rate, 4, (4 + modes), 0, (14 + (4 + modes)), (9 * points), 0)

@@ -96,513 +96,97 @@ static void softehl_film_conserving_carreau_level_lanes(
     for (int step = 0; step < 50 && softehl_any(active); ++step) {
         M failed = softehl_mask(0), far = failed;
         V g[7], A[49], B[56];
-        const V v1 = s[6] * s[6];
-        const V v2 = 1.0 + v1;
-        const V v3 = softehl_vlog(v2);
-        const V v4 = p[3] * v3;
-        const V v5 = softehl_vexp(v4);
-        const V v6 = p[2] * v5;
-        const V v7 = p[0] + v6;
-        const V v8 = 1.0 / v7;
-        const V v9 = 0.08566224618958518 * s[6];
-        const V v10 = v9 * v8;
-        const V v11 = s[1] * s[1];
-        const V v12 = 1.0 + v11;
-        const V v13 = softehl_vlog(v12);
-        const V v14 = p[3] * v13;
-        const V v15 = softehl_vexp(v14);
-        const V v16 = p[2] * v15;
-        const V v17 = p[0] + v16;
-        const V v18 = 1.0 / v17;
-        const V v19 = 0.08566224618958518 * s[1];
-        const V v20 = v19 * v18;
-        const V v21 = v20 + v10;
-        const V v22 = s[2] * s[2];
-        const V v23 = 1.0 + v22;
-        const V v24 = softehl_vlog(v23);
-        const V v25 = p[3] * v24;
-        const V v26 = softehl_vexp(v25);
-        const V v27 = p[2] * v26;
-        const V v28 = p[0] + v27;
-        const V v29 = 1.0 / v28;
-        const V v30 = 0.1803807865240693 * s[2];
-        const V v31 = v30 * v29;
-        const V v32 = v31 + v21;
-        const V v33 = s[5] * s[5];
-        const V v34 = 1.0 + v33;
-        const V v35 = softehl_vlog(v34);
-        const V v36 = p[3] * v35;
-        const V v37 = softehl_vexp(v36);
-        const V v38 = p[2] * v37;
-        const V v39 = p[0] + v38;
-        const V v40 = 1.0 / v39;
-        const V v41 = 0.1803807865240693 * s[5];
-        const V v42 = v41 * v40;
-        const V v43 = v42 + v32;
-        const V v44 = s[3] * s[3];
-        const V v45 = 1.0 + v44;
-        const V v46 = softehl_vlog(v45);
-        const V v47 = p[3] * v46;
-        const V v48 = softehl_vexp(v47);
-        const V v49 = p[2] * v48;
-        const V v50 = p[0] + v49;
-        const V v51 = 1.0 / v50;
-        const V v52 = 0.23395696728634552 * s[3];
-        const V v53 = v52 * v51;
-        const V v54 = v53 + v43;
-        const V v55 = s[4] * s[4];
-        const V v56 = 1.0 + v55;
-        const V v57 = softehl_vlog(v56);
-        const V v58 = p[3] * v57;
-        const V v59 = softehl_vexp(v58);
-        const V v60 = p[2] * v59;
-        const V v61 = p[0] + v60;
-        const V v62 = 1.0 / v61;
-        const V v63 = 0.23395696728634552 * s[4];
-        const V v64 = v63 * v62;
-        const V v65 = v64 + v54;
-        const V v66 = v65 - p[4];
-        const V v67 = v17 * v17;
-        const V v68 = 1.0 / v67;
-        const V v69 = v11 * v68;
-        const V v70 = 1.0 + v69;
-        const V v71 = softehl_vlog(v70);
-        const V v72 = p[1] * v71;
-        const V v73 = softehl_vexp(v72);
-        const V v74 = p[2] * v73;
-        const V v75 = p[0] + v74;
-        const V v76 = s[1] * v75;
-        const V v77 = v18 * v76;
-        const V v78 = s[0] + p[5];
-        const V v79 = v77 - v78;
-        const V v80 = v28 * v28;
-        const V v81 = 1.0 / v80;
-        const V v82 = v22 * v81;
-        const V v83 = 1.0 + v82;
-        const V v84 = softehl_vlog(v83);
-        const V v85 = p[1] * v84;
-        const V v86 = softehl_vexp(v85);
-        const V v87 = p[2] * v86;
-        const V v88 = p[0] + v87;
-        const V v89 = s[2] * v88;
-        const V v90 = v29 * v89;
-        const V v91 = s[0] + p[6];
-        const V v92 = v90 - v91;
-        const V v93 = v50 * v50;
-        const V v94 = 1.0 / v93;
-        const V v95 = v44 * v94;
-        const V v96 = 1.0 + v95;
-        const V v97 = softehl_vlog(v96);
-        const V v98 = p[1] * v97;
-        const V v99 = softehl_vexp(v98);
-        const V v100 = p[2] * v99;
-        const V v101 = p[0] + v100;
-        const V v102 = s[3] * v101;
-        const V v103 = v51 * v102;
-        const V v104 = s[0] + p[7];
-        const V v105 = v103 - v104;
-        const V v106 = v61 * v61;
-        const V v107 = 1.0 / v106;
-        const V v108 = v55 * v107;
-        const V v109 = 1.0 + v108;
-        const V v110 = softehl_vlog(v109);
-        const V v111 = p[1] * v110;
-        const V v112 = softehl_vexp(v111);
-        const V v113 = p[2] * v112;
-        const V v114 = p[0] + v113;
-        const V v115 = s[4] * v114;
-        const V v116 = v62 * v115;
-        const V v117 = p[7] - s[0];
-        const V v118 = v117 + v116;
-        const V v119 = v39 * v39;
-        const V v120 = 1.0 / v119;
-        const V v121 = v33 * v120;
-        const V v122 = 1.0 + v121;
-        const V v123 = softehl_vlog(v122);
-        const V v124 = p[1] * v123;
-        const V v125 = softehl_vexp(v124);
-        const V v126 = p[2] * v125;
-        const V v127 = p[0] + v126;
-        const V v128 = s[5] * v127;
-        const V v129 = v40 * v128;
-        const V v130 = p[6] - s[0];
-        const V v131 = v130 + v129;
-        const V v132 = v7 * v7;
-        const V v133 = 1.0 / v132;
-        const V v134 = v1 * v133;
-        const V v135 = 1.0 + v134;
-        const V v136 = softehl_vlog(v135);
-        const V v137 = p[1] * v136;
-        const V v138 = softehl_vexp(v137);
-        const V v139 = p[2] * v138;
-        const V v140 = p[0] + v139;
-        const V v141 = s[6] * v140;
-        const V v142 = v8 * v141;
-        const V v143 = p[5] - s[0];
-        const V v144 = v143 + v142;
-        const V v145 = 2.0 * s[1];
-        const V v146 = p[3] * v145;
-        const V v147 = 1.0 / v12;
-        const V v148 = v147 * v146;
-        const V v149 = v18 * v18;
-        const V v150 = v19 * v149;
-        const V v151 = v16 * v150;
-        const V v152 = v151 * v148;
-        const V v153 = 0.08566224618958518 * v18;
-        const V v154 = v153 - v152;
-        const V v155 = 2.0 * s[2];
-        const V v156 = p[3] * v155;
-        const V v157 = 1.0 / v23;
-        const V v158 = v157 * v156;
-        const V v159 = v29 * v29;
-        const V v160 = v30 * v159;
-        const V v161 = v27 * v160;
-        const V v162 = v161 * v158;
-        const V v163 = 0.1803807865240693 * v29;
-        const V v164 = v163 - v162;
-        const V v165 = 2.0 * s[3];
-        const V v166 = p[3] * v165;
-        const V v167 = 1.0 / v45;
-        const V v168 = v167 * v166;
-        const V v169 = v51 * v51;
-        const V v170 = v52 * v169;
-        const V v171 = v49 * v170;
-        const V v172 = v171 * v168;
-        const V v173 = 0.23395696728634552 * v51;
-        const V v174 = v173 - v172;
-        const V v175 = 2.0 * s[4];
-        const V v176 = p[3] * v175;
-        const V v177 = 1.0 / v56;
-        const V v178 = v177 * v176;
-        const V v179 = v62 * v62;
-        const V v180 = v63 * v179;
-        const V v181 = v60 * v180;
-        const V v182 = v181 * v178;
-        const V v183 = 0.23395696728634552 * v62;
-        const V v184 = v183 - v182;
-        const V v185 = 2.0 * s[5];
-        const V v186 = p[3] * v185;
-        const V v187 = 1.0 / v34;
-        const V v188 = v187 * v186;
-        const V v189 = v40 * v40;
-        const V v190 = v41 * v189;
-        const V v191 = v38 * v190;
-        const V v192 = v191 * v188;
-        const V v193 = 0.1803807865240693 * v40;
-        const V v194 = v193 - v192;
-        const V v195 = 2.0 * s[6];
-        const V v196 = p[3] * v195;
-        const V v197 = 1.0 / v2;
-        const V v198 = v197 * v196;
-        const V v199 = v8 * v8;
-        const V v200 = v9 * v199;
-        const V v201 = v6 * v200;
-        const V v202 = v201 * v198;
-        const V v203 = 0.08566224618958518 * v8;
-        const V v204 = v203 - v202;
-        const V v205 = 2.0 * v11;
-        const V v206 = v17 * v205;
-        const V v207 = v68 * v206;
-        const V v208 = v68 * v207;
-        const V v209 = 1.0 / v70;
-        const V v210 = p[1] * v209;
-        const V v211 = s[1] * v18;
-        const V v212 = v74 * v211;
-        const V v213 = v212 * v210;
-        const V v214 = v213 * v208;
-        const V v215 = v76 * v149;
-        const V v216 = v215 + v214;
-        const V v217 = v16 * v216;
-        const V v218 = p[3] * v147;
-        const V v219 = v218 * v217;
-        const V v220 = v68 * v213;
-        const V v221 = v220 - v219;
-        const V v222 = v145 * v221;
-        const V v223 = v18 * v75;
-        const V v224 = v223 + v222;
-        const V v225 = 2.0 * v22;
-        const V v226 = v28 * v225;
-        const V v227 = v81 * v226;
-        const V v228 = v81 * v227;
-        const V v229 = 1.0 / v83;
-        const V v230 = p[1] * v229;
-        const V v231 = s[2] * v29;
-        const V v232 = v87 * v231;
-        const V v233 = v232 * v230;
-        const V v234 = v233 * v228;
-        const V v235 = v89 * v159;
-        const V v236 = v235 + v234;
-        const V v237 = v27 * v236;
-        const V v238 = p[3] * v157;
-        const V v239 = v238 * v237;
-        const V v240 = v81 * v233;
-        const V v241 = v240 - v239;
-        const V v242 = v155 * v241;
-        const V v243 = v29 * v88;
-        const V v244 = v243 + v242;
-        const V v245 = 2.0 * v44;
-        const V v246 = v50 * v245;
-        const V v247 = v94 * v246;
-        const V v248 = v94 * v247;
-        const V v249 = 1.0 / v96;
-        const V v250 = p[1] * v249;
-        const V v251 = s[3] * v51;
-        const V v252 = v100 * v251;
-        const V v253 = v252 * v250;
-        const V v254 = v253 * v248;
-        const V v255 = v102 * v169;
-        const V v256 = v255 + v254;
-        const V v257 = v49 * v256;
-        const V v258 = p[3] * v167;
-        const V v259 = v258 * v257;
-        const V v260 = v94 * v253;
-        const V v261 = v260 - v259;
-        const V v262 = v165 * v261;
-        const V v263 = v51 * v101;
-        const V v264 = v263 + v262;
-        const V v265 = 2.0 * v55;
-        const V v266 = v61 * v265;
-        const V v267 = v107 * v266;
-        const V v268 = v107 * v267;
-        const V v269 = 1.0 / v109;
-        const V v270 = p[1] * v269;
-        const V v271 = s[4] * v62;
-        const V v272 = v113 * v271;
-        const V v273 = v272 * v270;
-        const V v274 = v273 * v268;
-        const V v275 = v115 * v179;
-        const V v276 = v275 + v274;
-        const V v277 = v60 * v276;
-        const V v278 = p[3] * v177;
-        const V v279 = v278 * v277;
-        const V v280 = v107 * v273;
-        const V v281 = v280 - v279;
-        const V v282 = v175 * v281;
-        const V v283 = v62 * v114;
-        const V v284 = v283 + v282;
-        const V v285 = 2.0 * v33;
-        const V v286 = v39 * v285;
-        const V v287 = v120 * v286;
-        const V v288 = v120 * v287;
-        const V v289 = 1.0 / v122;
-        const V v290 = p[1] * v289;
-        const V v291 = s[5] * v40;
-        const V v292 = v126 * v291;
-        const V v293 = v292 * v290;
-        const V v294 = v293 * v288;
-        const V v295 = v128 * v189;
-        const V v296 = v295 + v294;
-        const V v297 = v38 * v296;
-        const V v298 = p[3] * v187;
-        const V v299 = v298 * v297;
-        const V v300 = v120 * v293;
-        const V v301 = v300 - v299;
-        const V v302 = v185 * v301;
-        const V v303 = v40 * v127;
-        const V v304 = v303 + v302;
-        const V v305 = 2.0 * v1;
-        const V v306 = v7 * v305;
-        const V v307 = v133 * v306;
-        const V v308 = v133 * v307;
-        const V v309 = 1.0 / v135;
-        const V v310 = p[1] * v309;
-        const V v311 = s[6] * v8;
-        const V v312 = v139 * v311;
-        const V v313 = v312 * v310;
-        const V v314 = v313 * v308;
-        const V v315 = v141 * v199;
-        const V v316 = v315 + v314;
-        const V v317 = v6 * v316;
-        const V v318 = p[3] * v197;
-        const V v319 = v318 * v317;
-        const V v320 = v133 * v313;
-        const V v321 = v320 - v319;
-        const V v322 = v195 * v321;
-        const V v323 = v8 * v140;
-        const V v324 = v323 + v322;
-        const V v325 = v180 + v170;
-        const V v326 = v325 + v190;
-        const V v327 = v326 + v160;
-        const V v328 = v327 + v200;
-        const V v329 = v328 + v150;
-        const V v330 = -v329;
-        const V v331 = v48 * v170;
-        const V v332 = v59 * v180;
-        const V v333 = v332 + v331;
-        const V v334 = v37 * v190;
-        const V v335 = v333 + v334;
-        const V v336 = v26 * v160;
-        const V v337 = v335 + v336;
-        const V v338 = v5 * v200;
-        const V v339 = v337 + v338;
-        const V v340 = v15 * v150;
-        const V v341 = v339 + v340;
-        const V v342 = -v341;
-        const V v343 = v46 * v171;
-        const V v344 = v57 * v181;
-        const V v345 = v344 + v343;
-        const V v346 = v35 * v191;
-        const V v347 = v345 + v346;
-        const V v348 = v24 * v161;
-        const V v349 = v347 + v348;
-        const V v350 = v3 * v201;
-        const V v351 = v349 + v350;
-        const V v352 = v13 * v151;
-        const V v353 = v351 + v352;
-        const V v354 = -v353;
-        const V v355 = v211 - v216;
-        const V v356 = v71 * v212;
-        const V v357 = v15 * v216;
-        const V v358 = v73 * v211;
-        const V v359 = v358 - v357;
-        const V v360 = v13 * v217;
-        const V v361 = -v360;
-        const V v362 = v231 - v236;
-        const V v363 = v84 * v232;
-        const V v364 = v26 * v236;
-        const V v365 = v86 * v231;
-        const V v366 = v365 - v364;
-        const V v367 = v24 * v237;
-        const V v368 = -v367;
-        const V v369 = v251 - v256;
-        const V v370 = v97 * v252;
-        const V v371 = v48 * v256;
-        const V v372 = v99 * v251;
-        const V v373 = v372 - v371;
-        const V v374 = v46 * v257;
-        const V v375 = -v374;
-        const V v376 = v271 - v276;
-        const V v377 = v110 * v272;
-        const V v378 = v59 * v276;
-        const V v379 = v112 * v271;
-        const V v380 = v379 - v378;
-        const V v381 = v57 * v277;
-        const V v382 = -v381;
-        const V v383 = v291 - v296;
-        const V v384 = v123 * v292;
-        const V v385 = v37 * v296;
-        const V v386 = v125 * v291;
-        const V v387 = v386 - v385;
-        const V v388 = v35 * v297;
-        const V v389 = -v388;
-        const V v390 = v311 - v316;
-        const V v391 = v136 * v312;
-        const V v392 = v5 * v316;
-        const V v393 = v138 * v311;
-        const V v394 = v393 - v392;
-        const V v395 = v3 * v317;
-        const V v396 = -v395;
-        g[0] = v66;
-        g[1] = v79;
-        g[2] = v92;
-        g[3] = v105;
-        g[4] = v118;
-        g[5] = v131;
-        g[6] = v144;
-        A[0] = softehl_splat(0.0);
-        A[1] = v154;
-        A[2] = v164;
-        A[3] = v174;
-        A[4] = v184;
-        A[5] = v194;
-        A[6] = v204;
-        A[7] = softehl_splat((-1.0));
-        A[8] = v224;
-        A[9] = softehl_splat(0.0);
-        A[10] = softehl_splat(0.0);
-        A[11] = softehl_splat(0.0);
-        A[12] = softehl_splat(0.0);
-        A[13] = softehl_splat(0.0);
-        A[14] = softehl_splat((-1.0));
-        A[15] = softehl_splat(0.0);
-        A[16] = v244;
-        A[17] = softehl_splat(0.0);
-        A[18] = softehl_splat(0.0);
-        A[19] = softehl_splat(0.0);
-        A[20] = softehl_splat(0.0);
-        A[21] = softehl_splat((-1.0));
-        A[22] = softehl_splat(0.0);
-        A[23] = softehl_splat(0.0);
-        A[24] = v264;
-        A[25] = softehl_splat(0.0);
-        A[26] = softehl_splat(0.0);
-        A[27] = softehl_splat(0.0);
-        A[28] = softehl_splat((-1.0));
-        A[29] = softehl_splat(0.0);
-        A[30] = softehl_splat(0.0);
-        A[31] = softehl_splat(0.0);
-        A[32] = v284;
-        A[33] = softehl_splat(0.0);
-        A[34] = softehl_splat(0.0);
-        A[35] = softehl_splat((-1.0));
-        A[36] = softehl_splat(0.0);
-        A[37] = softehl_splat(0.0);
-        A[38] = softehl_splat(0.0);
-        A[39] = softehl_splat(0.0);
-        A[40] = v304;
-        A[41] = softehl_splat(0.0);
-        A[42] = softehl_splat((-1.0));
-        A[43] = softehl_splat(0.0);
-        A[44] = softehl_splat(0.0);
-        A[45] = softehl_splat(0.0);
-        A[46] = softehl_splat(0.0);
-        A[47] = softehl_splat(0.0);
-        A[48] = v324;
-        B[0] = v330;
-        B[1] = softehl_splat(0.0);
-        B[2] = v342;
-        B[3] = v354;
-        B[4] = softehl_splat((-1.0));
-        B[5] = softehl_splat(0.0);
-        B[6] = softehl_splat(0.0);
-        B[7] = softehl_splat(0.0);
-        B[8] = v355;
-        B[9] = v356;
-        B[10] = v359;
-        B[11] = v361;
-        B[12] = softehl_splat(0.0);
-        B[13] = softehl_splat((-1.0));
-        B[14] = softehl_splat(0.0);
-        B[15] = softehl_splat(0.0);
-        B[16] = v362;
-        B[17] = v363;
-        B[18] = v366;
-        B[19] = v368;
-        B[20] = softehl_splat(0.0);
-        B[21] = softehl_splat(0.0);
-        B[22] = softehl_splat((-1.0));
-        B[23] = softehl_splat(0.0);
-        B[24] = v369;
-        B[25] = v370;
-        B[26] = v373;
-        B[27] = v375;
-        B[28] = softehl_splat(0.0);
-        B[29] = softehl_splat(0.0);
-        B[30] = softehl_splat(0.0);
-        B[31] = softehl_splat((-1.0));
-        B[32] = v376;
-        B[33] = v377;
-        B[34] = v380;
-        B[35] = v382;
-        B[36] = softehl_splat(0.0);
-        B[37] = softehl_splat(0.0);
-        B[38] = softehl_splat(0.0);
-        B[39] = softehl_splat(1.0);
-        B[40] = v383;
-        B[41] = v384;
-        B[42] = v387;
-        B[43] = v389;
-        B[44] = softehl_splat(0.0);
-        B[45] = softehl_splat(0.0);
-        B[46] = softehl_splat(1.0);
-        B[47] = softehl_splat(0.0);
-        B[48] = v390;
-        B[49] = v391;
-        B[50] = v394;
-        B[51] = v396;
-        B[52] = softehl_splat(0.0);
-        B[53] = softehl_splat(1.0);
-        B[54] = softehl_splat(0.0);
+        const V v1 = s[6] * s[6], v2 = 1.0 + v1, v3 = softehl_vlog(v2),
+            v4 = softehl_vexp(p[3] * v3), v5 = p[2] * v4, v6 = p[0] + v5, v7 = 1.0 / v6,
+            v8 = 0.08566224618958518 * s[6], v9 = s[1] * s[1], v10 = 1.0 + v9,
+            v11 = softehl_vlog(v10), v12 = softehl_vexp(p[3] * v11), v13 = p[2] * v12,
+            v14 = p[0] + v13, v15 = 1.0 / v14, v16 = 0.08566224618958518 * s[1], v17 = s[2] * s[2],
+            v18 = 1.0 + v17, v19 = softehl_vlog(v18), v20 = softehl_vexp(p[3] * v19),
+            v21 = p[2] * v20, v22 = p[0] + v21, v23 = 1.0 / v22, v24 = 0.1803807865240693 * s[2],
+            v25 = s[5] * s[5], v26 = 1.0 + v25, v27 = softehl_vlog(v26),
+            v28 = softehl_vexp(p[3] * v27), v29 = p[2] * v28, v30 = p[0] + v29, v31 = 1.0 / v30,
+            v32 = 0.1803807865240693 * s[5], v33 = s[3] * s[3], v34 = 1.0 + v33,
+            v35 = softehl_vlog(v34), v36 = softehl_vexp(p[3] * v35), v37 = p[2] * v36,
+            v38 = p[0] + v37, v39 = 1.0 / v38, v40 = 0.23395696728634552 * s[3], v41 = s[4] * s[4],
+            v42 = 1.0 + v41, v43 = softehl_vlog(v42), v44 = softehl_vexp(p[3] * v43),
+            v45 = p[2] * v44, v46 = p[0] + v45, v47 = 1.0 / v46, v48 = 0.23395696728634552 * s[4],
+            v49 = v48 * v47 + (v40 * v39 + (v32 * v31 + (v24 * v23 + (v16 * v15 + v8 * v7)))),
+            v50 = 1.0 / (v14 * v14), v51 = 1.0 + v9 * v50, v52 = softehl_vlog(v51),
+            v53 = softehl_vexp(p[1] * v52), v54 = p[2] * v53, v55 = p[0] + v54, v56 = s[1] * v55,
+            v57 = 1.0 / (v22 * v22), v58 = 1.0 + v17 * v57, v59 = softehl_vlog(v58),
+            v60 = softehl_vexp(p[1] * v59), v61 = p[2] * v60, v62 = p[0] + v61, v63 = s[2] * v62,
+            v64 = 1.0 / (v38 * v38), v65 = 1.0 + v33 * v64, v66 = softehl_vlog(v65),
+            v67 = softehl_vexp(p[1] * v66), v68 = p[2] * v67, v69 = p[0] + v68, v70 = s[3] * v69,
+            v71 = 1.0 / (v46 * v46), v72 = 1.0 + v41 * v71, v73 = softehl_vlog(v72),
+            v74 = softehl_vexp(p[1] * v73), v75 = p[2] * v74, v76 = p[0] + v75, v77 = s[4] * v76,
+            v78 = 1.0 / (v30 * v30), v79 = 1.0 + v25 * v78, v80 = softehl_vlog(v79),
+            v81 = softehl_vexp(p[1] * v80), v82 = p[2] * v81, v83 = p[0] + v82, v84 = s[5] * v83,
+            v85 = 1.0 / (v6 * v6), v86 = 1.0 + v1 * v85, v87 = softehl_vlog(v86),
+            v88 = softehl_vexp(p[1] * v87), v89 = p[2] * v88, v90 = p[0] + v89, v91 = s[6] * v90,
+            v92 = 2.0 * s[1], v93 = 1.0 / v10, v94 = v15 * v15, v95 = v16 * v94, v96 = v13 * v95,
+            v97 = 2.0 * s[2], v98 = 1.0 / v18, v99 = v23 * v23, v100 = v24 * v99, v101 = v21 * v100,
+            v102 = 2.0 * s[3], v103 = 1.0 / v34, v104 = v39 * v39, v105 = v40 * v104,
+            v106 = v37 * v105, v107 = 2.0 * s[4], v108 = 1.0 / v42, v109 = v47 * v47,
+            v110 = v48 * v109, v111 = v45 * v110, v112 = 2.0 * s[5], v113 = 1.0 / v26,
+            v114 = v31 * v31, v115 = v32 * v114, v116 = v29 * v115, v117 = 2.0 * s[6],
+            v118 = 1.0 / v2, v119 = v7 * v7, v120 = v8 * v119, v121 = v5 * v120, v122 = s[1] * v15,
+            v123 = v54 * v122, v124 = v123 * (p[1] * (1.0 / v51)),
+            v125 = v56 * v94 + v124 * (v50 * (v50 * (v14 * (2.0 * v9)))), v126 = v13 * v125,
+            v127 = s[2] * v23, v128 = v61 * v127, v129 = v128 * (p[1] * (1.0 / v58)),
+            v130 = v63 * v99 + v129 * (v57 * (v57 * (v22 * (2.0 * v17)))), v131 = v21 * v130,
+            v132 = s[3] * v39, v133 = v68 * v132, v134 = v133 * (p[1] * (1.0 / v65)),
+            v135 = v70 * v104 + v134 * (v64 * (v64 * (v38 * (2.0 * v33)))), v136 = v37 * v135,
+            v137 = s[4] * v47, v138 = v75 * v137, v139 = v138 * (p[1] * (1.0 / v72)),
+            v140 = v77 * v109 + v139 * (v71 * (v71 * (v46 * (2.0 * v41)))), v141 = v45 * v140,
+            v142 = s[5] * v31, v143 = v82 * v142, v144 = v143 * (p[1] * (1.0 / v79)),
+            v145 = v84 * v114 + v144 * (v78 * (v78 * (v30 * (2.0 * v25)))), v146 = v29 * v145,
+            v147 = s[6] * v7, v148 = v89 * v147, v149 = v148 * (p[1] * (1.0 / v86)),
+            v150 = v91 * v119 + v149 * (v85 * (v85 * (v6 * (2.0 * v1)))), v151 = v5 * v150,
+            v152 = v44 * v110 + v36 * v105 + v28 * v115 + v20 * v100 + v4 * v120 + v12 * v95,
+            v153 = v43 * v111 + v35 * v106 + v27 * v116 + v19 * v101 + v3 * v121 + v11 * v96;
+        g[0] = v49 - p[4]; g[1] = v15 * v56 - (s[0] + p[5]); g[2] = v23 * v63 - (s[0] + p[6]);
+        g[3] = v39 * v70 - (s[0] + p[7]); g[4] = p[7] - s[0] + v47 * v77;
+        g[5] = p[6] - s[0] + v31 * v84; g[6] = p[5] - s[0] + v7 * v91; A[0] = softehl_splat(0.0);
+        A[1] = 0.08566224618958518 * v15 - v96 * (v93 * (p[3] * v92));
+        A[2] = 0.1803807865240693 * v23 - v101 * (v98 * (p[3] * v97));
+        A[3] = 0.23395696728634552 * v39 - v106 * (v103 * (p[3] * v102));
+        A[4] = 0.23395696728634552 * v47 - v111 * (v108 * (p[3] * v107));
+        A[5] = 0.1803807865240693 * v31 - v116 * (v113 * (p[3] * v112));
+        A[6] = 0.08566224618958518 * v7 - v121 * (v118 * (p[3] * v117));
+        A[7] = softehl_splat((-1.0)); A[8] = v15 * v55 + v92 * (v50 * v124 - p[3] * v93 * v126);
+        A[9] = softehl_splat(0.0); A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0);
+        A[12] = softehl_splat(0.0); A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0));
+        A[15] = softehl_splat(0.0); A[16] = v23 * v62 + v97 * (v57 * v129 - p[3] * v98 * v131);
+        A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0); A[19] = softehl_splat(0.0);
+        A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0)); A[22] = softehl_splat(0.0);
+        A[23] = softehl_splat(0.0); A[24] = v39 * v69 + v102 * (v64 * v134 - p[3] * v103 * v136);
+        A[25] = softehl_splat(0.0); A[26] = softehl_splat(0.0); A[27] = softehl_splat(0.0);
+        A[28] = softehl_splat((-1.0)); A[29] = softehl_splat(0.0); A[30] = softehl_splat(0.0);
+        A[31] = softehl_splat(0.0); A[32] = v47 * v76 + v107 * (v71 * v139 - p[3] * v108 * v141);
+        A[33] = softehl_splat(0.0); A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0));
+        A[36] = softehl_splat(0.0); A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0);
+        A[39] = softehl_splat(0.0); A[40] = v31 * v83 + v112 * (v78 * v144 - p[3] * v113 * v146);
+        A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0)); A[43] = softehl_splat(0.0);
+        A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0); A[46] = softehl_splat(0.0);
+        A[47] = softehl_splat(0.0); A[48] = v7 * v90 + v117 * (v85 * v149 - p[3] * v118 * v151);
+        B[0] = -(v110 + v105 + v115 + v100 + v120 + v95); B[1] = softehl_splat(0.0); B[2] = -v152;
+        B[3] = -v153; B[4] = softehl_splat((-1.0)); B[5] = softehl_splat(0.0);
+        B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0); B[8] = v122 - v125; B[9] = v52 * v123;
+        B[10] = v53 * v122 - v12 * v125; B[11] = -(v11 * v126); B[12] = softehl_splat(0.0);
+        B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0); B[15] = softehl_splat(0.0);
+        B[16] = v127 - v130; B[17] = v59 * v128; B[18] = v60 * v127 - v20 * v130;
+        B[19] = -(v19 * v131); B[20] = softehl_splat(0.0); B[21] = softehl_splat(0.0);
+        B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0); B[24] = v132 - v135;
+        B[25] = v66 * v133; B[26] = v67 * v132 - v36 * v135; B[27] = -(v35 * v136);
+        B[28] = softehl_splat(0.0); B[29] = softehl_splat(0.0); B[30] = softehl_splat(0.0);
+        B[31] = softehl_splat((-1.0)); B[32] = v137 - v140; B[33] = v73 * v138;
+        B[34] = v74 * v137 - v44 * v140; B[35] = -(v43 * v141); B[36] = softehl_splat(0.0);
+        B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0); B[39] = softehl_splat(1.0);
+        B[40] = v142 - v145; B[41] = v80 * v143; B[42] = v81 * v142 - v28 * v145;
+        B[43] = -(v27 * v146); B[44] = softehl_splat(0.0); B[45] = softehl_splat(0.0);
+        B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0); B[48] = v147 - v150;
+        B[49] = v87 * v148; B[50] = v88 * v147 - v4 * v150; B[51] = -(v3 * v151);
+        B[52] = softehl_splat(0.0); B[53] = softehl_splat(1.0); B[54] = softehl_splat(0.0);
         B[55] = softehl_splat(0.0);
         V felt[7];
         for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
@@ -644,514 +228,98 @@ static void softehl_film_conserving_carreau_level_cell_lanes(
     for (int step = 0; step < 50 && softehl_any(active); ++step) {
         M failed = softehl_mask(0), far = failed;
         V g[7], A[49], B[56];
-        const V v1 = s[6] * s[6];
-        const V v2 = 1.0 + v1;
-        const V v3 = softehl_vlog(v2);
-        const V v4 = p[4] * v3;
-        const V v5 = softehl_vexp(v4);
-        const V v6 = p[3] * v5;
-        const V v7 = p[0] + v6;
-        const V v8 = 1.0 / v7;
-        const V v9 = 0.08566224618958518 * s[6];
-        const V v10 = v9 * v8;
-        const V v11 = s[1] * s[1];
-        const V v12 = 1.0 + v11;
-        const V v13 = softehl_vlog(v12);
-        const V v14 = p[4] * v13;
-        const V v15 = softehl_vexp(v14);
-        const V v16 = p[3] * v15;
-        const V v17 = p[0] + v16;
-        const V v18 = 1.0 / v17;
-        const V v19 = 0.08566224618958518 * s[1];
-        const V v20 = v19 * v18;
-        const V v21 = v20 + v10;
-        const V v22 = s[2] * s[2];
-        const V v23 = 1.0 + v22;
-        const V v24 = softehl_vlog(v23);
-        const V v25 = p[4] * v24;
-        const V v26 = softehl_vexp(v25);
-        const V v27 = p[3] * v26;
-        const V v28 = p[0] + v27;
-        const V v29 = 1.0 / v28;
-        const V v30 = 0.1803807865240693 * s[2];
-        const V v31 = v30 * v29;
-        const V v32 = v31 + v21;
-        const V v33 = s[5] * s[5];
-        const V v34 = 1.0 + v33;
-        const V v35 = softehl_vlog(v34);
-        const V v36 = p[4] * v35;
-        const V v37 = softehl_vexp(v36);
-        const V v38 = p[3] * v37;
-        const V v39 = p[0] + v38;
-        const V v40 = 1.0 / v39;
-        const V v41 = 0.1803807865240693 * s[5];
-        const V v42 = v41 * v40;
-        const V v43 = v42 + v32;
-        const V v44 = s[3] * s[3];
-        const V v45 = 1.0 + v44;
-        const V v46 = softehl_vlog(v45);
-        const V v47 = p[4] * v46;
-        const V v48 = softehl_vexp(v47);
-        const V v49 = p[3] * v48;
-        const V v50 = p[0] + v49;
-        const V v51 = 1.0 / v50;
-        const V v52 = 0.23395696728634552 * s[3];
-        const V v53 = v52 * v51;
-        const V v54 = v53 + v43;
-        const V v55 = s[4] * s[4];
-        const V v56 = 1.0 + v55;
-        const V v57 = softehl_vlog(v56);
-        const V v58 = p[4] * v57;
-        const V v59 = softehl_vexp(v58);
-        const V v60 = p[3] * v59;
-        const V v61 = p[0] + v60;
-        const V v62 = 1.0 / v61;
-        const V v63 = 0.23395696728634552 * s[4];
-        const V v64 = v63 * v62;
-        const V v65 = v64 + v54;
-        const V v66 = v65 - p[1];
-        const V v67 = v17 * v17;
-        const V v68 = 1.0 / v67;
-        const V v69 = v11 * v68;
-        const V v70 = 1.0 + v69;
-        const V v71 = softehl_vlog(v70);
-        const V v72 = p[2] * v71;
-        const V v73 = softehl_vexp(v72);
-        const V v74 = p[3] * v73;
-        const V v75 = p[0] + v74;
-        const V v76 = s[1] * v75;
-        const V v77 = v18 * v76;
-        const V v78 = s[0] + p[5];
-        const V v79 = v77 - v78;
-        const V v80 = v28 * v28;
-        const V v81 = 1.0 / v80;
-        const V v82 = v22 * v81;
-        const V v83 = 1.0 + v82;
-        const V v84 = softehl_vlog(v83);
-        const V v85 = p[2] * v84;
-        const V v86 = softehl_vexp(v85);
-        const V v87 = p[3] * v86;
-        const V v88 = p[0] + v87;
-        const V v89 = s[2] * v88;
-        const V v90 = v29 * v89;
-        const V v91 = s[0] + p[6];
-        const V v92 = v90 - v91;
-        const V v93 = v50 * v50;
-        const V v94 = 1.0 / v93;
-        const V v95 = v44 * v94;
-        const V v96 = 1.0 + v95;
-        const V v97 = softehl_vlog(v96);
-        const V v98 = p[2] * v97;
-        const V v99 = softehl_vexp(v98);
-        const V v100 = p[3] * v99;
-        const V v101 = p[0] + v100;
-        const V v102 = s[3] * v101;
-        const V v103 = v51 * v102;
-        const V v104 = s[0] + p[7];
-        const V v105 = v103 - v104;
-        const V v106 = v61 * v61;
-        const V v107 = 1.0 / v106;
-        const V v108 = v55 * v107;
-        const V v109 = 1.0 + v108;
-        const V v110 = softehl_vlog(v109);
-        const V v111 = p[2] * v110;
-        const V v112 = softehl_vexp(v111);
-        const V v113 = p[3] * v112;
-        const V v114 = p[0] + v113;
-        const V v115 = s[4] * v114;
-        const V v116 = v62 * v115;
-        const V v117 = p[7] - s[0];
-        const V v118 = v117 + v116;
-        const V v119 = v39 * v39;
-        const V v120 = 1.0 / v119;
-        const V v121 = v33 * v120;
-        const V v122 = 1.0 + v121;
-        const V v123 = softehl_vlog(v122);
-        const V v124 = p[2] * v123;
-        const V v125 = softehl_vexp(v124);
-        const V v126 = p[3] * v125;
-        const V v127 = p[0] + v126;
-        const V v128 = s[5] * v127;
-        const V v129 = v40 * v128;
-        const V v130 = p[6] - s[0];
-        const V v131 = v130 + v129;
-        const V v132 = v7 * v7;
-        const V v133 = 1.0 / v132;
-        const V v134 = v1 * v133;
-        const V v135 = 1.0 + v134;
-        const V v136 = softehl_vlog(v135);
-        const V v137 = p[2] * v136;
-        const V v138 = softehl_vexp(v137);
-        const V v139 = p[3] * v138;
-        const V v140 = p[0] + v139;
-        const V v141 = s[6] * v140;
-        const V v142 = v8 * v141;
-        const V v143 = p[5] - s[0];
-        const V v144 = v143 + v142;
-        const V v145 = 2.0 * s[1];
-        const V v146 = p[4] * v145;
-        const V v147 = 1.0 / v12;
-        const V v148 = v147 * v146;
-        const V v149 = v18 * v18;
-        const V v150 = v19 * v149;
-        const V v151 = v16 * v150;
-        const V v152 = v151 * v148;
-        const V v153 = 0.08566224618958518 * v18;
-        const V v154 = v153 - v152;
-        const V v155 = 2.0 * s[2];
-        const V v156 = p[4] * v155;
-        const V v157 = 1.0 / v23;
-        const V v158 = v157 * v156;
-        const V v159 = v29 * v29;
-        const V v160 = v30 * v159;
-        const V v161 = v27 * v160;
-        const V v162 = v161 * v158;
-        const V v163 = 0.1803807865240693 * v29;
-        const V v164 = v163 - v162;
-        const V v165 = 2.0 * s[3];
-        const V v166 = p[4] * v165;
-        const V v167 = 1.0 / v45;
-        const V v168 = v167 * v166;
-        const V v169 = v51 * v51;
-        const V v170 = v52 * v169;
-        const V v171 = v49 * v170;
-        const V v172 = v171 * v168;
-        const V v173 = 0.23395696728634552 * v51;
-        const V v174 = v173 - v172;
-        const V v175 = 2.0 * s[4];
-        const V v176 = p[4] * v175;
-        const V v177 = 1.0 / v56;
-        const V v178 = v177 * v176;
-        const V v179 = v62 * v62;
-        const V v180 = v63 * v179;
-        const V v181 = v60 * v180;
-        const V v182 = v181 * v178;
-        const V v183 = 0.23395696728634552 * v62;
-        const V v184 = v183 - v182;
-        const V v185 = 2.0 * s[5];
-        const V v186 = p[4] * v185;
-        const V v187 = 1.0 / v34;
-        const V v188 = v187 * v186;
-        const V v189 = v40 * v40;
-        const V v190 = v41 * v189;
-        const V v191 = v38 * v190;
-        const V v192 = v191 * v188;
-        const V v193 = 0.1803807865240693 * v40;
-        const V v194 = v193 - v192;
-        const V v195 = 2.0 * s[6];
-        const V v196 = p[4] * v195;
-        const V v197 = 1.0 / v2;
-        const V v198 = v197 * v196;
-        const V v199 = v8 * v8;
-        const V v200 = v9 * v199;
-        const V v201 = v6 * v200;
-        const V v202 = v201 * v198;
-        const V v203 = 0.08566224618958518 * v8;
-        const V v204 = v203 - v202;
-        const V v205 = 2.0 * v11;
-        const V v206 = v205 * v17;
-        const V v207 = v68 * v206;
-        const V v208 = v68 * v207;
-        const V v209 = 1.0 / v70;
-        const V v210 = p[2] * v209;
-        const V v211 = s[1] * v18;
-        const V v212 = v74 * v211;
-        const V v213 = v212 * v210;
-        const V v214 = v213 * v208;
-        const V v215 = v76 * v149;
-        const V v216 = v215 + v214;
-        const V v217 = v16 * v216;
-        const V v218 = p[4] * v147;
-        const V v219 = v218 * v217;
-        const V v220 = v68 * v213;
-        const V v221 = v220 - v219;
-        const V v222 = v145 * v221;
-        const V v223 = v18 * v75;
-        const V v224 = v223 + v222;
-        const V v225 = 2.0 * v22;
-        const V v226 = v225 * v28;
-        const V v227 = v81 * v226;
-        const V v228 = v81 * v227;
-        const V v229 = 1.0 / v83;
-        const V v230 = p[2] * v229;
-        const V v231 = s[2] * v29;
-        const V v232 = v87 * v231;
-        const V v233 = v232 * v230;
-        const V v234 = v233 * v228;
-        const V v235 = v89 * v159;
-        const V v236 = v235 + v234;
-        const V v237 = v27 * v236;
-        const V v238 = p[4] * v157;
-        const V v239 = v238 * v237;
-        const V v240 = v81 * v233;
-        const V v241 = v240 - v239;
-        const V v242 = v155 * v241;
-        const V v243 = v29 * v88;
-        const V v244 = v243 + v242;
-        const V v245 = 2.0 * v44;
-        const V v246 = v245 * v50;
-        const V v247 = v94 * v246;
-        const V v248 = v94 * v247;
-        const V v249 = 1.0 / v96;
-        const V v250 = p[2] * v249;
-        const V v251 = s[3] * v51;
-        const V v252 = v100 * v251;
-        const V v253 = v252 * v250;
-        const V v254 = v253 * v248;
-        const V v255 = v102 * v169;
-        const V v256 = v255 + v254;
-        const V v257 = v49 * v256;
-        const V v258 = p[4] * v167;
-        const V v259 = v258 * v257;
-        const V v260 = v94 * v253;
-        const V v261 = v260 - v259;
-        const V v262 = v165 * v261;
-        const V v263 = v51 * v101;
-        const V v264 = v263 + v262;
-        const V v265 = 2.0 * v55;
-        const V v266 = v265 * v61;
-        const V v267 = v107 * v266;
-        const V v268 = v107 * v267;
-        const V v269 = 1.0 / v109;
-        const V v270 = p[2] * v269;
-        const V v271 = s[4] * v62;
-        const V v272 = v113 * v271;
-        const V v273 = v272 * v270;
-        const V v274 = v273 * v268;
-        const V v275 = v115 * v179;
-        const V v276 = v275 + v274;
-        const V v277 = v60 * v276;
-        const V v278 = p[4] * v177;
-        const V v279 = v278 * v277;
-        const V v280 = v107 * v273;
-        const V v281 = v280 - v279;
-        const V v282 = v175 * v281;
-        const V v283 = v62 * v114;
-        const V v284 = v283 + v282;
-        const V v285 = 2.0 * v33;
-        const V v286 = v285 * v39;
-        const V v287 = v120 * v286;
-        const V v288 = v120 * v287;
-        const V v289 = 1.0 / v122;
-        const V v290 = p[2] * v289;
-        const V v291 = s[5] * v40;
-        const V v292 = v126 * v291;
-        const V v293 = v292 * v290;
-        const V v294 = v293 * v288;
-        const V v295 = v128 * v189;
-        const V v296 = v295 + v294;
-        const V v297 = v38 * v296;
-        const V v298 = p[4] * v187;
-        const V v299 = v298 * v297;
-        const V v300 = v120 * v293;
-        const V v301 = v300 - v299;
-        const V v302 = v185 * v301;
-        const V v303 = v40 * v127;
-        const V v304 = v303 + v302;
-        const V v305 = 2.0 * v1;
-        const V v306 = v305 * v7;
-        const V v307 = v133 * v306;
-        const V v308 = v133 * v307;
-        const V v309 = 1.0 / v135;
-        const V v310 = p[2] * v309;
-        const V v311 = s[6] * v8;
-        const V v312 = v139 * v311;
-        const V v313 = v312 * v310;
-        const V v314 = v313 * v308;
-        const V v315 = v141 * v199;
-        const V v316 = v315 + v314;
-        const V v317 = v6 * v316;
-        const V v318 = p[4] * v197;
-        const V v319 = v318 * v317;
-        const V v320 = v133 * v313;
-        const V v321 = v320 - v319;
-        const V v322 = v195 * v321;
-        const V v323 = v8 * v140;
-        const V v324 = v323 + v322;
-        const V v325 = v180 + v170;
-        const V v326 = v325 + v190;
-        const V v327 = v326 + v160;
-        const V v328 = v327 + v200;
-        const V v329 = v328 + v150;
-        const V v330 = -v329;
-        const V v331 = v48 * v170;
-        const V v332 = v59 * v180;
-        const V v333 = v332 + v331;
-        const V v334 = v37 * v190;
-        const V v335 = v333 + v334;
-        const V v336 = v26 * v160;
-        const V v337 = v335 + v336;
-        const V v338 = v5 * v200;
-        const V v339 = v337 + v338;
-        const V v340 = v15 * v150;
-        const V v341 = v339 + v340;
-        const V v342 = -v341;
-        const V v343 = v46 * v171;
-        const V v344 = v57 * v181;
-        const V v345 = v344 + v343;
-        const V v346 = v35 * v191;
-        const V v347 = v345 + v346;
-        const V v348 = v24 * v161;
-        const V v349 = v347 + v348;
-        const V v350 = v3 * v201;
-        const V v351 = v349 + v350;
-        const V v352 = v13 * v151;
-        const V v353 = v351 + v352;
-        const V v354 = -v353;
-        const V v355 = v211 - v216;
-        const V v356 = v71 * v212;
-        const V v357 = v15 * v216;
-        const V v358 = v73 * v211;
-        const V v359 = v358 - v357;
-        const V v360 = v13 * v217;
-        const V v361 = -v360;
-        const V v362 = v231 - v236;
-        const V v363 = v84 * v232;
-        const V v364 = v26 * v236;
-        const V v365 = v86 * v231;
-        const V v366 = v365 - v364;
-        const V v367 = v24 * v237;
-        const V v368 = -v367;
-        const V v369 = v251 - v256;
-        const V v370 = v97 * v252;
-        const V v371 = v48 * v256;
-        const V v372 = v99 * v251;
-        const V v373 = v372 - v371;
-        const V v374 = v46 * v257;
-        const V v375 = -v374;
-        const V v376 = v271 - v276;
-        const V v377 = v110 * v272;
-        const V v378 = v59 * v276;
-        const V v379 = v112 * v271;
-        const V v380 = v379 - v378;
-        const V v381 = v57 * v277;
-        const V v382 = -v381;
-        const V v383 = v291 - v296;
-        const V v384 = v123 * v292;
-        const V v385 = v37 * v296;
-        const V v386 = v125 * v291;
-        const V v387 = v386 - v385;
-        const V v388 = v35 * v297;
-        const V v389 = -v388;
-        const V v390 = v311 - v316;
-        const V v391 = v136 * v312;
-        const V v392 = v5 * v316;
-        const V v393 = v138 * v311;
-        const V v394 = v393 - v392;
-        const V v395 = v3 * v317;
-        const V v396 = -v395;
-        g[0] = v66;
-        g[1] = v79;
-        g[2] = v92;
-        g[3] = v105;
-        g[4] = v118;
-        g[5] = v131;
-        g[6] = v144;
-        A[0] = softehl_splat(0.0);
-        A[1] = v154;
-        A[2] = v164;
-        A[3] = v174;
-        A[4] = v184;
-        A[5] = v194;
-        A[6] = v204;
-        A[7] = softehl_splat((-1.0));
-        A[8] = v224;
-        A[9] = softehl_splat(0.0);
-        A[10] = softehl_splat(0.0);
-        A[11] = softehl_splat(0.0);
-        A[12] = softehl_splat(0.0);
-        A[13] = softehl_splat(0.0);
-        A[14] = softehl_splat((-1.0));
-        A[15] = softehl_splat(0.0);
-        A[16] = v244;
-        A[17] = softehl_splat(0.0);
-        A[18] = softehl_splat(0.0);
-        A[19] = softehl_splat(0.0);
-        A[20] = softehl_splat(0.0);
-        A[21] = softehl_splat((-1.0));
-        A[22] = softehl_splat(0.0);
-        A[23] = softehl_splat(0.0);
-        A[24] = v264;
-        A[25] = softehl_splat(0.0);
-        A[26] = softehl_splat(0.0);
-        A[27] = softehl_splat(0.0);
-        A[28] = softehl_splat((-1.0));
-        A[29] = softehl_splat(0.0);
-        A[30] = softehl_splat(0.0);
-        A[31] = softehl_splat(0.0);
-        A[32] = v284;
-        A[33] = softehl_splat(0.0);
-        A[34] = softehl_splat(0.0);
-        A[35] = softehl_splat((-1.0));
-        A[36] = softehl_splat(0.0);
-        A[37] = softehl_splat(0.0);
-        A[38] = softehl_splat(0.0);
-        A[39] = softehl_splat(0.0);
-        A[40] = v304;
-        A[41] = softehl_splat(0.0);
-        A[42] = softehl_splat((-1.0));
-        A[43] = softehl_splat(0.0);
-        A[44] = softehl_splat(0.0);
-        A[45] = softehl_splat(0.0);
-        A[46] = softehl_splat(0.0);
-        A[47] = softehl_splat(0.0);
-        A[48] = v324;
-        B[0] = v330;
-        B[1] = softehl_splat((-1.0));
-        B[2] = softehl_splat(0.0);
-        B[3] = v342;
-        B[4] = v354;
-        B[5] = softehl_splat(0.0);
-        B[6] = softehl_splat(0.0);
-        B[7] = softehl_splat(0.0);
-        B[8] = v355;
-        B[9] = softehl_splat(0.0);
-        B[10] = v356;
-        B[11] = v359;
-        B[12] = v361;
-        B[13] = softehl_splat((-1.0));
-        B[14] = softehl_splat(0.0);
-        B[15] = softehl_splat(0.0);
-        B[16] = v362;
-        B[17] = softehl_splat(0.0);
-        B[18] = v363;
-        B[19] = v366;
-        B[20] = v368;
-        B[21] = softehl_splat(0.0);
-        B[22] = softehl_splat((-1.0));
-        B[23] = softehl_splat(0.0);
-        B[24] = v369;
-        B[25] = softehl_splat(0.0);
-        B[26] = v370;
-        B[27] = v373;
-        B[28] = v375;
-        B[29] = softehl_splat(0.0);
-        B[30] = softehl_splat(0.0);
-        B[31] = softehl_splat((-1.0));
-        B[32] = v376;
-        B[33] = softehl_splat(0.0);
-        B[34] = v377;
-        B[35] = v380;
-        B[36] = v382;
-        B[37] = softehl_splat(0.0);
-        B[38] = softehl_splat(0.0);
-        B[39] = softehl_splat(1.0);
-        B[40] = v383;
-        B[41] = softehl_splat(0.0);
-        B[42] = v384;
-        B[43] = v387;
-        B[44] = v389;
-        B[45] = softehl_splat(0.0);
-        B[46] = softehl_splat(1.0);
-        B[47] = softehl_splat(0.0);
-        B[48] = v390;
-        B[49] = softehl_splat(0.0);
-        B[50] = v391;
-        B[51] = v394;
-        B[52] = v396;
-        B[53] = softehl_splat(1.0);
-        B[54] = softehl_splat(0.0);
-        B[55] = softehl_splat(0.0);
+        const V v1 = s[6] * s[6], v2 = 1.0 + v1, v3 = softehl_vlog(v2),
+            v4 = softehl_vexp(p[4] * v3), v5 = p[3] * v4, v6 = p[0] + v5, v7 = 1.0 / v6,
+            v8 = 0.08566224618958518 * s[6], v9 = s[1] * s[1], v10 = 1.0 + v9,
+            v11 = softehl_vlog(v10), v12 = softehl_vexp(p[4] * v11), v13 = p[3] * v12,
+            v14 = p[0] + v13, v15 = 1.0 / v14, v16 = 0.08566224618958518 * s[1], v17 = s[2] * s[2],
+            v18 = 1.0 + v17, v19 = softehl_vlog(v18), v20 = softehl_vexp(p[4] * v19),
+            v21 = p[3] * v20, v22 = p[0] + v21, v23 = 1.0 / v22, v24 = 0.1803807865240693 * s[2],
+            v25 = s[5] * s[5], v26 = 1.0 + v25, v27 = softehl_vlog(v26),
+            v28 = softehl_vexp(p[4] * v27), v29 = p[3] * v28, v30 = p[0] + v29, v31 = 1.0 / v30,
+            v32 = 0.1803807865240693 * s[5], v33 = s[3] * s[3], v34 = 1.0 + v33,
+            v35 = softehl_vlog(v34), v36 = softehl_vexp(p[4] * v35), v37 = p[3] * v36,
+            v38 = p[0] + v37, v39 = 1.0 / v38, v40 = 0.23395696728634552 * s[3], v41 = s[4] * s[4],
+            v42 = 1.0 + v41, v43 = softehl_vlog(v42), v44 = softehl_vexp(p[4] * v43),
+            v45 = p[3] * v44, v46 = p[0] + v45, v47 = 1.0 / v46, v48 = 0.23395696728634552 * s[4],
+            v49 = v48 * v47 + (v40 * v39 + (v32 * v31 + (v24 * v23 + (v16 * v15 + v8 * v7)))),
+            v50 = 1.0 / (v14 * v14), v51 = 1.0 + v9 * v50, v52 = softehl_vlog(v51),
+            v53 = softehl_vexp(p[2] * v52), v54 = p[3] * v53, v55 = p[0] + v54, v56 = s[1] * v55,
+            v57 = 1.0 / (v22 * v22), v58 = 1.0 + v17 * v57, v59 = softehl_vlog(v58),
+            v60 = softehl_vexp(p[2] * v59), v61 = p[3] * v60, v62 = p[0] + v61, v63 = s[2] * v62,
+            v64 = 1.0 / (v38 * v38), v65 = 1.0 + v33 * v64, v66 = softehl_vlog(v65),
+            v67 = softehl_vexp(p[2] * v66), v68 = p[3] * v67, v69 = p[0] + v68, v70 = s[3] * v69,
+            v71 = 1.0 / (v46 * v46), v72 = 1.0 + v41 * v71, v73 = softehl_vlog(v72),
+            v74 = softehl_vexp(p[2] * v73), v75 = p[3] * v74, v76 = p[0] + v75, v77 = s[4] * v76,
+            v78 = 1.0 / (v30 * v30), v79 = 1.0 + v25 * v78, v80 = softehl_vlog(v79),
+            v81 = softehl_vexp(p[2] * v80), v82 = p[3] * v81, v83 = p[0] + v82, v84 = s[5] * v83,
+            v85 = 1.0 / (v6 * v6), v86 = 1.0 + v1 * v85, v87 = softehl_vlog(v86),
+            v88 = softehl_vexp(p[2] * v87), v89 = p[3] * v88, v90 = p[0] + v89, v91 = s[6] * v90,
+            v92 = 2.0 * s[1], v93 = 1.0 / v10, v94 = v15 * v15, v95 = v16 * v94, v96 = v13 * v95,
+            v97 = 2.0 * s[2], v98 = 1.0 / v18, v99 = v23 * v23, v100 = v24 * v99, v101 = v21 * v100,
+            v102 = 2.0 * s[3], v103 = 1.0 / v34, v104 = v39 * v39, v105 = v40 * v104,
+            v106 = v37 * v105, v107 = 2.0 * s[4], v108 = 1.0 / v42, v109 = v47 * v47,
+            v110 = v48 * v109, v111 = v45 * v110, v112 = 2.0 * s[5], v113 = 1.0 / v26,
+            v114 = v31 * v31, v115 = v32 * v114, v116 = v29 * v115, v117 = 2.0 * s[6],
+            v118 = 1.0 / v2, v119 = v7 * v7, v120 = v8 * v119, v121 = v5 * v120, v122 = s[1] * v15,
+            v123 = v54 * v122, v124 = v123 * (p[2] * (1.0 / v51)),
+            v125 = v56 * v94 + v124 * (v50 * (v50 * (2.0 * v9 * v14))), v126 = v13 * v125,
+            v127 = s[2] * v23, v128 = v61 * v127, v129 = v128 * (p[2] * (1.0 / v58)),
+            v130 = v63 * v99 + v129 * (v57 * (v57 * (2.0 * v17 * v22))), v131 = v21 * v130,
+            v132 = s[3] * v39, v133 = v68 * v132, v134 = v133 * (p[2] * (1.0 / v65)),
+            v135 = v70 * v104 + v134 * (v64 * (v64 * (2.0 * v33 * v38))), v136 = v37 * v135,
+            v137 = s[4] * v47, v138 = v75 * v137, v139 = v138 * (p[2] * (1.0 / v72)),
+            v140 = v77 * v109 + v139 * (v71 * (v71 * (2.0 * v41 * v46))), v141 = v45 * v140,
+            v142 = s[5] * v31, v143 = v82 * v142, v144 = v143 * (p[2] * (1.0 / v79)),
+            v145 = v84 * v114 + v144 * (v78 * (v78 * (2.0 * v25 * v30))), v146 = v29 * v145,
+            v147 = s[6] * v7, v148 = v89 * v147, v149 = v148 * (p[2] * (1.0 / v86)),
+            v150 = v91 * v119 + v149 * (v85 * (v85 * (2.0 * v1 * v6))), v151 = v5 * v150,
+            v152 = v44 * v110 + v36 * v105 + v28 * v115 + v20 * v100 + v4 * v120 + v12 * v95,
+            v153 = v43 * v111 + v35 * v106 + v27 * v116 + v19 * v101 + v3 * v121 + v11 * v96;
+        g[0] = v49 - p[1]; g[1] = v15 * v56 - (s[0] + p[5]); g[2] = v23 * v63 - (s[0] + p[6]);
+        g[3] = v39 * v70 - (s[0] + p[7]); g[4] = p[7] - s[0] + v47 * v77;
+        g[5] = p[6] - s[0] + v31 * v84; g[6] = p[5] - s[0] + v7 * v91; A[0] = softehl_splat(0.0);
+        A[1] = 0.08566224618958518 * v15 - v96 * (v93 * (p[4] * v92));
+        A[2] = 0.1803807865240693 * v23 - v101 * (v98 * (p[4] * v97));
+        A[3] = 0.23395696728634552 * v39 - v106 * (v103 * (p[4] * v102));
+        A[4] = 0.23395696728634552 * v47 - v111 * (v108 * (p[4] * v107));
+        A[5] = 0.1803807865240693 * v31 - v116 * (v113 * (p[4] * v112));
+        A[6] = 0.08566224618958518 * v7 - v121 * (v118 * (p[4] * v117));
+        A[7] = softehl_splat((-1.0)); A[8] = v15 * v55 + v92 * (v50 * v124 - p[4] * v93 * v126);
+        A[9] = softehl_splat(0.0); A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0);
+        A[12] = softehl_splat(0.0); A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0));
+        A[15] = softehl_splat(0.0); A[16] = v23 * v62 + v97 * (v57 * v129 - p[4] * v98 * v131);
+        A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0); A[19] = softehl_splat(0.0);
+        A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0)); A[22] = softehl_splat(0.0);
+        A[23] = softehl_splat(0.0); A[24] = v39 * v69 + v102 * (v64 * v134 - p[4] * v103 * v136);
+        A[25] = softehl_splat(0.0); A[26] = softehl_splat(0.0); A[27] = softehl_splat(0.0);
+        A[28] = softehl_splat((-1.0)); A[29] = softehl_splat(0.0); A[30] = softehl_splat(0.0);
+        A[31] = softehl_splat(0.0); A[32] = v47 * v76 + v107 * (v71 * v139 - p[4] * v108 * v141);
+        A[33] = softehl_splat(0.0); A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0));
+        A[36] = softehl_splat(0.0); A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0);
+        A[39] = softehl_splat(0.0); A[40] = v31 * v83 + v112 * (v78 * v144 - p[4] * v113 * v146);
+        A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0)); A[43] = softehl_splat(0.0);
+        A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0); A[46] = softehl_splat(0.0);
+        A[47] = softehl_splat(0.0); A[48] = v7 * v90 + v117 * (v85 * v149 - p[4] * v118 * v151);
+        B[0] = -(v110 + v105 + v115 + v100 + v120 + v95); B[1] = softehl_splat((-1.0));
+        B[2] = softehl_splat(0.0); B[3] = -v152; B[4] = -v153; B[5] = softehl_splat(0.0);
+        B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0); B[8] = v122 - v125;
+        B[9] = softehl_splat(0.0); B[10] = v52 * v123; B[11] = v53 * v122 - v12 * v125;
+        B[12] = -(v11 * v126); B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0);
+        B[15] = softehl_splat(0.0); B[16] = v127 - v130; B[17] = softehl_splat(0.0);
+        B[18] = v59 * v128; B[19] = v60 * v127 - v20 * v130; B[20] = -(v19 * v131);
+        B[21] = softehl_splat(0.0); B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0);
+        B[24] = v132 - v135; B[25] = softehl_splat(0.0); B[26] = v66 * v133;
+        B[27] = v67 * v132 - v36 * v135; B[28] = -(v35 * v136); B[29] = softehl_splat(0.0);
+        B[30] = softehl_splat(0.0); B[31] = softehl_splat((-1.0)); B[32] = v137 - v140;
+        B[33] = softehl_splat(0.0); B[34] = v73 * v138; B[35] = v74 * v137 - v44 * v140;
+        B[36] = -(v43 * v141); B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0);
+        B[39] = softehl_splat(1.0); B[40] = v142 - v145; B[41] = softehl_splat(0.0);
+        B[42] = v80 * v143; B[43] = v81 * v142 - v28 * v145; B[44] = -(v27 * v146);
+        B[45] = softehl_splat(0.0); B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0);
+        B[48] = v147 - v150; B[49] = softehl_splat(0.0); B[50] = v87 * v148;
+        B[51] = v88 * v147 - v4 * v150; B[52] = -(v3 * v151); B[53] = softehl_splat(1.0);
+        B[54] = softehl_splat(0.0); B[55] = softehl_splat(0.0);
         V felt[7];
         for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
         for (int i = 0; i < 7; ++i) {
@@ -1191,35 +359,20 @@ static void softehl_film_conserving_carreau_inverse_7_lanes(
     *lost |= spoilt;
 }
 
-static void softehl_film_conserving_carreau_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_conserving_carreau_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 16, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 16, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15;
+    softehl_load4(t + 0, 16, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 16, &t4, &t5, &t6, &t7);
     softehl_load4(t + 8, 16, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
     softehl_load4(t + 12, 16, &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1235,1627 +388,336 @@ static void softehl_film_conserving_carreau_pseudo_load_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const double v1 = 1.0 - parameters[8];
-    const double v2 = 6.283185307179586 * parameters[4];
-    const V v3 = X2 + d2;
-    const V v4 = X1 - parameters[0];
-    const V v5 = X3 - parameters[0];
-    const V v6 = d1 + v4;
-    const V v7 = d3 + v5;
-    const V v8 = parameters[2] * t9;
-    const V v9 = d2 * parameters[9];
-    const V v10 = a1 + v9;
-    const V v11 = d0 * parameters[9];
-    const V v12 = a0 + v11;
-    const V v13 = v3 - X0;
-    const V v14 = t2 - t0;
-    const V v15 = 6.283185307179586 * t10;
-    const V v16 = v13 - d0;
-    const V v17 = d0 * t15;
-    const V v18 = t4 + v17;
-    const V v19 = d2 * t15;
-    const V v20 = t5 + v19;
-    const V v21 = v7 - v6;
-    const V v22 = 0.5 * v14;
-    const V v23 = 0.5 * v16;
-    const V v24 = 0.5 * v21;
-    const V v25 = t1 - t6;
-    const V v26 = t3 - t6;
-    const double v27 = 1.0 / parameters[7];
-    const double v28 = 0.5 * parameters[6];
-    const double v29 = 1.0 / parameters[6];
-    const double v30 = parameters[7] - 1.0;
-    const V v31 = 1.0 / v23;
-    const V v32 = parameters[6] * v23;
-    const V v33 = parameters[6] * v22;
-    const double v34 = 0.5 * v30;
-    const V v35 = v26 - v25;
-    const V v36 = 1.0 / v32;
-    const V v37 = v24 * v24;
-    const V v38 = v23 * v22;
-    const V v39 = 0.5 * v35;
-    const V v40 = v23 * v23;
-    const V v41 = v37 + v40;
-    const V v42 = v23 * t12;
-    const V v43 = v33 + v42;
-    const V v44 = 0.5 * t12;
-    const V v45 = v24 * v39;
-    const V v46 = v45 + v38;
-    const double v47 = v27 * v34;
-    const V v48 = softehl_vsqrt(v41);
-    const V v49 = 1.0 / v41;
-    const V v50 = v29 * t12;
-    const V v51 = 0.5 * t13;
-    const double v52 = 0.5 * parameters[5];
-    const V v53 = v31 * v31;
-    const V v54 = 2.0 * v46;
-    const V v55 = v47 * t13;
-    const V v56 = v51 - v55;
-    const V v57 = v53 * v22;
-    const V v58 = v36 * v43;
-    const V v59 = v27 * v56;
-    const V v60 = parameters[5] * v48;
-    const V v61 = softehl_vsqrt(v49);
-    const V v62 = v61 * v52;
-    const V v63 = v54 * v62;
-    const V v64 = v48 * t11;
-    const V v65 = v64 + v63;
-    V s66 = softehl_splat(0.0);
-    V s67 = softehl_splat(0.0);
-    V s68 = softehl_splat(0.0);
-    V s69 = softehl_splat(0.0);
+    const double v1 = 1.0 - parameters[8], v2 = 6.283185307179586 * parameters[4];
+    const V v3 = d1 + (X1 - parameters[0]), v4 = d3 + (X3 - parameters[0]), v5 = parameters[2] * t9,
+        v6 = a1 + d2 * parameters[9], v7 = a0 + d0 * parameters[9], v8 = 6.283185307179586 * t10,
+        v9 = t4 + d0 * t15, v10 = t5 + d2 * t15, v11 = 0.5 * (t2 - t0),
+        v12 = 0.5 * (X2 + d2 - X0 - d0), v13 = 0.5 * (v4 - v3), v14 = t1 - t6, v15 = t3 - t6;
+    const double v16 = 1.0 / parameters[7], v17 = 0.5 * parameters[6], v18 = 1.0 / parameters[6];
+    const V v19 = 1.0 / v12; const double v20 = 0.5 * (parameters[7] - 1.0);
+    const V v21 = 1.0 / (parameters[6] * v12), v22 = 0.5 * (v15 - v14), v23 = v13 * v13 + v12 * v12,
+        v24 = 0.5 * t12;
+    const double v25 = v16 * v20;
+    const V v26 = softehl_vsqrt(v23), v27 = v18 * t12, v28 = 0.5 * t13, v29 = v19 * v19 * v11,
+        v30 = v21 * (parameters[6] * v11 + v12 * t12), v31 = v16 * (v28 - v25 * t13),
+        v32 = parameters[5] * v26, v33 = softehl_vsqrt(1.0 / v23),
+        v34 = v26 * t11 + 2.0 * (v13 * v22 + v12 * v11) * (v33 * (0.5 * parameters[5]));
+    V s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v70 = 0.5 * w[0];
-        const V v71 = p1 * v31;
-        const double v72 = 0.5 + v70;
-        const double v73 = 0.5 - v70;
-        const V v74 = p0 * parameters[3];
-        const V v75 = softehl_vexp(v74);
-        const V v76 = v72 * v10;
-        const V v77 = parameters[1] - v76;
-        const V v78 = v72 * v7;
-        const V v79 = v72 * v26;
-        const V v80 = v73 * v12;
-        const V v81 = v77 - v80;
-        const V v82 = v73 * v6;
-        const V v83 = v82 + v78;
-        const V v84 = parameters[0] + v83;
-        const V v85 = v73 * v25;
-        const V v86 = v85 + v79;
-        const V v87 = t6 + v86;
-        const V v88 = 0.5 * v83;
-        const V v89 = parameters[6] * v83;
-        const V v90 = v88 * v71;
-        const V v91 = 1.0 / v89;
-        const V v92 = parameters[2] * v75;
-        const V v93 = v92 * v81;
-        const V v94 = v91 * v93;
-        const V v95 = v84 * v15;
-        const V v96 = v84 * v2;
-        const V v97 = v2 * v87;
-        const V v98 = v97 + v95;
-        const V v99 = v29 * v90;
-        const V v100 = v96 * v22;
-        const V v101 = v23 * v98;
-        const V v102 = v100 + v101;
-        const V v103 = p0 * v102;
-        const V v104 = v94 * v94;
-        const V v105 = 1.0 + v104;
-        const V v106 = softehl_vlog(v105);
-        const V v107 = v34 * v106;
-        const V v108 = softehl_vexp(v107);
-        const V v109 = v1 * v108;
-        const V v110 = parameters[8] + v109;
-        const V v111 = v94 * v110;
-        const V v112 = 0.932469514203152 * v99;
-        const V v113 = 0.6612093864662645 * v99;
-        const V v114 = 0.2386191860831969 * v99;
-        const V v115 = w[3] * v103;
-        const V v116 = v72 * v115;
-        s66 += v116;
-        const V v117 = v73 * v115;
-        s67 += v117;
-        const V v118 = v111 + v112;
-        const V v119 = v111 + v113;
-        const V v120 = v111 + v114;
-        const V v121 = v111 - v114;
-        const V v122 = v111 - v113;
-        const V v123 = v111 - v112;
-        V v124[7];
-        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v34), softehl_splat(v1), softehl_splat(v47), v94, v112, v113, v114, v111, v118, v119, v120, v121, v122, v123}, v124, &failed);
-        const V v125 = v124[1];
-        const V v126 = v124[2];
-        const V v127 = v124[3];
-        const V v128 = v124[4];
-        const V v129 = v124[5];
-        const V v130 = v124[6];
-        const V v131 = v125 * v125;
-        const V v132 = v126 * v126;
-        const V v133 = v127 * v127;
-        const V v134 = v128 * v128;
-        const V v135 = v129 * v129;
-        const V v136 = v130 * v130;
-        const V v137 = 1.0 + v131;
-        const V v138 = 1.0 + v132;
-        const V v139 = 1.0 + v133;
-        const V v140 = 1.0 + v134;
-        const V v141 = 1.0 + v135;
-        const V v142 = 1.0 + v136;
-        const V v143 = softehl_vlog(v137);
-        const V v144 = softehl_vlog(v138);
-        const V v145 = softehl_vlog(v139);
-        const V v146 = softehl_vlog(v140);
-        const V v147 = softehl_vlog(v141);
-        const V v148 = softehl_vlog(v142);
-        const V v149 = v47 * v143;
-        const V v150 = v47 * v148;
-        const V v151 = v47 * v144;
-        const V v152 = v47 * v147;
-        const V v153 = softehl_vexp(v149);
-        const V v154 = softehl_vexp(v150);
-        const V v155 = softehl_vexp(v151);
-        const V v156 = v47 * v145;
-        const V v157 = v47 * v146;
-        const V v158 = softehl_vexp(v152);
-        const V v159 = softehl_vexp(v156);
-        const V v160 = softehl_vexp(v157);
-        const V v161 = 1.0 / v140;
-        const V v162 = 1.0 / v139;
-        const V v163 = 1.0 / v141;
-        const V v164 = 1.0 / v138;
-        const V v165 = 1.0 / v142;
-        const V v166 = 1.0 / v137;
-        const V v167 = 2.0 * v128;
-        const V v168 = 0.23395696728634552 * v128;
-        const V v169 = 2.0 * v127;
-        const V v170 = 0.23395696728634552 * v127;
-        const V v171 = 2.0 * v129;
-        const V v172 = 0.1803807865240693 * v129;
-        const V v173 = 2.0 * v126;
-        const V v174 = 0.1803807865240693 * v126;
-        const V v175 = 2.0 * v130;
-        const V v176 = 0.08566224618958518 * v130;
-        const V v177 = 2.0 * v125;
-        const V v178 = 0.08566224618958518 * v125;
-        const V v179 = v1 * v153;
-        const V v180 = v1 * v154;
-        const V v181 = v1 * v155;
-        const V v182 = v1 * v158;
-        const V v183 = v1 * v159;
-        const V v184 = v1 * v160;
-        const V v185 = v47 * v161;
-        const V v186 = v47 * v162;
-        const V v187 = v47 * v163;
-        const V v188 = v47 * v164;
-        const V v189 = parameters[8] + v179;
-        const V v190 = parameters[8] + v180;
-        const V v191 = parameters[8] + v181;
-        const V v192 = parameters[8] + v182;
-        const V v193 = parameters[8] + v183;
-        const V v194 = parameters[8] + v184;
-        const V v195 = v167 * v185;
-        const V v196 = v169 * v186;
-        const V v197 = v171 * v187;
-        const V v198 = v173 * v188;
-        const V v199 = 1.0 / v189;
-        const V v200 = v189 * v189;
-        const V v201 = 1.0 / v190;
-        const V v202 = v190 * v190;
-        const V v203 = 1.0 / v191;
-        const V v204 = v191 * v191;
-        const V v205 = 1.0 / v200;
-        const V v206 = 1.0 / v192;
-        const V v207 = v192 * v192;
-        const V v208 = 1.0 / v202;
-        const V v209 = 1.0 / v204;
-        const V v210 = 1.0 / v193;
-        const V v211 = v193 * v193;
-        const V v212 = 1.0 / v194;
-        const V v213 = v194 * v194;
-        const V v214 = 1.0 / v207;
-        const V v215 = 1.0 / v211;
-        const V v216 = 1.0 / v213;
-        const V v217 = v47 * v165;
-        const V v218 = v47 * v166;
-        const V v219 = v175 * v217;
-        const V v220 = v177 * v218;
-        const V v221 = v199 * v199;
-        const V v222 = v125 * v199;
-        const V v223 = 0.08566224618958518 * v199;
-        const V v224 = v201 * v201;
-        const V v225 = 0.08566224618958518 * v201;
-        const V v226 = v130 * v201;
-        const V v227 = v221 * v178;
-        const V v228 = v203 * v203;
-        const V v229 = v126 * v203;
-        const V v230 = 0.1803807865240693 * v203;
-        const V v231 = v224 * v176;
-        const V v232 = v228 * v174;
-        const V v233 = v210 * v210;
-        const V v234 = v206 * v206;
-        const V v235 = 0.1803807865240693 * v206;
-        const V v236 = v129 * v206;
-        const V v237 = 0.23395696728634552 * v210;
-        const V v238 = v127 * v210;
-        const V v239 = v179 * v227;
-        const V v240 = v234 * v172;
-        const V v241 = v180 * v231;
-        const V v242 = v233 * v170;
-        const V v243 = v181 * v232;
-        const V v244 = v220 * v239;
-        const V v245 = v223 - v244;
-        const V v246 = v219 * v241;
-        const V v247 = v225 - v246;
-        const V v248 = v182 * v240;
-        const V v249 = v198 * v243;
-        const V v250 = v230 - v249;
-        const V v251 = v183 * v242;
-        const V v252 = v212 * v212;
-        const V v253 = 0.23395696728634552 * v212;
-        const V v254 = v128 * v212;
-        const V v255 = v197 * v248;
-        const V v256 = v235 - v255;
-        const V v257 = v252 * v168;
-        const V v258 = v196 * v251;
-        const V v259 = v237 - v258;
-        const V v260 = v131 * v205;
-        const V v261 = 1.0 + v260;
-        const V v262 = v132 * v209;
-        const V v263 = 1.0 + v262;
-        const V v264 = softehl_vlog(v261);
-        const V v265 = softehl_vlog(v263);
-        const V v266 = v133 * v215;
-        const V v267 = 1.0 + v266;
-        const V v268 = v184 * v257;
-        const V v269 = softehl_vlog(v267);
-        const V v270 = v134 * v216;
-        const V v271 = 1.0 + v270;
-        const V v272 = v135 * v214;
-        const V v273 = 1.0 + v272;
-        const V v274 = softehl_vlog(v271);
-        const V v275 = softehl_vlog(v273);
-        const V v276 = v136 * v208;
-        const V v277 = 1.0 + v276;
-        const V v278 = v195 * v268;
-        const V v279 = v253 - v278;
-        const V v280 = softehl_vlog(v277);
-        const V v281 = 2.0 * v131;
-        const V v282 = 2.0 * v132;
-        const V v283 = 2.0 * v133;
-        const V v284 = 2.0 * v134;
-        const V v285 = 2.0 * v135;
-        const V v286 = v281 * v189;
-        const V v287 = v282 * v191;
-        const V v288 = v283 * v193;
-        const V v289 = 2.0 * v136;
-        const V v290 = v284 * v194;
-        const V v291 = v285 * v192;
-        const V v292 = v125 * v221;
-        const V v293 = v126 * v228;
-        const V v294 = v289 * v190;
-        const V v295 = v127 * v233;
-        const V v296 = v128 * v252;
-        const V v297 = v205 * v286;
-        const V v298 = v209 * v287;
-        const V v299 = v215 * v288;
-        const V v300 = v216 * v290;
-        const V v301 = v214 * v291;
-        const V v302 = v205 * v297;
-        const V v303 = v209 * v298;
-        const V v304 = v215 * v299;
-        const V v305 = v216 * v300;
-        const V v306 = v214 * v301;
-        const V v307 = v129 * v234;
-        const V v308 = v208 * v294;
-        const V v309 = v130 * v224;
-        const V v310 = 1.0 / v261;
-        const V v311 = 1.0 / v263;
-        const V v312 = 1.0 / v267;
-        const V v313 = v208 * v308;
-        const V v314 = 1.0 / v271;
-        const V v315 = 1.0 / v273;
-        const V v316 = 1.0 / v277;
-        const V v317 = v34 * v264;
-        const V v318 = v34 * v265;
-        const V v319 = v34 * v269;
-        const V v320 = v34 * v274;
-        const V v321 = v34 * v275;
-        const V v322 = softehl_vexp(v317);
-        const V v323 = softehl_vexp(v318);
-        const V v324 = softehl_vexp(v319);
-        const V v325 = softehl_vexp(v320);
-        const V v326 = softehl_vexp(v321);
-        const V v327 = v34 * v280;
-        const V v328 = softehl_vexp(v327);
-        const V v329 = v34 * v310;
-        const V v330 = v34 * v311;
-        const V v331 = v34 * v312;
-        const V v332 = v34 * v314;
-        const V v333 = v34 * v315;
-        const V v334 = v34 * v316;
-        const V v335 = v1 * v324;
-        const V v336 = v1 * v326;
-        const V v337 = v1 * v328;
-        const V v338 = parameters[8] + v335;
-        const V v339 = v335 * v238;
-        const V v340 = v339 * v331;
-        const V v341 = parameters[8] + v336;
-        const V v342 = v336 * v236;
-        const V v343 = v342 * v333;
-        const V v344 = parameters[8] + v337;
-        const V v345 = v337 * v226;
-        const V v346 = v345 * v334;
-        const V v347 = v1 * v322;
-        const V v348 = parameters[8] + v347;
-        const V v349 = v347 * v222;
-        const V v350 = v349 * v329;
-        const V v351 = v1 * v323;
-        const V v352 = v1 * v325;
-        const V v353 = parameters[8] + v351;
-        const V v354 = v351 * v229;
-        const V v355 = v354 * v330;
-        const V v356 = parameters[8] + v352;
-        const V v357 = v352 * v254;
-        const V v358 = v357 * v332;
-        const V v359 = v199 * v348;
-        const V v360 = v292 * v348;
-        const V v361 = v302 * v350;
-        const V v362 = v360 + v361;
-        const V v363 = v179 * v362;
-        const V v364 = v205 * v350;
-        const V v365 = v218 * v363;
-        const V v366 = v364 - v365;
-        const V v367 = v177 * v366;
-        const V v368 = v359 + v367;
-        const V v369 = v203 * v353;
-        const V v370 = v293 * v353;
-        const V v371 = v303 * v355;
-        const V v372 = v370 + v371;
-        const V v373 = v181 * v372;
-        const V v374 = v209 * v355;
-        const V v375 = v188 * v373;
-        const V v376 = v374 - v375;
-        const V v377 = v173 * v376;
-        const V v378 = v369 + v377;
-        const V v379 = v210 * v338;
-        const V v380 = v295 * v338;
-        const V v381 = v304 * v340;
-        const V v382 = v380 + v381;
-        const V v383 = v183 * v382;
-        const V v384 = v215 * v340;
-        const V v385 = v186 * v383;
-        const V v386 = v384 - v385;
-        const V v387 = v169 * v386;
-        const V v388 = v379 + v387;
-        const V v389 = v212 * v356;
-        const V v390 = v296 * v356;
-        const V v391 = v305 * v358;
-        const V v392 = v390 + v391;
-        const V v393 = v184 * v392;
-        const V v394 = v216 * v358;
-        const V v395 = v185 * v393;
-        const V v396 = v394 - v395;
-        const V v397 = v167 * v396;
-        const V v398 = v389 + v397;
-        const V v399 = v206 * v341;
-        const V v400 = v307 * v341;
-        const V v401 = v306 * v343;
-        const V v402 = v400 + v401;
-        const V v403 = v182 * v402;
-        const V v404 = v214 * v343;
-        const V v405 = v187 * v403;
-        const V v406 = v404 - v405;
-        const V v407 = v171 * v406;
-        const V v408 = v399 + v407;
-        const V v409 = v201 * v344;
-        const V v410 = v309 * v344;
-        const V v411 = v313 * v346;
-        const V v412 = v410 + v411;
-        const V v413 = v180 * v412;
-        const V v414 = v208 * v346;
-        const V v415 = v217 * v413;
-        const V v416 = v414 - v415;
-        const V v417 = v175 * v416;
-        const V v418 = v409 + v417;
-        V v419[49];
-        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v245, v250, v259, v279, v256, v247, softehl_splat((-1.0)), v368, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v378, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v388, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v398, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v408, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v418}, v419, &failed);
-        const V v420 = 0.5 * v71;
-        const V v421 = v124[0];
-        const V v422 = p1 * v57;
-        const V v423 = v88 * v422;
-        const V v424 = v420 * v86;
-        const V v425 = 1.0 - p6;
-        const V v426 = 1.0 - p4;
-        const V v427 = parameters[6] * v86;
-        const V v428 = parameters[6] * v421;
-        const V v429 = v72 * v20;
-        const V v430 = t7 - v429;
-        const V v431 = p0 * v8;
-        const V v432 = t8 + v431;
-        const M v433 = softehl_lt(softehl_splat(0.0), v428);
-        const V v434 = v264 * v349;
-        const V v435 = v75 * v432;
-        const V v436 = v73 * v18;
-        const V v437 = v430 - v436;
-        const V v438 = v424 - v423;
-        const V v439 = v265 * v354;
-        const V v440 = v269 * v339;
-        const V v441 = v274 * v357;
-        const V v442 = v92 * v437;
-        const V v443 = v275 * v342;
-        const V v444 = v90 * v50;
-        const V v445 = v438 - v444;
-        const V v446 = v280 * v345;
-        const V v447 = v421 * t12;
-        const V v448 = v83 * t12;
-        const V v449 = v427 + v448;
-        const V v450 = v29 * v445;
-        const V v451 = v81 * v435;
-        const V v452 = v442 + v451;
-        const V v453 = v94 * v449;
-        const V v454 = v452 - v453;
-        const V v455 = v143 * v363;
-        const V v456 = v143 * v239;
-        const V v457 = v144 * v373;
-        const V v458 = v144 * v243;
-        const V v459 = v458 + v456;
-        const V v460 = v160 * v257;
-        const V v461 = v257 - v460;
-        const V v462 = v91 * v454;
-        const V v463 = v145 * v383;
-        const V v464 = v145 * v251;
-        const V v465 = v464 + v459;
-        const V v466 = v146 * v393;
-        const V v467 = v146 * v268;
-        const V v468 = v467 + v465;
-        const V v469 = v147 * v403;
-        const V v470 = v147 * v248;
-        const V v471 = v470 + v468;
-        const V v472 = v242 + v461;
-        const V v473 = v148 * v413;
-        const V v474 = v148 * v241;
-        const V v475 = v474 + v471;
-        const V v476 = v419[0];
-        const V v477 = v419[1];
-        const V v478 = v419[2];
-        const V v479 = v419[3];
-        const V v480 = v159 * v242;
-        const V v481 = v472 - v480;
-        const V v482 = v419[4];
-        const V v483 = v476 * v475;
-        const V v484 = v462 * v476;
-        const V v485 = v419[5];
-        const V v486 = v419[6];
-        const V v487 = v469 * v485;
-        const V v488 = v487 + v483;
-        const V v489 = v434 * v477;
-        const V v490 = v477 - v486;
-        const V v491 = v478 - v485;
-        const V v492 = v479 - v482;
-        const V v493 = v240 + v481;
-        const V v494 = v439 * v478;
-        const V v495 = v489 + v494;
-        const V v496 = 0.6612093864662645 * v491;
-        const V v497 = v322 * v222;
-        const V v498 = v497 - v222;
-        const V v499 = v455 * v477;
-        const V v500 = v499 + v488;
-        const V v501 = v158 * v240;
-        const V v502 = v493 - v501;
-        const V v503 = v440 * v479;
-        const V v504 = v503 + v495;
-        const V v505 = v323 * v229;
-        const V v506 = v505 - v229;
-        const V v507 = 0.932469514203152 * v490;
-        const V v508 = v507 + v496;
-        const V v509 = v457 * v478;
-        const V v510 = v509 + v500;
-        const V v511 = 0.2386191860831969 * v492;
-        const V v512 = v508 + v511;
-        const V v513 = v441 * v482;
-        const V v514 = v513 + v504;
-        const V v515 = v232 + v502;
-        const V v516 = v362 + v498;
-        const V v517 = v324 * v238;
-        const V v518 = v517 - v238;
-        const V v519 = v463 * v479;
-        const V v520 = v519 + v510;
-        const V v521 = v155 * v232;
-        const V v522 = v515 - v521;
-        const V v523 = v155 * v372;
-        const V v524 = v506 - v523;
-        const V v525 = v153 * v362;
-        const V v526 = v516 - v525;
-        const V v527 = v443 * v485;
-        const V v528 = v527 + v514;
-        const V v529 = v372 + v524;
-        const V v530 = v477 * v526;
-        const V v531 = v153 * v227;
-        const V v532 = v522 - v531;
-        const V v533 = v466 * v482;
-        const V v534 = v533 + v520;
-        const V v535 = v227 + v532;
-        const V v536 = v450 * v512;
-        const V v537 = v484 + v536;
-        const V v538 = v478 * v529;
-        const V v539 = v530 + v538;
-        const V v540 = v446 * v486;
-        const V v541 = v540 + v528;
-        const V v542 = v473 * v486;
-        const V v543 = v542 + v534;
-        const V v544 = v382 + v518;
-        const V v545 = v159 * v382;
-        const V v546 = v544 - v545;
-        const V v547 = v479 * v546;
-        const V v548 = v539 + v547;
-        const V v549 = v51 * v541;
-        const V v550 = v537 - v549;
-        const V v551 = v231 + v535;
-        const V v552 = v325 * v254;
-        const V v553 = v552 - v254;
-        const V v554 = v154 * v231;
-        const V v555 = v551 - v554;
-        const V v556 = v326 * v236;
-        const V v557 = v556 - v236;
-        const V v558 = v59 * v543;
-        const V v559 = v550 + v558;
-        const V v560 = v476 * v555;
-        const V v561 = v548 + v560;
-        const V v562 = v328 * v226;
-        const V v563 = v562 - v226;
-        const V v564 = v158 * v402;
-        const V v565 = v557 - v564;
-        const V v566 = v402 + v565;
-        const V v567 = v485 * v566;
-        const V v568 = v561 + v567;
-        const V v569 = v392 + v553;
-        const V v570 = v160 * v392;
-        const V v571 = v569 - v570;
-        const V v572 = v154 * v412;
-        const V v573 = v563 - v572;
-        const V v574 = v412 + v573;
-        const V v575 = v482 * v571;
-        const V v576 = v568 + v575;
-        const V v577 = v486 * v574;
-        const V v578 = v576 + v577;
-        const V v579 = t14 * v578;
-        const V v580 = v559 + v579;
-        const V v581 = parameters[6] * v580;
-        const V v582 = v447 + v581;
-        V v583 = softehl_splat(0.0);
-        V v584 = softehl_splat(0.0);
-        V v585 = softehl_splat(0.0);
-        V v586 = softehl_splat(0.0);
-        const M m587 = v433;
-        if (softehl_any(m587)) {
-            const V v588 = v426 * v582;
-            v583 = softehl_blend(m587, softehl_splat(0.0), v583);
-            v584 = softehl_blend(m587, v588, v584);
-            v585 = softehl_blend(m587, v428, v585);
-            v586 = softehl_blend(m587, softehl_splat(0.0), v586);
+        const double v39 = 0.5 * w[0]; const V v40 = p1 * v19;
+        const double v41 = 0.5 + v39, v42 = 0.5 - v39;
+        const V v43 = softehl_vexp(p0 * parameters[3]), v44 = parameters[1] - v41 * v6 - v42 * v7,
+            v45 = v42 * v3 + v41 * v4, v46 = parameters[0] + v45, v47 = v42 * v14 + v41 * v15,
+            v48 = 0.5 * v45, v49 = v48 * v40, v50 = 1.0 / (parameters[6] * v45),
+            v51 = parameters[2] * v43, v52 = v50 * (v51 * v44), v53 = v46 * v2,
+            v54 = v2 * (t6 + v47) + v46 * v8, v55 = v18 * v49, v56 = softehl_vlog(1.0 + v52 * v52),
+            v57 = softehl_vexp(v20 * v56), v58 = v52 * (parameters[8] + v1 * v57),
+            v59 = 0.932469514203152 * v55, v60 = 0.6612093864662645 * v55,
+            v61 = 0.2386191860831969 * v55, v62 = w[3] * (p0 * (v53 * v11 + v12 * v54));
+        s35 += v41 * v62; s36 += v42 * v62;
+        const V v63 = v58 + v59, v64 = v58 + v60, v65 = v58 + v61, v66 = v58 - v61, v67 = v58 - v60,
+            v68 = v58 - v59;
+        V v69[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v20), softehl_splat(v1), softehl_splat(v25), v52, v59, v60, v61, v58, v63, v64, v65, v66, v67, v68}, v69, &failed);
+        const V v70 = v69[1], v71 = v69[2], v72 = v69[3], v73 = v69[4], v74 = v69[5], v75 = v69[6],
+            v76 = v70 * v70, v77 = v71 * v71, v78 = v72 * v72, v79 = v73 * v73, v80 = v74 * v74,
+            v81 = v75 * v75, v82 = 1.0 + v76, v83 = 1.0 + v77, v84 = 1.0 + v78, v85 = 1.0 + v79,
+            v86 = 1.0 + v80, v87 = 1.0 + v81, v88 = softehl_vlog(v82), v89 = softehl_vlog(v83),
+            v90 = softehl_vlog(v84), v91 = softehl_vlog(v85), v92 = softehl_vlog(v86),
+            v93 = softehl_vlog(v87), v94 = softehl_vexp(v25 * v88), v95 = softehl_vexp(v25 * v93),
+            v96 = softehl_vexp(v25 * v89), v97 = softehl_vexp(v25 * v92),
+            v98 = softehl_vexp(v25 * v90), v99 = softehl_vexp(v25 * v91), v100 = 2.0 * v73,
+            v101 = 2.0 * v72, v102 = 2.0 * v74, v103 = 2.0 * v71, v104 = 2.0 * v75,
+            v105 = 2.0 * v70, v106 = v1 * v94, v107 = v1 * v95, v108 = v1 * v96, v109 = v1 * v97,
+            v110 = v1 * v98, v111 = v1 * v99, v112 = v25 * (1.0 / v85), v113 = v25 * (1.0 / v84),
+            v114 = v25 * (1.0 / v86), v115 = v25 * (1.0 / v83), v116 = parameters[8] + v106,
+            v117 = parameters[8] + v107, v118 = parameters[8] + v108, v119 = parameters[8] + v109,
+            v120 = parameters[8] + v110, v121 = parameters[8] + v111, v122 = 1.0 / v116,
+            v123 = 1.0 / v117, v124 = 1.0 / v118, v125 = 1.0 / (v116 * v116), v126 = 1.0 / v119,
+            v127 = 1.0 / (v117 * v117), v128 = 1.0 / (v118 * v118), v129 = 1.0 / v120,
+            v130 = 1.0 / v121, v131 = 1.0 / (v119 * v119), v132 = 1.0 / (v120 * v120),
+            v133 = 1.0 / (v121 * v121), v134 = v25 * (1.0 / v87), v135 = v25 * (1.0 / v82),
+            v136 = v122 * v122, v137 = v70 * v122, v138 = v123 * v123, v139 = v75 * v123,
+            v140 = v136 * (0.08566224618958518 * v70), v141 = v124 * v124, v142 = v71 * v124,
+            v143 = v138 * (0.08566224618958518 * v75), v144 = v141 * (0.1803807865240693 * v71),
+            v145 = v129 * v129, v146 = v126 * v126, v147 = v74 * v126, v148 = v72 * v129,
+            v149 = v106 * v140, v150 = v146 * (0.1803807865240693 * v74), v151 = v107 * v143,
+            v152 = v145 * (0.23395696728634552 * v72), v153 = v108 * v144,
+            v154 = 0.08566224618958518 * v122 - v105 * v135 * v149,
+            v155 = 0.08566224618958518 * v123 - v104 * v134 * v151, v156 = v109 * v150,
+            v157 = 0.1803807865240693 * v124 - v103 * v115 * v153, v158 = v110 * v152,
+            v159 = v130 * v130, v160 = v73 * v130,
+            v161 = 0.1803807865240693 * v126 - v102 * v114 * v156,
+            v162 = v159 * (0.23395696728634552 * v73),
+            v163 = 0.23395696728634552 * v129 - v101 * v113 * v158, v164 = 1.0 + v76 * v125,
+            v165 = 1.0 + v77 * v128, v166 = softehl_vlog(v164), v167 = softehl_vlog(v165),
+            v168 = 1.0 + v78 * v132, v169 = v111 * v162, v170 = softehl_vlog(v168),
+            v171 = 1.0 + v79 * v133, v172 = 1.0 + v80 * v131, v173 = softehl_vlog(v171),
+            v174 = softehl_vlog(v172), v175 = 1.0 + v81 * v127,
+            v176 = 0.23395696728634552 * v130 - v100 * v112 * v169, v177 = softehl_vlog(v175),
+            v178 = softehl_vexp(v20 * v166), v179 = softehl_vexp(v20 * v167),
+            v180 = softehl_vexp(v20 * v170), v181 = softehl_vexp(v20 * v173),
+            v182 = softehl_vexp(v20 * v174), v183 = softehl_vexp(v20 * v177), v184 = v1 * v180,
+            v185 = v1 * v182, v186 = v1 * v183, v187 = parameters[8] + v184, v188 = v184 * v148,
+            v189 = v188 * (v20 * (1.0 / v168)), v190 = parameters[8] + v185, v191 = v185 * v147,
+            v192 = v191 * (v20 * (1.0 / v172)), v193 = parameters[8] + v186, v194 = v186 * v139,
+            v195 = v194 * (v20 * (1.0 / v175)), v196 = v1 * v178, v197 = parameters[8] + v196,
+            v198 = v196 * v137, v199 = v198 * (v20 * (1.0 / v164)), v200 = v1 * v179,
+            v201 = v1 * v181, v202 = parameters[8] + v200, v203 = v200 * v142,
+            v204 = v203 * (v20 * (1.0 / v165)), v205 = parameters[8] + v201, v206 = v201 * v160,
+            v207 = v206 * (v20 * (1.0 / v171)),
+            v208 = v70 * v136 * v197 + v125 * (v125 * (2.0 * v76 * v116)) * v199,
+            v209 = v106 * v208, v210 = v122 * v197 + v105 * (v125 * v199 - v135 * v209),
+            v211 = v71 * v141 * v202 + v128 * (v128 * (2.0 * v77 * v118)) * v204,
+            v212 = v108 * v211, v213 = v124 * v202 + v103 * (v128 * v204 - v115 * v212),
+            v214 = v72 * v145 * v187 + v132 * (v132 * (2.0 * v78 * v120)) * v189,
+            v215 = v110 * v214, v216 = v129 * v187 + v101 * (v132 * v189 - v113 * v215),
+            v217 = v73 * v159 * v205 + v133 * (v133 * (2.0 * v79 * v121)) * v207,
+            v218 = v111 * v217, v219 = v130 * v205 + v100 * (v133 * v207 - v112 * v218),
+            v220 = v74 * v146 * v190 + v131 * (v131 * (2.0 * v80 * v119)) * v192,
+            v221 = v109 * v220, v222 = v126 * v190 + v102 * (v131 * v192 - v114 * v221),
+            v223 = v75 * v138 * v193 + v127 * (v127 * (2.0 * v81 * v117)) * v195,
+            v224 = v107 * v223, v225 = v123 * v193 + v104 * (v127 * v195 - v134 * v224);
+        V v226[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v154, v157, v163, v176, v161, v155, softehl_splat((-1.0)), v210, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v213, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v216, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v219, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v222, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v225}, v226, &failed);
+        const V v227 = v69[0], v228 = v48 * (p1 * v29), v229 = 0.5 * v40 * v47, v230 = 1.0 - p6,
+            v231 = 1.0 - p4, v232 = parameters[6] * v227;
+        const M v233 = softehl_lt(softehl_splat(0.0), v232);
+        const V v234 = t7 - v41 * v10 - v42 * v9,
+            v235 = v51 * v234 + v44 * (v43 * (t8 + p0 * v5)) - v52 * (parameters[6] * v47 + v45 * t12),
+            v236 = v92 * v156 + (v91 * v169 + (v90 * v158 + (v89 * v153 + v88 * v149))),
+            v237 = v226[0], v238 = v226[1], v239 = v226[2], v240 = v226[3], v241 = v226[4],
+            v242 = v226[5], v243 = v226[6],
+            v244 = v88 * v209 * v238 + (v92 * v221 * v242 + v237 * (v93 * v151 + v236)),
+            v245 = 0.932469514203152 * (v238 - v243) + 0.6612093864662645 * (v239 - v242),
+            v246 = v173 * v206 * v241 + (v170 * v188 * v240 + (v166 * v198 * v238 + v167 * v203 * v239)),
+            v247 = v144 + (v150 + (v152 + (v162 - v99 * v162) - v98 * v152) - v97 * v150),
+            v248 = v91 * v218 * v241 + (v90 * v215 * v240 + (v89 * v212 * v239 + v244)),
+            v249 = v18 * (v229 - v228 - v49 * v27) * (v245 + 0.2386191860831969 * (v240 - v241)),
+            v250 = v238 * (v208 + (v178 * v137 - v137) - v94 * v208) + v239 * (v211 + (v179 * v142 - v142 - v96 * v211)),
+            v251 = v50 * v235 * v237 + v249 - v28 * (v177 * v194 * v243 + (v174 * v191 * v242 + v246)),
+            v252 = v237 * (v143 + (v140 + (v247 - v96 * v144 - v94 * v140)) - v95 * v143),
+            v253 = v250 + v240 * (v214 + (v180 * v148 - v148) - v98 * v214) + v252 + v242 * (v220 + (v182 * v147 - v147 - v97 * v220)),
+            v254 = v253 + v241 * (v217 + (v181 * v160 - v160) - v99 * v217) + v243 * (v223 + (v183 * v139 - v139 - v95 * v223)),
+            v255 = parameters[6] * (v251 + v31 * (v93 * v224 * v243 + v248) + t14 * v254),
+            v256 = v227 * t12 + v255;
+        V v257 = softehl_splat(0.0), v258 = softehl_splat(0.0), v259 = softehl_splat(0.0),
+            v260 = softehl_splat(0.0);
+        const M m261 = v233;
+        if (softehl_any(m261)) {
+            const V v262 = v231 * v256; v257 = softehl_blend(m261, softehl_splat(0.0), v257);
+            v258 = softehl_blend(m261, v262, v258); v259 = softehl_blend(m261, v232, v259);
+            v260 = softehl_blend(m261, softehl_splat(0.0), v260);
         }
-        const M m589 = ~v433;
-        if (softehl_any(m589)) {
-            const V v590 = v425 * v582;
-            v583 = softehl_blend(m589, v590, v583);
-            v584 = softehl_blend(m589, softehl_splat(0.0), v584);
-            v585 = softehl_blend(m589, softehl_splat(0.0), v585);
-            v586 = softehl_blend(m589, v428, v586);
+        const M m263 = ~v233;
+        if (softehl_any(m263)) {
+            const V v264 = v230 * v256; v257 = softehl_blend(m263, v264, v257);
+            v258 = softehl_blend(m263, softehl_splat(0.0), v258);
+            v259 = softehl_blend(m263, softehl_splat(0.0), v259);
+            v260 = softehl_blend(m263, v232, v260);
         }
-        const double v591 = 0.5 * w[1];
-        const double v592 = 0.5 * w[2];
-        const V v593 = p2 * parameters[3];
-        const V v594 = 0.5 * p3;
-        const V v595 = softehl_vexp(v593);
-        const double v596 = 0.5 - v591;
-        const double v597 = 0.5 + v591;
-        const double v598 = 0.5 - v592;
-        const double v599 = 0.5 + v592;
-        const V v600 = v425 * v586;
-        const V v601 = v596 * v6;
-        const V v602 = v598 * v6;
-        const V v603 = p0 * v24;
-        const V v604 = p0 * v39;
-        const V v605 = v600 - v90;
-        const V v606 = v597 * v7;
-        const V v607 = v601 + v606;
-        const V v608 = v599 * v7;
-        const V v609 = v602 + v608;
-        const V v610 = v423 - v424;
-        const V v611 = v426 * v585;
-        const V v612 = v611 + v605;
-        const V v613 = v607 + v609;
-        const V v614 = v610 + v583;
-        const V v615 = 0.5 * v613;
-        const V v616 = v65 * v612;
-        const V v617 = v604 - v616;
-        const V v618 = v60 * v612;
-        const V v619 = v603 - v618;
-        const V v620 = v584 + v614;
-        const V v621 = v60 * v620;
-        const V v622 = v617 - v621;
-        const V v623 = v98 * v619;
-        const V v624 = parameters[2] * v595;
-        const V v625 = v594 * v615;
-        const V v626 = parameters[6] * v615;
-        const V v627 = 1.0 / v626;
-        const V v628 = v96 * v622;
-        const V v629 = v623 + v628;
-        const V v630 = v624 * v81;
-        const V v631 = v627 * v630;
-        const V v632 = v36 * v625;
-        const V v633 = v631 * v631;
-        const V v634 = 1.0 + v633;
-        const V v635 = softehl_vlog(v634);
-        const V v636 = v34 * v635;
-        const V v637 = w[3] * v629;
-        const V v638 = softehl_vexp(v636);
-        const V v639 = v1 * v638;
-        const V v640 = parameters[8] + v639;
-        const V v641 = v631 * v640;
-        const V v642 = 0.932469514203152 * v632;
-        const V v643 = 0.6612093864662645 * v632;
-        const V v644 = 0.2386191860831969 * v632;
-        const V v645 = v72 * v637;
-        s68 += v645;
-        const V v646 = v73 * v637;
-        s69 += v646;
-        const V v647 = v641 + v642;
-        const V v648 = v641 + v643;
-        const V v649 = v641 + v644;
-        const V v650 = v641 - v644;
-        const V v651 = v641 - v643;
-        const V v652 = v641 - v642;
-        V v653[7];
-        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v631, softehl_splat(v34), softehl_splat(v1), softehl_splat(v47), v642, v643, v644, v641, v647, v648, v649, v650, v651, v652}, v653, &failed);
-        const V v654 = v653[1];
-        const V v655 = v653[2];
-        const V v656 = v653[3];
-        const V v657 = v653[4];
-        const V v658 = v653[5];
-        const V v659 = v653[6];
-        const V v660 = v654 * v654;
-        const V v661 = 2.0 * v654;
-        const V v662 = v655 * v655;
-        const V v663 = 2.0 * v655;
-        const V v664 = v656 * v656;
-        const V v665 = 2.0 * v656;
-        const V v666 = 1.0 + v660;
-        const V v667 = 1.0 + v662;
-        const V v668 = 1.0 + v664;
-        const V v669 = v659 * v659;
-        const V v670 = 2.0 * v659;
-        const V v671 = v657 * v657;
-        const V v672 = 2.0 * v657;
-        const V v673 = 1.0 + v669;
-        const V v674 = 1.0 + v671;
-        const V v675 = v658 * v658;
-        const V v676 = 2.0 * v658;
-        const V v677 = softehl_vlog(v666);
-        const V v678 = softehl_vlog(v667);
-        const V v679 = softehl_vlog(v668);
-        const V v680 = 1.0 + v675;
-        const V v681 = softehl_vlog(v673);
-        const V v682 = softehl_vlog(v674);
-        const V v683 = softehl_vlog(v680);
-        const V v684 = 1.0 / v674;
-        const V v685 = 1.0 / v668;
-        const V v686 = 1.0 / v680;
-        const V v687 = 1.0 / v667;
-        const V v688 = 1.0 / v673;
-        const V v689 = 1.0 / v666;
-        const V v690 = v47 * v678;
-        const V v691 = v47 * v679;
-        const V v692 = v47 * v677;
-        const V v693 = v47 * v681;
-        const V v694 = softehl_vexp(v690);
-        const V v695 = softehl_vexp(v691);
-        const V v696 = v47 * v682;
-        const V v697 = softehl_vexp(v692);
-        const V v698 = softehl_vexp(v693);
-        const V v699 = v47 * v683;
-        const V v700 = softehl_vexp(v696);
-        const V v701 = softehl_vexp(v699);
-        const V v702 = v47 * v684;
-        const V v703 = v47 * v685;
-        const V v704 = v47 * v686;
-        const V v705 = v47 * v687;
-        const V v706 = v47 * v688;
-        const V v707 = v47 * v689;
-        const V v708 = 0.08566224618958518 * v654;
-        const V v709 = 0.08566224618958518 * v659;
-        const V v710 = 0.1803807865240693 * v655;
-        const V v711 = 0.1803807865240693 * v658;
-        const V v712 = 0.23395696728634552 * v656;
-        const V v713 = 0.23395696728634552 * v657;
-        const V v714 = v1 * v694;
-        const V v715 = v1 * v695;
-        const V v716 = v1 * v697;
-        const V v717 = v1 * v698;
-        const V v718 = v1 * v700;
-        const V v719 = v1 * v701;
-        const V v720 = parameters[8] + v714;
-        const V v721 = parameters[8] + v715;
-        const V v722 = parameters[8] + v716;
-        const V v723 = parameters[8] + v717;
-        const V v724 = parameters[8] + v718;
-        const V v725 = parameters[8] + v719;
-        const V v726 = 1.0 / v720;
-        const V v727 = v720 * v720;
-        const V v728 = 1.0 / v721;
-        const V v729 = v721 * v721;
-        const V v730 = 1.0 / v722;
-        const V v731 = v722 * v722;
-        const V v732 = 1.0 / v723;
-        const V v733 = v723 * v723;
-        const V v734 = 1.0 / v727;
-        const V v735 = 1.0 / v724;
-        const V v736 = v724 * v724;
-        const V v737 = 1.0 / v729;
-        const V v738 = 1.0 / v731;
-        const V v739 = 1.0 / v725;
-        const V v740 = v725 * v725;
-        const V v741 = 1.0 / v733;
-        const V v742 = 1.0 / v736;
-        const V v743 = 1.0 / v740;
-        const V v744 = v726 * v726;
-        const V v745 = v710 * v744;
-        const V v746 = v728 * v728;
-        const V v747 = v655 * v726;
-        const V v748 = 0.1803807865240693 * v726;
-        const V v749 = v656 * v728;
-        const V v750 = 0.23395696728634552 * v728;
-        const V v751 = v730 * v730;
-        const V v752 = v654 * v730;
-        const V v753 = 0.08566224618958518 * v730;
-        const V v754 = v712 * v746;
-        const V v755 = v708 * v751;
-        const V v756 = v732 * v732;
-        const V v757 = v659 * v732;
-        const V v758 = 0.08566224618958518 * v732;
-        const V v759 = v709 * v756;
-        const V v760 = v735 * v735;
-        const V v761 = v657 * v735;
-        const V v762 = 0.23395696728634552 * v735;
-        const V v763 = v713 * v760;
-        const V v764 = v714 * v745;
-        const V v765 = v715 * v754;
-        const V v766 = v716 * v755;
-        const V v767 = v739 * v739;
-        const V v768 = v658 * v739;
-        const V v769 = 0.1803807865240693 * v739;
-        const V v770 = v717 * v759;
-        const V v771 = v711 * v767;
-        const V v772 = v718 * v763;
-        const V v773 = v660 * v738;
-        const V v774 = 1.0 + v773;
-        const V v775 = v662 * v734;
-        const V v776 = 1.0 + v775;
-        const V v777 = v47 * v764;
-        const V v778 = v47 * v765;
-        const V v779 = v47 * v766;
-        const V v780 = v47 * v770;
-        const V v781 = softehl_vlog(v774);
-        const V v782 = v719 * v771;
-        const V v783 = softehl_vlog(v776);
-        const V v784 = v47 * v772;
-        const V v785 = v687 * v777;
-        const V v786 = v685 * v778;
-        const V v787 = v47 * v782;
-        const V v788 = v689 * v779;
-        const V v789 = v688 * v780;
-        const V v790 = v684 * v784;
-        const V v791 = v664 * v737;
-        const V v792 = 1.0 + v791;
-        const V v793 = v670 * v789;
-        const V v794 = v758 - v793;
-        const V v795 = v663 * v785;
-        const V v796 = v748 - v795;
-        const V v797 = v665 * v786;
-        const V v798 = v750 - v797;
-        const V v799 = softehl_vlog(v792);
-        const V v800 = v672 * v790;
-        const V v801 = v762 - v800;
-        const V v802 = v686 * v787;
-        const V v803 = v661 * v788;
-        const V v804 = v753 - v803;
-        const V v805 = v671 * v742;
-        const V v806 = 1.0 + v805;
-        const V v807 = v676 * v802;
-        const V v808 = v769 - v807;
-        const V v809 = softehl_vlog(v806);
-        const V v810 = v675 * v743;
-        const V v811 = 1.0 + v810;
-        const V v812 = v669 * v741;
-        const V v813 = 1.0 + v812;
-        const V v814 = softehl_vlog(v811);
-        const V v815 = softehl_vlog(v813);
-        const V v816 = 2.0 * v660;
-        const V v817 = 2.0 * v662;
-        const V v818 = 2.0 * v664;
-        const V v819 = 2.0 * v671;
-        const V v820 = 2.0 * v675;
-        const V v821 = v816 * v722;
-        const V v822 = v817 * v720;
-        const V v823 = v818 * v721;
-        const V v824 = 2.0 * v669;
-        const V v825 = v819 * v724;
-        const V v826 = v820 * v725;
-        const V v827 = v654 * v751;
-        const V v828 = v655 * v744;
-        const V v829 = v824 * v723;
-        const V v830 = v656 * v746;
-        const V v831 = v657 * v760;
-        const V v832 = v738 * v821;
-        const V v833 = v734 * v822;
-        const V v834 = v737 * v823;
-        const V v835 = v742 * v825;
-        const V v836 = v743 * v826;
-        const V v837 = v738 * v832;
-        const V v838 = v734 * v833;
-        const V v839 = v737 * v834;
-        const V v840 = v742 * v835;
-        const V v841 = v743 * v836;
-        const V v842 = v658 * v767;
-        const V v843 = v741 * v829;
-        const V v844 = v659 * v756;
-        const V v845 = 1.0 / v774;
-        const V v846 = 1.0 / v776;
-        const V v847 = v741 * v843;
-        const V v848 = 1.0 / v792;
-        const V v849 = 1.0 / v806;
-        const V v850 = 1.0 / v811;
-        const V v851 = 1.0 / v813;
-        const V v852 = v34 * v781;
-        const V v853 = v34 * v783;
-        const V v854 = v34 * v799;
-        const V v855 = v34 * v809;
-        const V v856 = softehl_vexp(v852);
-        const V v857 = softehl_vexp(v853);
-        const V v858 = v34 * v814;
-        const V v859 = softehl_vexp(v854);
-        const V v860 = softehl_vexp(v855);
-        const V v861 = v34 * v815;
-        const V v862 = softehl_vexp(v858);
-        const V v863 = softehl_vexp(v861);
-        const V v864 = v1 * v856;
-        const V v865 = v1 * v857;
-        const V v866 = v1 * v859;
-        const V v867 = v1 * v860;
-        const V v868 = v1 * v862;
-        const V v869 = v1 * v863;
-        const V v870 = parameters[8] + v864;
-        const V v871 = v752 * v864;
-        const V v872 = v34 * v871;
-        const V v873 = v872 * v845;
-        const V v874 = parameters[8] + v865;
-        const V v875 = v747 * v865;
-        const V v876 = v34 * v875;
-        const V v877 = v876 * v846;
-        const V v878 = parameters[8] + v866;
-        const V v879 = v749 * v866;
-        const V v880 = v34 * v879;
-        const V v881 = v880 * v848;
-        const V v882 = parameters[8] + v867;
-        const V v883 = v761 * v867;
-        const V v884 = v34 * v883;
-        const V v885 = v884 * v849;
-        const V v886 = parameters[8] + v868;
-        const V v887 = v768 * v868;
-        const V v888 = v34 * v887;
-        const V v889 = v888 * v850;
-        const V v890 = parameters[8] + v869;
-        const V v891 = v757 * v869;
-        const V v892 = v34 * v891;
-        const V v893 = v892 * v851;
-        const V v894 = v738 * v873;
-        const V v895 = v837 * v873;
-        const V v896 = v827 * v870;
-        const V v897 = v895 + v896;
-        const V v898 = v716 * v897;
-        const V v899 = v707 * v898;
-        const V v900 = v894 - v899;
-        const V v901 = v730 * v870;
-        const V v902 = v661 * v900;
-        const V v903 = v901 + v902;
-        const V v904 = v734 * v877;
-        const V v905 = v838 * v877;
-        const V v906 = v828 * v874;
-        const V v907 = v905 + v906;
-        const V v908 = v714 * v907;
-        const V v909 = v705 * v908;
-        const V v910 = v904 - v909;
-        const V v911 = v726 * v874;
-        const V v912 = v663 * v910;
-        const V v913 = v911 + v912;
-        const V v914 = v737 * v881;
-        const V v915 = v839 * v881;
-        const V v916 = v830 * v878;
-        const V v917 = v915 + v916;
-        const V v918 = v715 * v917;
-        const V v919 = v703 * v918;
-        const V v920 = v914 - v919;
-        const V v921 = v728 * v878;
-        const V v922 = v665 * v920;
-        const V v923 = v921 + v922;
-        const V v924 = v742 * v885;
-        const V v925 = v840 * v885;
-        const V v926 = v831 * v882;
-        const V v927 = v925 + v926;
-        const V v928 = v718 * v927;
-        const V v929 = v702 * v928;
-        const V v930 = v924 - v929;
-        const V v931 = v735 * v882;
-        const V v932 = v672 * v930;
-        const V v933 = v931 + v932;
-        const V v934 = v743 * v889;
-        const V v935 = v841 * v889;
-        const V v936 = v842 * v886;
-        const V v937 = v935 + v936;
-        const V v938 = v719 * v937;
-        const V v939 = v704 * v938;
-        const V v940 = v934 - v939;
-        const V v941 = v739 * v886;
-        const V v942 = v676 * v940;
-        const V v943 = v941 + v942;
-        const V v944 = v741 * v893;
-        const V v945 = v847 * v893;
-        const V v946 = v844 * v890;
-        const V v947 = v945 + v946;
-        const V v948 = v717 * v947;
-        const V v949 = v706 * v948;
-        const V v950 = v944 - v949;
-        const V v951 = v732 * v890;
-        const V v952 = v670 * v950;
-        const V v953 = v951 + v952;
-        V v954[49];
-        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v804, v796, v798, v801, v808, v794, softehl_splat((-1.0)), v903, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v913, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v923, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v933, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v943, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v953}, v954, &failed);
-        const V v955 = v607 * v609;
-        const V v956 = v615 * v615;
-        const V v957 = 1.0 / v956;
-        const V v958 = v955 * v957;
-        const V v959 = v596 * v25;
-        const V v960 = v598 * v25;
-        const V v961 = v597 * v26;
-        const V v962 = v959 + v961;
-        const V v963 = v599 * v26;
-        const V v964 = v960 + v963;
-        const V v965 = v609 * v962;
-        const V v966 = v962 + v964;
-        const V v967 = v607 * v964;
-        const V v968 = v965 + v967;
-        const V v969 = 0.5 * v966;
-        const V v970 = v613 * v969;
-        const V v971 = v958 * v970;
-        const V v972 = v968 - v971;
-        const V v973 = v957 * v972;
-        const V v974 = 0.1192694691878821 * v655;
-        const V v975 = 0.05582662111236089 * v656;
-        const V v976 = 0.07987743308995329 * v654;
-        const V v977 = 0.07987743308995329 * v659;
-        const V v978 = 0.05582662111236089 * v657;
-        const V v979 = 0.1192694691878821 * v658;
-        const V v980 = v663 * v705;
-        const V v981 = v665 * v703;
-        const V v982 = v661 * v707;
-        const V v983 = v670 * v706;
-        const V v984 = v672 * v702;
-        const V v985 = v676 * v704;
-        const V v986 = v974 * v744;
-        const V v987 = v975 * v746;
-        const V v988 = v976 * v751;
-        const V v989 = v977 * v756;
-        const V v990 = v978 * v760;
-        const V v991 = v781 * v871;
-        const V v992 = v783 * v875;
-        const V v993 = v799 * v879;
-        const V v994 = v809 * v883;
-        const V v995 = v814 * v887;
-        const V v996 = v815 * v891;
-        const V v997 = v615 * t12;
-        const V v998 = v978 * v735;
-        const V v999 = 1.0 - v694;
-        const V v1000 = 1.0 - v695;
-        const V v1001 = p2 * v8;
-        const V v1002 = t8 + v1001;
-        const V v1003 = 1.0 - v697;
-        const V v1004 = 1.0 - v698;
-        const V v1005 = v595 * v1002;
-        const V v1006 = parameters[6] * v969;
-        const V v1007 = v1006 + v997;
-        const V v1008 = v594 * v969;
-        const V v1009 = 1.0 - v700;
-        const V v1010 = 1.0 - v701;
-        const V v1011 = 1.0 / v624;
-        const V v1012 = v624 * v437;
-        const V v1013 = v625 * v58;
-        const V v1014 = v1008 - v1013;
-        const V v1015 = v631 * v1007;
-        const V v1016 = v1012 - v1015;
-        const V v1017 = v36 * v1014;
-        const V v1018 = v958 * v958;
-        const V v1019 = 2.0 * v958;
-        const V v1020 = v81 * v1005;
-        const V v1021 = v1020 + v1016;
-        const V v1022 = v979 * v767;
-        const V v1023 = v627 * v1021;
-        const V v1024 = v677 * v898;
-        const V v1025 = v677 * v766;
-        const V v1026 = v59 * v677;
-        const V v1027 = v678 * v908;
-        const V v1028 = v59 * v678;
-        const V v1029 = v678 * v764;
-        const V v1030 = v1029 + v1025;
-        const V v1031 = 0.932469514203152 * v1017;
-        const V v1032 = 0.6612093864662645 * v1017;
-        const V v1033 = 0.2386191860831969 * v1017;
-        const V v1034 = v679 * v918;
-        const V v1035 = v59 * v679;
-        const V v1036 = v679 * v765;
-        const V v1037 = v1036 + v1030;
-        const V v1038 = v682 * v928;
-        const V v1039 = v59 * v682;
-        const V v1040 = v682 * v772;
-        const V v1041 = v1040 + v1037;
-        const V v1042 = v683 * v938;
-        const V v1043 = v59 * v683;
-        const V v1044 = v683 * v782;
-        const V v1045 = v1044 + v1041;
-        const V v1046 = v681 * v948;
-        const V v1047 = v59 * v681;
-        const V v1048 = v681 * v770;
-        const V v1049 = v1048 + v1045;
-        const V v1050 = v954[7];
-        const V v1051 = v954[8];
-        const V v1052 = v954[9];
-        const V v1053 = v954[10];
-        const V v1054 = v954[11];
-        const V v1055 = v954[12];
-        const V v1056 = v954[13];
-        const V v1057 = v954[14];
-        const V v1058 = v954[15];
-        const V v1059 = v954[16];
-        const V v1060 = v954[17];
-        const V v1061 = v954[18];
-        const V v1062 = v954[19];
-        const V v1063 = v954[20];
-        const V v1064 = v954[21];
-        const V v1065 = v954[22];
-        const V v1066 = v954[23];
-        const V v1067 = v954[24];
-        const V v1068 = v954[25];
-        const V v1069 = v954[26];
-        const V v1070 = v954[27];
-        const V v1071 = v954[28];
-        const V v1072 = v954[29];
-        const V v1073 = v954[30];
-        const V v1074 = v954[31];
-        const V v1075 = v954[32];
-        const V v1076 = v954[33];
-        const V v1077 = v954[34];
-        const V v1078 = v954[35];
-        const V v1079 = v954[36];
-        const V v1080 = v954[37];
-        const V v1081 = v954[38];
-        const V v1082 = v954[39];
-        const V v1083 = v954[40];
-        const V v1084 = v954[41];
-        const V v1085 = v954[42];
-        const V v1086 = v954[43];
-        const V v1087 = v954[44];
-        const V v1088 = v954[45];
-        const V v1089 = v954[46];
-        const V v1090 = v954[47];
-        const V v1091 = v954[48];
-        const V v1092 = v28 * v970;
-        const V v1093 = v28 * v956;
-        const V v1094 = v956 * v44;
-        const V v1095 = v1092 + v1094;
-        const V v1096 = v1086 - v1091;
-        const V v1097 = v1081 - v1082;
-        const V v1098 = v1080 - v1083;
-        const V v1099 = v1093 * v1019;
-        const V v1100 = v1093 * v1018;
-        const V v1101 = v1018 * v1095;
-        const V v1102 = v1088 - v1089;
-        const V v1103 = v1099 * v973;
-        const V v1104 = v1101 + v1103;
-        const V v1105 = v1087 - v1090;
-        const V v1106 = v1033 * v1097;
-        const V v1107 = v1031 * v1096;
-        const V v1108 = t14 * v999;
-        const V v1109 = t14 * v1000;
-        const V v1110 = t14 * v1003;
-        const V v1111 = t14 * v1004;
-        const V v1112 = v1033 * v1102;
-        const V v1113 = v1107 + v1112;
-        const V v1114 = t14 * v1009;
-        const V v1115 = v700 * v763;
-        const V v1116 = v763 - v1115;
-        const V v1117 = t14 * v1010;
-        const V v1118 = v752 * v856;
-        const V v1119 = v1118 - v752;
-        const V v1120 = v1032 * v1105;
-        const V v1121 = v1120 + v1113;
-        const V v1122 = v1032 * v1098;
-        const V v1123 = v1122 + v1106;
-        const V v1124 = v747 * v857;
-        const V v1125 = v1124 - v747;
-        const V v1126 = v754 + v1116;
-        const V v1127 = v749 * v859;
-        const V v1128 = v1127 - v749;
-        const V v1129 = v897 + v1119;
-        const V v1130 = v695 * v754;
-        const V v1131 = v1126 - v1130;
-        const V v1132 = v761 * v860;
-        const V v1133 = v1132 - v761;
-        const V v1134 = v697 * v897;
-        const V v1135 = v1129 - v1134;
-        const V v1136 = v695 * v917;
-        const V v1137 = v1128 - v1136;
-        const V v1138 = v917 + v1137;
-        const V v1139 = v697 * v755;
-        const V v1140 = v1131 - v1139;
-        const V v1141 = v700 * v927;
-        const V v1142 = v1133 - v1141;
-        const V v1143 = v927 + v1142;
-        const V v1144 = v755 + v1140;
-        const V v1145 = v907 + v1125;
-        const V v1146 = v768 * v862;
-        const V v1147 = v1146 - v768;
-        const V v1148 = v694 * v907;
-        const V v1149 = v1145 - v1148;
-        const V v1150 = v694 * v745;
-        const V v1151 = v1144 - v1150;
-        const V v1152 = v745 + v1151;
-        const V v1153 = v757 * v863;
-        const V v1154 = v1153 - v757;
-        const V v1155 = v1051 * v1135;
-        const V v1156 = v937 + v1147;
-        const V v1157 = v771 + v1152;
-        const V v1158 = v701 * v937;
-        const V v1159 = v1156 - v1158;
-        const V v1160 = v701 * v771;
-        const V v1161 = v1157 - v1160;
-        const V v1162 = v1051 - v1056;
-        const V v1163 = v1052 * v1149;
-        const V v1164 = v1155 + v1163;
-        const V v1165 = v947 + v1154;
-        const V v1166 = v1052 - v1055;
-        const V v1167 = v698 * v947;
-        const V v1168 = v1165 - v1167;
-        const V v1169 = v698 * v759;
-        const V v1170 = v1161 - v1169;
-        const V v1171 = v759 + v1170;
-        const V v1172 = v1055 * v1159;
-        const V v1173 = v1164 + v1172;
-        const V v1174 = v1031 * v1162;
-        const V v1175 = v1058 * v1135;
-        const V v1176 = v1065 * v1135;
-        const V v1177 = v1053 - v1054;
-        const V v1178 = v1058 - v1063;
-        const V v1179 = v1059 - v1062;
-        const V v1180 = v1060 - v1061;
-        const V v1181 = v1065 - v1070;
-        const V v1182 = v1031 * v1178;
-        const V v1183 = v1031 * v1181;
-        const V v1184 = v1066 - v1069;
-        const V v1185 = v1067 - v1068;
-        const V v1186 = v1072 - v1077;
-        const V v1187 = v1073 - v1076;
-        const V v1188 = v1031 * v1186;
-        const V v1189 = v1032 * v1184;
-        const V v1190 = v1183 + v1189;
-        const V v1191 = v1032 * v1179;
-        const V v1192 = v1182 + v1191;
-        const V v1193 = v1074 - v1075;
-        const V v1194 = v994 * v1068;
-        const V v1195 = v994 * v1075;
-        const V v1196 = v994 * v1054;
-        const V v1197 = v1032 * v1187;
-        const V v1198 = v1188 + v1197;
-        const V v1199 = v1032 * v1166;
-        const V v1200 = v1174 + v1199;
-        const V v1201 = v1038 * v1054;
-        const V v1202 = v1038 * v1068;
-        const V v1203 = v1038 * v1075;
-        const V v1204 = v1075 * v1143;
-        const V v1205 = v1054 * v1143;
-        const V v1206 = v1173 + v1205;
-        const V v1207 = v1033 * v1193;
-        const V v1208 = v1207 + v1198;
-        const V v1209 = v1033 * v1177;
-        const V v1210 = v1209 + v1200;
-        const V v1211 = v1068 * v1143;
-        const V v1212 = v1176 + v1211;
-        const V v1213 = v994 * v1061;
-        const V v1214 = v1038 * v1061;
-        const V v1215 = v1061 * v1143;
-        const V v1216 = v1175 + v1215;
-        const V v1217 = v994 * v1082;
-        const V v1218 = v1038 * v1082;
-        const V v1219 = v1082 * v1143;
-        const V v1220 = v994 * v1089;
-        const V v1221 = v1038 * v1089;
-        const V v1222 = v1089 * v1143;
-        const V v1223 = v1011 * v1005;
-        const V v1224 = v1033 * v1180;
-        const V v1225 = v1224 + v1192;
-        const V v1226 = v1033 * v1185;
-        const V v1227 = v1226 + v1190;
-        const V v1228 = v1079 - v1084;
-        const V v1229 = v996 * v1084;
-        const V v1230 = v1217 + v1229;
-        const V v1231 = v996 * v1063;
-        const V v1232 = v1213 + v1231;
-        const V v1233 = v1046 * v1084;
-        const V v1234 = v1218 + v1233;
-        const V v1235 = v1084 * v1168;
-        const V v1236 = v1219 + v1235;
-        const V v1237 = v996 * v1091;
-        const V v1238 = v1220 + v1237;
-        const V v1239 = v1091 * v1168;
-        const V v1240 = v1222 + v1239;
-        const V v1241 = v1046 * v1091;
-        const V v1242 = v1221 + v1241;
-        const V v1243 = v1031 * v1228;
-        const V v1244 = v1243 + v1123;
-        const V v1245 = v1046 * v1063;
-        const V v1246 = v1214 + v1245;
-        const V v1247 = v1063 * v1168;
-        const V v1248 = v1216 + v1247;
-        const V v1249 = v991 * v1058;
-        const V v1250 = v1249 + v1232;
-        const V v1251 = v991 * v1079;
-        const V v1252 = v1251 + v1230;
-        const V v1253 = v1024 * v1079;
-        const V v1254 = v1253 + v1234;
-        const V v1255 = v1024 * v1058;
-        const V v1256 = v1255 + v1246;
-        const V v1257 = v991 * v1086;
-        const V v1258 = v1257 + v1238;
-        const V v1259 = v1024 * v1086;
-        const V v1260 = v1259 + v1242;
-        const V v1261 = v1086 * v1135;
-        const V v1262 = v1240 + v1261;
-        const V v1263 = v1079 * v1135;
-        const V v1264 = v1236 + v1263;
-        const V v1265 = v1072 * v1135;
-        const V v1266 = v1204 + v1265;
-        const V v1267 = v991 * v1072;
-        const V v1268 = v1267 + v1195;
-        const V v1269 = v1024 * v1072;
-        const V v1270 = v1269 + v1203;
-        const V v1271 = v992 * v1059;
-        const V v1272 = v1271 + v1250;
-        const V v1273 = v1027 * v1059;
-        const V v1274 = v1273 + v1256;
-        const V v1275 = v992 * v1080;
-        const V v1276 = v1275 + v1252;
-        const V v1277 = v992 * v1087;
-        const V v1278 = v1277 + v1258;
-        const V v1279 = v1080 * v1149;
-        const V v1280 = v1264 + v1279;
-        const V v1281 = v1027 * v1080;
-        const V v1282 = v1281 + v1254;
-        const V v1283 = v1059 * v1149;
-        const V v1284 = v1248 + v1283;
-        const V v1285 = v992 * v1073;
-        const V v1286 = v1285 + v1268;
-        const V v1287 = v1027 * v1073;
-        const V v1288 = v1287 + v1270;
-        const V v1289 = v1073 * v1149;
-        const V v1290 = v1266 + v1289;
-        const V v1291 = v1027 * v1087;
-        const V v1292 = v1291 + v1260;
-        const V v1293 = v1087 * v1149;
-        const V v1294 = v1262 + v1293;
-        const V v1295 = v1066 * v1149;
-        const V v1296 = v1212 + v1295;
-        const V v1297 = v992 * v1066;
-        const V v1298 = v1297 + v1194;
-        const V v1299 = v1027 * v1066;
-        const V v1300 = v1299 + v1202;
-        const V v1301 = v992 * v1052;
-        const V v1302 = v1301 + v1196;
-        const V v1303 = v1027 * v1052;
-        const V v1304 = v1303 + v1201;
-        const V v1305 = v993 * v1074;
-        const V v1306 = v1305 + v1286;
-        const V v1307 = v1034 * v1074;
-        const V v1308 = v1307 + v1288;
-        const V v1309 = v1074 * v1138;
-        const V v1310 = v1290 + v1309;
-        const V v1311 = v1034 * v1081;
-        const V v1312 = v1311 + v1282;
-        const V v1313 = v993 * v1067;
-        const V v1314 = v1313 + v1298;
-        const V v1315 = v1034 * v1067;
-        const V v1316 = v1315 + v1300;
-        const V v1317 = v1067 * v1138;
-        const V v1318 = v1296 + v1317;
-        const V v1319 = v993 * v1053;
-        const V v1320 = v1319 + v1302;
-        const V v1321 = v1034 * v1053;
-        const V v1322 = v1321 + v1304;
-        const V v1323 = v1053 * v1138;
-        const V v1324 = v1206 + v1323;
-        const V v1325 = v1034 * v1088;
-        const V v1326 = v1325 + v1292;
-        const V v1327 = v1034 * v1060;
-        const V v1328 = v1327 + v1274;
-        const V v1329 = v993 * v1060;
-        const V v1330 = v1329 + v1272;
-        const V v1331 = v1060 * v1138;
-        const V v1332 = v1284 + v1331;
-        const V v1333 = v993 * v1081;
-        const V v1334 = v1333 + v1276;
-        const V v1335 = v993 * v1088;
-        const V v1336 = v1335 + v1278;
-        const V v1337 = v1081 * v1138;
-        const V v1338 = v1280 + v1337;
-        const V v1339 = v1088 * v1138;
-        const V v1340 = v1294 + v1339;
-        const V v1341 = v991 * v1051;
-        const V v1342 = v1341 + v1320;
-        const V v1343 = v1024 * v1051;
-        const V v1344 = v1343 + v1322;
-        const V v1345 = v1024 * v1065;
-        const V v1346 = v1345 + v1316;
-        const V v1347 = v991 * v1065;
-        const V v1348 = v1347 + v1314;
-        const V v1349 = v995 * v1062;
-        const V v1350 = v1349 + v1330;
-        const V v1351 = v995 * v1083;
-        const V v1352 = v1351 + v1334;
-        const V v1353 = v995 * v1090;
-        const V v1354 = v1353 + v1336;
-        const V v1355 = v1042 * v1062;
-        const V v1356 = v1355 + v1328;
-        const V v1357 = v1062 * v1159;
-        const V v1358 = v1332 + v1357;
-        const V v1359 = v1083 * v1159;
-        const V v1360 = v1338 + v1359;
-        const V v1361 = v1090 * v1159;
-        const V v1362 = v1340 + v1361;
-        const V v1363 = v1042 * v1083;
-        const V v1364 = v1363 + v1312;
-        const V v1365 = v1042 * v1090;
-        const V v1366 = v1365 + v1326;
-        const V v1367 = v995 * v1055;
-        const V v1368 = v1367 + v1342;
-        const V v1369 = v1042 * v1055;
-        const V v1370 = v1369 + v1344;
-        const V v1371 = v995 * v1069;
-        const V v1372 = v1371 + v1348;
-        const V v1373 = v1057 * v1049;
-        const V v1374 = v1356 + v1373;
-        const V v1375 = v1057 * v1171;
-        const V v1376 = v1358 + v1375;
-        const V v1377 = v1078 * v1171;
-        const V v1378 = v1360 + v1377;
-        const V v1379 = v1078 * v1049;
-        const V v1380 = v1364 + v1379;
-        const V v1381 = v1085 * v1049;
-        const V v1382 = v1366 + v1381;
-        const V v1383 = v1085 * v1171;
-        const V v1384 = v1362 + v1383;
-        const V v1385 = v1050 * v1049;
-        const V v1386 = v1370 + v1385;
-        const V v1387 = v996 * v1070;
-        const V v1388 = v1387 + v1372;
-        const V v1389 = v1057 * v1023;
-        const V v1390 = v1225 + v1389;
-        const V v1391 = v1078 * v1023;
-        const V v1392 = v1244 + v1391;
-        const V v1393 = v1085 * v1023;
-        const V v1394 = v1121 + v1393;
-        const V v1395 = v1050 * v1023;
-        const V v1396 = v1210 + v1395;
-        const V v1397 = v1050 * v1171;
-        const V v1398 = v1324 + v1397;
-        const V v1399 = t14 * v1378;
-        const V v1400 = v1392 + v1399;
-        const V v1401 = t14 * v1384;
-        const V v1402 = v1394 + v1401;
-        const V v1403 = t14 * v1376;
-        const V v1404 = v1390 + v1403;
-        const V v1405 = v1046 * v1056;
-        const V v1406 = v1405 + v1386;
-        const V v1407 = v996 * v1056;
-        const V v1408 = v1407 + v1368;
-        const V v1409 = v1056 * v1168;
-        const V v1410 = v1398 + v1409;
-        const V v1411 = t14 * v1410;
-        const V v1412 = v1396 + v1411;
-        const V v1413 = v1046 * v1070;
-        const V v1414 = v1413 + v1346;
-        const V v1415 = v1070 * v1168;
-        const V v1416 = v1318 + v1415;
-        const V v1417 = v51 * v1352;
-        const V v1418 = v1400 - v1417;
-        const V v1419 = v51 * v1350;
-        const V v1420 = v1404 - v1419;
-        const V v1421 = v51 * v1354;
-        const V v1422 = v1402 - v1421;
-        const V v1423 = v996 * v1077;
-        const V v1424 = v1423 + v1306;
-        const V v1425 = v1046 * v1077;
-        const V v1426 = v1425 + v1308;
-        const V v1427 = v1077 * v1168;
-        const V v1428 = v1310 + v1427;
-        const V v1429 = v51 * v1408;
-        const V v1430 = v1412 - v1429;
-        const V v1431 = v59 * v1380;
-        const V v1432 = v1418 + v1431;
-        const V v1433 = v59 * v1374;
-        const V v1434 = v1420 + v1433;
-        const V v1435 = v59 * v1382;
-        const V v1436 = v1422 + v1435;
-        const V v1437 = v59 * v1406;
-        const V v1438 = v1430 + v1437;
-        const V v1439 = v995 * v1076;
-        const V v1440 = v1439 + v1424;
-        const V v1441 = v1042 * v1076;
-        const V v1442 = v1441 + v1426;
-        const V v1443 = v1042 * v1069;
-        const V v1444 = v1443 + v1414;
-        const V v1445 = v1069 * v1159;
-        const V v1446 = v1416 + v1445;
-        const V v1447 = v1076 * v1159;
-        const V v1448 = v1428 + v1447;
-        const V v1449 = v980 * v1434;
-        const V v1450 = v1028 + v1449;
-        const V v1451 = v983 * v1436;
-        const V v1452 = v1047 + v1451;
-        const V v1453 = v732 * v1436;
-        const V v1454 = v977 * v732;
-        const V v1455 = v1454 + v998;
-        const V v1456 = v51 * v1440;
-        const V v1457 = v1208 - v1456;
-        const V v1458 = v51 * v1388;
-        const V v1459 = v1227 - v1458;
-        const V v1460 = v714 * v1450;
-        const V v1461 = v1108 + v1460;
-        const V v1462 = v717 * v1452;
-        const V v1463 = v1111 + v1462;
-        const V v1464 = v982 * v1438;
-        const V v1465 = v1026 + v1464;
-        const V v1466 = v730 * v1438;
-        const V v1467 = v1453 - v1466;
-        const V v1468 = v976 * v730;
-        const V v1469 = v1455 - v1468;
-        const V v1470 = v986 * v1461;
-        const V v1471 = v985 * v1432;
-        const V v1472 = v1043 + v1471;
-        const V v1473 = v739 * v1432;
-        const V v1474 = v979 * v739;
-        const V v1475 = v1474 + v1469;
-        const V v1476 = v716 * v1465;
-        const V v1477 = v1110 + v1476;
-        const V v1478 = v726 * v1434;
-        const V v1479 = v1473 - v1478;
-        const V v1480 = v974 * v726;
-        const V v1481 = v1475 - v1480;
-        const V v1482 = v719 * v1472;
-        const V v1483 = v1117 + v1482;
-        const V v1484 = v988 * v1477;
-        const V v1485 = v1470 + v1484;
-        const V v1486 = v1064 * v1049;
-        const V v1487 = v1444 + v1486;
-        const V v1488 = v1071 * v1049;
-        const V v1489 = v1442 + v1488;
-        const V v1490 = v1064 * v1171;
-        const V v1491 = v1446 + v1490;
-        const V v1492 = v1071 * v1171;
-        const V v1493 = v1448 + v1492;
-        const V v1494 = v1064 * v1023;
-        const V v1495 = v1459 + v1494;
-        const V v1496 = v1071 * v1023;
-        const V v1497 = v1457 + v1496;
-        const V v1498 = v975 * v728;
-        const V v1499 = v1481 - v1498;
-        const V v1500 = v989 * v1463;
-        const V v1501 = v1485 - v1500;
-        const V v1502 = t14 * v1491;
-        const V v1503 = v1495 + v1502;
-        const V v1504 = t14 * v1493;
-        const V v1505 = v1497 + v1504;
-        const V v1506 = v1022 * v1483;
-        const V v1507 = v1501 - v1506;
-        const V v1508 = v1104 * v1499;
-        const V v1509 = 0.1192694691878821 * v1479;
-        const V v1510 = v1507 + v1509;
-        const V v1511 = v59 * v1487;
-        const V v1512 = v1503 + v1511;
-        const V v1513 = v59 * v1489;
-        const V v1514 = v1505 + v1513;
-        const V v1515 = 0.07987743308995329 * v1467;
-        const V v1516 = v1510 + v1515;
-        const V v1517 = v1223 * v1499;
-        const V v1518 = v1516 - v1517;
-        const V v1519 = v735 * v1514;
-        const V v1520 = v984 * v1514;
-        const V v1521 = v1039 + v1520;
-        const V v1522 = v981 * v1512;
-        const V v1523 = v1035 + v1522;
-        const V v1524 = v728 * v1512;
-        const V v1525 = v1519 - v1524;
-        const V v1526 = 0.05582662111236089 * v1525;
-        const V v1527 = v1518 + v1526;
-        const V v1528 = v715 * v1523;
-        const V v1529 = v1109 + v1528;
-        const V v1530 = v718 * v1521;
-        const V v1531 = v1114 + v1530;
-        const V v1532 = v987 * v1529;
-        const V v1533 = v1527 + v1532;
-        const V v1534 = v990 * v1531;
-        const V v1535 = v1533 - v1534;
-        const V v1536 = v1100 * v1535;
-        const V v1537 = v1508 + v1536;
-        const V v1538 = v1011 * v1537;
-        const M v1539 = softehl_lt(softehl_splat(0.0), v81);
-        V v1540 = softehl_splat(0.0);
-        V v1541 = softehl_splat(0.0);
-        V v1542 = softehl_splat(0.0);
-        V v1543 = softehl_splat(0.0);
-        const M m1544 = v1539;
-        if (softehl_any(m1544)) {
-            const V v1545 = v426 * v437;
-            v1540 = softehl_blend(m1544, v1545, v1540);
-            v1541 = softehl_blend(m1544, softehl_splat(0.0), v1541);
-            v1542 = softehl_blend(m1544, v81, v1542);
-            v1543 = softehl_blend(m1544, softehl_splat(0.0), v1543);
+        const double v265 = 0.5 * w[1], v266 = 0.5 * w[2];
+        const V v267 = 0.5 * p3, v268 = softehl_vexp(p2 * parameters[3]);
+        const double v269 = 0.5 - v265, v270 = 0.5 + v265, v271 = 0.5 - v266, v272 = 0.5 + v266;
+        const V v273 = v269 * v3 + v270 * v4, v274 = v271 * v3 + v272 * v4,
+            v275 = v231 * v259 + (v230 * v260 - v49), v276 = v273 + v274, v277 = 0.5 * v276,
+            v278 = parameters[2] * v268, v279 = v267 * v277, v280 = 1.0 / (parameters[6] * v277),
+            v281 = v53 * (p0 * v22 - v34 * v275 - v32 * (v258 + (v228 - v229 + v257))),
+            v282 = v280 * (v278 * v44), v283 = v21 * v279, v284 = softehl_vlog(1.0 + v282 * v282),
+            v285 = w[3] * (v54 * (p0 * v13 - v32 * v275) + v281), v286 = softehl_vexp(v20 * v284),
+            v287 = v282 * (parameters[8] + v1 * v286), v288 = 0.932469514203152 * v283,
+            v289 = 0.6612093864662645 * v283, v290 = 0.2386191860831969 * v283, v291 = v41 * v285;
+        s37 += v291; const V v292 = v42 * v285; s38 += v292;
+        const V v293 = v287 + v288, v294 = v287 + v289, v295 = v287 + v290, v296 = v287 - v290,
+            v297 = v287 - v289, v298 = v287 - v288;
+        V v299[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v282, softehl_splat(v20), softehl_splat(v1), softehl_splat(v25), v288, v289, v290, v287, v293, v294, v295, v296, v297, v298}, v299, &failed);
+        const V v300 = v299[1], v301 = v299[2], v302 = v299[3], v303 = v299[4], v304 = v299[5],
+            v305 = v299[6], v306 = v300 * v300, v307 = 2.0 * v300, v308 = v301 * v301,
+            v309 = 2.0 * v301, v310 = v302 * v302, v311 = 2.0 * v302, v312 = 1.0 + v306,
+            v313 = 1.0 + v308, v314 = 1.0 + v310, v315 = v305 * v305, v316 = 2.0 * v305,
+            v317 = v303 * v303, v318 = 2.0 * v303, v319 = 1.0 + v315, v320 = 1.0 + v317,
+            v321 = v304 * v304, v322 = 2.0 * v304, v323 = softehl_vlog(v312),
+            v324 = softehl_vlog(v313), v325 = softehl_vlog(v314), v326 = 1.0 + v321,
+            v327 = softehl_vlog(v319), v328 = softehl_vlog(v320), v329 = softehl_vlog(v326),
+            v330 = 1.0 / v320, v331 = 1.0 / v314, v332 = 1.0 / v326, v333 = 1.0 / v313,
+            v334 = 1.0 / v319, v335 = 1.0 / v312, v336 = softehl_vexp(v25 * v324),
+            v337 = softehl_vexp(v25 * v325), v338 = softehl_vexp(v25 * v323),
+            v339 = softehl_vexp(v25 * v327), v340 = softehl_vexp(v25 * v328),
+            v341 = softehl_vexp(v25 * v329), v342 = v25 * v330, v343 = v25 * v331,
+            v344 = v25 * v332, v345 = v25 * v333, v346 = v25 * v334, v347 = v25 * v335,
+            v348 = v1 * v336, v349 = v1 * v337, v350 = v1 * v338, v351 = v1 * v339,
+            v352 = v1 * v340, v353 = v1 * v341, v354 = parameters[8] + v348,
+            v355 = parameters[8] + v349, v356 = parameters[8] + v350, v357 = parameters[8] + v351,
+            v358 = parameters[8] + v352, v359 = parameters[8] + v353, v360 = 1.0 / v354,
+            v361 = 1.0 / v355, v362 = 1.0 / v356, v363 = 1.0 / v357, v364 = 1.0 / (v354 * v354),
+            v365 = 1.0 / v358, v366 = 1.0 / (v355 * v355), v367 = 1.0 / (v356 * v356),
+            v368 = 1.0 / v359, v369 = 1.0 / (v357 * v357), v370 = 1.0 / (v358 * v358),
+            v371 = 1.0 / (v359 * v359), v372 = v360 * v360, v373 = 0.1803807865240693 * v301 * v372,
+            v374 = v361 * v361, v375 = v301 * v360, v376 = v302 * v361, v377 = v362 * v362,
+            v378 = v300 * v362, v379 = 0.23395696728634552 * v302 * v374,
+            v380 = 0.08566224618958518 * v300 * v377, v381 = v363 * v363, v382 = v305 * v363,
+            v383 = 0.08566224618958518 * v305 * v381, v384 = v365 * v365, v385 = v303 * v365,
+            v386 = 0.23395696728634552 * v303 * v384, v387 = v348 * v373, v388 = v349 * v379,
+            v389 = v350 * v380, v390 = v368 * v368, v391 = v304 * v368, v392 = v351 * v383,
+            v393 = 0.1803807865240693 * v304 * v390, v394 = v352 * v386, v395 = 1.0 + v306 * v367,
+            v396 = 1.0 + v308 * v364, v397 = softehl_vlog(v395), v398 = v353 * v393,
+            v399 = softehl_vlog(v396), v400 = 1.0 + v310 * v366,
+            v401 = 0.08566224618958518 * v363 - v316 * (v334 * (v25 * v392)),
+            v402 = 0.1803807865240693 * v360 - v309 * (v333 * (v25 * v387)),
+            v403 = 0.23395696728634552 * v361 - v311 * (v331 * (v25 * v388)),
+            v404 = softehl_vlog(v400),
+            v405 = 0.23395696728634552 * v365 - v318 * (v330 * (v25 * v394)),
+            v406 = 0.08566224618958518 * v362 - v307 * (v335 * (v25 * v389)),
+            v407 = 1.0 + v317 * v370,
+            v408 = 0.1803807865240693 * v368 - v322 * (v332 * (v25 * v398)),
+            v409 = softehl_vlog(v407), v410 = 1.0 + v321 * v371, v411 = 1.0 + v315 * v369,
+            v412 = softehl_vlog(v410), v413 = softehl_vlog(v411), v414 = softehl_vexp(v20 * v397),
+            v415 = softehl_vexp(v20 * v399), v416 = softehl_vexp(v20 * v404),
+            v417 = softehl_vexp(v20 * v409), v418 = softehl_vexp(v20 * v412),
+            v419 = softehl_vexp(v20 * v413), v420 = v1 * v414, v421 = v1 * v415, v422 = v1 * v416,
+            v423 = v1 * v417, v424 = v1 * v418, v425 = v1 * v419, v426 = parameters[8] + v420,
+            v427 = v378 * v420, v428 = v20 * v427 * (1.0 / v395), v429 = parameters[8] + v421,
+            v430 = v375 * v421, v431 = v20 * v430 * (1.0 / v396), v432 = parameters[8] + v422,
+            v433 = v376 * v422, v434 = v20 * v433 * (1.0 / v400), v435 = parameters[8] + v423,
+            v436 = v385 * v423, v437 = v20 * v436 * (1.0 / v407), v438 = parameters[8] + v424,
+            v439 = v391 * v424, v440 = v20 * v439 * (1.0 / v410), v441 = parameters[8] + v425,
+            v442 = v382 * v425, v443 = v20 * v442 * (1.0 / v411),
+            v444 = v367 * (v367 * (2.0 * v306 * v356)) * v428 + v300 * v377 * v426,
+            v445 = v350 * v444, v446 = v362 * v426 + v307 * (v367 * v428 - v347 * v445),
+            v447 = v364 * (v364 * (2.0 * v308 * v354)) * v431 + v301 * v372 * v429,
+            v448 = v348 * v447, v449 = v360 * v429 + v309 * (v364 * v431 - v345 * v448),
+            v450 = v366 * (v366 * (2.0 * v310 * v355)) * v434 + v302 * v374 * v432,
+            v451 = v349 * v450, v452 = v361 * v432 + v311 * (v366 * v434 - v343 * v451),
+            v453 = v370 * (v370 * (2.0 * v317 * v358)) * v437 + v303 * v384 * v435,
+            v454 = v352 * v453, v455 = v365 * v435 + v318 * (v370 * v437 - v342 * v454),
+            v456 = v371 * (v371 * (2.0 * v321 * v359)) * v440 + v304 * v390 * v438,
+            v457 = v353 * v456, v458 = v368 * v438 + v322 * (v371 * v440 - v344 * v457),
+            v459 = v369 * (v369 * (2.0 * v315 * v357)) * v443 + v305 * v381 * v441,
+            v460 = v351 * v459, v461 = v363 * v441 + v316 * (v369 * v443 - v346 * v460);
+        V v462[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v406, v402, v403, v405, v408, v401, softehl_splat((-1.0)), v446, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v449, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v452, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v455, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v458, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v461}, v462, &failed);
+        const V v463 = v277 * v277, v464 = 1.0 / v463, v465 = v273 * v274 * v464,
+            v466 = v269 * v14 + v270 * v15, v467 = v271 * v14 + v272 * v15,
+            v468 = 0.5 * (v466 + v467), v469 = v276 * v468,
+            v470 = v464 * (v274 * v466 + v273 * v467 - v465 * v469),
+            v471 = 0.1192694691878821 * v301, v472 = 0.05582662111236089 * v302,
+            v473 = 0.07987743308995329 * v300, v474 = 0.07987743308995329 * v305,
+            v475 = 0.05582662111236089 * v303, v476 = 0.1192694691878821 * v304, v477 = v397 * v427,
+            v478 = v399 * v430, v479 = v404 * v433, v480 = v409 * v436, v481 = v412 * v439,
+            v482 = v413 * v442, v483 = v268 * (t8 + p2 * v5), v484 = 1.0 / v278,
+            v485 = v21 * (v267 * v468 - v279 * v30), v486 = v465 * v465,
+            v487 = v44 * v483 + (v278 * v234 - v282 * (parameters[6] * v468 + v277 * t12)),
+            v488 = v280 * v487, v489 = v323 * v445, v490 = v324 * v448,
+            v491 = 0.932469514203152 * v485, v492 = 0.6612093864662645 * v485,
+            v493 = 0.2386191860831969 * v485, v494 = v325 * v451, v495 = v328 * v454,
+            v496 = v329 * v457,
+            v497 = v329 * v398 + (v328 * v394 + (v325 * v388 + (v324 * v387 + v323 * v389))),
+            v498 = v327 * v460, v499 = v327 * v392 + v497, v500 = v462[7], v501 = v462[8],
+            v502 = v462[9], v503 = v462[10], v504 = v462[11], v505 = v462[12], v506 = v462[13],
+            v507 = v462[14], v508 = v462[15], v509 = v462[16], v510 = v462[17], v511 = v462[18],
+            v512 = v462[19], v513 = v462[20], v514 = v462[21], v515 = v462[22], v516 = v462[23],
+            v517 = v462[24], v518 = v462[25], v519 = v462[26], v520 = v462[27], v521 = v462[28],
+            v522 = v462[29], v523 = v462[30], v524 = v462[31], v525 = v462[32], v526 = v462[33],
+            v527 = v462[34], v528 = v462[35], v529 = v462[36], v530 = v462[37], v531 = v462[38],
+            v532 = v462[39], v533 = v462[40], v534 = v462[41], v535 = v462[42], v536 = v462[43],
+            v537 = v462[44], v538 = v462[45], v539 = v462[46], v540 = v462[47], v541 = v462[48],
+            v542 = v17 * v463,
+            v543 = v492 * (v537 - v540) + (v491 * (v536 - v541) + v493 * (v538 - v539)),
+            v544 = v444 + (v378 * v414 - v378) - v338 * v444,
+            v545 = v450 + (v376 * v416 - v376 - v337 * v450),
+            v546 = v453 + (v385 * v417 - v385 - v340 * v453),
+            v547 = v447 + (v375 * v415 - v375) - v336 * v447,
+            v548 = v380 + (v379 + (v386 - v340 * v386) - v337 * v379 - v338 * v380) - v336 * v373,
+            v549 = v456 + (v391 * v418 - v391) - v341 * v456,
+            v550 = v459 + (v382 * v419 - v382) - v339 * v459,
+            v551 = v383 + (v393 + (v373 + v548) - v341 * v393 - v339 * v383),
+            v552 = v493 * (v524 - v525) + (v491 * (v522 - v527) + v492 * (v523 - v526)),
+            v553 = v493 * (v503 - v504) + (v491 * (v501 - v506) + v492 * (v502 - v505)),
+            v554 = v493 * (v510 - v511) + (v491 * (v508 - v513) + v492 * (v509 - v512)),
+            v555 = v493 * (v517 - v518) + (v491 * (v515 - v520) + v492 * (v516 - v519)),
+            v556 = v491 * (v529 - v534) + (v492 * (v530 - v533) + v493 * (v531 - v532)),
+            v557 = v494 * v531 + (v490 * v530 + (v489 * v529 + (v495 * v532 + v498 * v534))),
+            v558 = v501 * v544 + v502 * v547 + v505 * v549 + v504 * v546 + v503 * v545,
+            v559 = v494 * v538 + (v490 * v537 + (v489 * v536 + (v495 * v539 + v498 * v541))),
+            v560 = v494 * v510 + (v490 * v509 + (v489 * v508 + (v495 * v511 + v498 * v513))),
+            v561 = v479 * v510 + (v478 * v509 + (v477 * v508 + (v480 * v511 + v482 * v513))),
+            v562 = v508 * v544 + v511 * v546 + v513 * v550 + v509 * v547 + v510 * v545,
+            v563 = v479 * v531 + (v478 * v530 + (v477 * v529 + (v480 * v532 + v482 * v534))),
+            v564 = v479 * v538 + (v478 * v537 + (v477 * v536 + (v480 * v539 + v482 * v541))),
+            v565 = v532 * v546 + v534 * v550 + v529 * v544 + v530 * v547 + v531 * v545,
+            v566 = v539 * v546 + v541 * v550 + v536 * v544 + v537 * v547 + v538 * v545,
+            v567 = v481 * v505 + (v477 * v501 + (v479 * v503 + (v478 * v502 + v480 * v504))),
+            v568 = v496 * v505 + (v489 * v501 + (v494 * v503 + (v490 * v502 + v495 * v504))),
+            v569 = v481 * v519 + (v477 * v515 + (v479 * v517 + (v478 * v516 + v480 * v518))),
+            v570 = v498 * v520 + (v489 * v515 + (v494 * v517 + (v490 * v516 + v495 * v518))),
+            v571 = v515 * v544 + v518 * v546 + v516 * v547 + v517 * v545 + v520 * v550,
+            v572 = v556 + v528 * v488 + t14 * (v565 + v533 * v549 + v528 * v551) - v28 * (v481 * v533 + v563),
+            v573 = v554 + v507 * v488 + t14 * (v562 + v512 * v549 + v507 * v551) - v28 * (v481 * v512 + v561),
+            v574 = v543 + v535 * v488 + t14 * (v566 + v540 * v549 + v535 * v551) - v28 * (v481 * v540 + v564),
+            v575 = v482 * v527 + (v479 * v524 + (v478 * v523 + (v477 * v522 + v480 * v525))),
+            v576 = v498 * v527 + (v494 * v524 + (v490 * v523 + (v489 * v522 + v495 * v525))),
+            v577 = v525 * v546 + v522 * v544 + v523 * v547 + v524 * v545 + v527 * v550,
+            v578 = v553 + v500 * v488 + t14 * (v558 + v500 * v551 + v506 * v550) - v28 * (v482 * v506 + v567),
+            v579 = v572 + v31 * (v496 * v533 + v557 + v528 * v499),
+            v580 = v573 + v31 * (v496 * v512 + v560 + v507 * v499),
+            v581 = v574 + v31 * (v496 * v540 + v559 + v535 * v499),
+            v582 = v578 + v31 * (v498 * v506 + (v568 + v500 * v499)),
+            v583 = v471 * v372 * (t14 * (1.0 - v336) + v348 * (v31 * v324 + v309 * v345 * v580)),
+            v584 = v476 * v368 + (v474 * v363 + v475 * v365 - v473 * v362) - v471 * v360,
+            v585 = v473 * v377 * (t14 * (1.0 - v338) + v350 * (v31 * v323 + v307 * v347 * v582)),
+            v586 = v584 - v472 * v361,
+            v587 = v474 * v381 * (t14 * (1.0 - v339) + v351 * (v31 * v327 + v316 * v346 * v581)),
+            v588 = v555 - v28 * (v482 * v520 + v569) + v514 * v488 + t14 * (v571 + v519 * v549 + v514 * v551),
+            v589 = v552 - v28 * (v481 * v526 + v575) + v521 * v488 + t14 * (v577 + v526 * v549 + v521 * v551),
+            v590 = v476 * v390 * (t14 * (1.0 - v341) + v353 * (v31 * v329 + v322 * v344 * v579)),
+            v591 = (v486 * (v17 * v469 + v463 * v24) + v542 * (2.0 * v465) * v470) * v586,
+            v592 = v583 + v585 - v587 - v590 + 0.1192694691878821 * (v368 * v579 - v360 * v580),
+            v593 = v588 + v31 * (v496 * v519 + v570 + v514 * v499),
+            v594 = v589 + v31 * (v496 * v526 + v576 + v521 * v499),
+            v595 = v592 + 0.07987743308995329 * (v363 * v581 - v362 * v582) - v484 * v483 * v586,
+            v596 = v472 * v374 * (t14 * (1.0 - v337) + v349 * (v31 * v325 + v311 * v343 * v593)),
+            v597 = v475 * v384 * (t14 * (1.0 - v340) + v352 * (v31 * v328 + v318 * v342 * v594)),
+            v598 = v595 + 0.05582662111236089 * (v365 * v594 - v361 * v593) + v596 - v597,
+            v599 = v484 * (v591 + v542 * v486 * v598);
+        const M v600 = softehl_lt(softehl_splat(0.0), v44);
+        V v601 = softehl_splat(0.0), v602 = softehl_splat(0.0), v603 = softehl_splat(0.0),
+            v604 = softehl_splat(0.0);
+        const M m605 = v600;
+        if (softehl_any(m605)) {
+            const V v606 = v231 * v234; v601 = softehl_blend(m605, v606, v601);
+            v602 = softehl_blend(m605, softehl_splat(0.0), v602);
+            v603 = softehl_blend(m605, v44, v603);
+            v604 = softehl_blend(m605, softehl_splat(0.0), v604);
         }
-        const M m1546 = ~v1539;
-        if (softehl_any(m1546)) {
-            const V v1547 = v425 * v437;
-            v1540 = softehl_blend(m1546, softehl_splat(0.0), v1540);
-            v1541 = softehl_blend(m1546, v1547, v1541);
-            v1542 = softehl_blend(m1546, softehl_splat(0.0), v1542);
-            v1543 = softehl_blend(m1546, v81, v1543);
+        const M m607 = ~v600;
+        if (softehl_any(m607)) {
+            const V v608 = v230 * v234; v601 = softehl_blend(m607, softehl_splat(0.0), v601);
+            v602 = softehl_blend(m607, v608, v602);
+            v603 = softehl_blend(m607, softehl_splat(0.0), v603);
+            v604 = softehl_blend(m607, v44, v604);
         }
-        const V v1548 = v425 * v1543;
-        const V v1549 = v426 * v1542;
-        const V v1550 = v1548 + v1549;
-        const V v1551 = 0.5 * v1550;
-        const V v1552 = v1541 + v1540;
-        const V v1553 = v88 * v1552;
-        const V v1554 = v1551 * v86;
-        const V v1555 = v1554 + v1553;
-        const V v1556 = v83 * v1551;
-        const V v1557 = v1556 * v973;
-        const V v1558 = v1557 + v1538;
-        const V v1559 = v958 * v1555;
-        const V v1560 = v1559 + v1558;
-        const V v1561 = w[3] * v1560;
+        const V v609 = 0.5 * (v230 * v604 + v231 * v603),
+            v610 = v465 * (v609 * v47 + v48 * (v602 + v601)) + (v45 * v609 * v470 + v599),
+            v611 = w[3] * v610;
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v1561;
+            R_lanes[4 + i] += D1 * v611;
         }
     }
-    const V v1562 = -s66;
-    const V v1563 = -s67;
-    R_lanes[0] = s69;
-    R_lanes[1] = v1563;
-    R_lanes[2] = s68;
-    R_lanes[3] = v1562;
+    const V v612 = -s35, v613 = -s36;
+    R_lanes[0] = s38; R_lanes[1] = v613; R_lanes[2] = s37; R_lanes[3] = v612;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
@@ -2863,70 +725,24 @@ static void softehl_film_conserving_carreau_pseudo_load_group(
         softehl_spoil(failed, R, (4 + modes));
     }
 }
+SOFTEHL_BATCH(softehl_film_conserving_carreau_pseudo_load, 4, (4 + modes), 2, 16, (4 + modes), 0)
 
-void softehl_film_conserving_carreau_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_carreau_fields_rate)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_carreau_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + 16 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_carreau_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + 16 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double t[SOFTEHL_LANES * 16];
-    softehl_pad(t, direction, 16, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_conserving_carreau_pseudo_load(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_conserving_carreau_fields_rate_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    V t0, t1, t2, t3;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17, t18, t19;
     softehl_load4(t + 0, (16 + (4 + modes)), &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
     softehl_load4(t + 4, (16 + (4 + modes)), &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
     softehl_load4(t + 8, (16 + (4 + modes)), &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
     softehl_load4(t + 12, (16 + (4 + modes)), &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
-    V t16, t17, t18, t19;
-    softehl_load4(t + 16, (16 + (4 + modes)), &t16, &t17, &t18, &t19);
-    (void)t16; (void)t17; (void)t18; (void)t19;
+    softehl_load4(t + 16, (16 + (4 + modes)), &t16, &t17, &t18, &t19); (void)t10; (void)t11;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -2944,2043 +760,394 @@ static void softehl_film_conserving_carreau_fields_rate_group(
     softehl_gather(t_lanes, t, (16 + (4 + modes)));
 #endif
     const double v1 = 1.0 - parameters[8];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d3 + v4;
-    const V v7 = d2 * parameters[9];
-    const V v8 = a1 + v7;
-    const V v9 = d0 * parameters[9];
-    const V v10 = a0 + v9;
-    const V v11 = v2 - X0;
-    const V v12 = t1 + t17;
-    const double v13 = 1.0 / parameters[7];
-    const V v14 = v11 - d0;
-    const V v15 = t3 + t19;
-    const V v16 = d0 * t15;
-    const V v17 = t4 + v16;
-    const V v18 = d2 * t15;
-    const V v19 = t5 + v18;
-    const double v20 = parameters[7] - 1.0;
-    const V v21 = 0.5 * v14;
-    const V v22 = v12 - t6;
-    const V v23 = v15 - t6;
-    const double v24 = 0.5 * v20;
-    const double v25 = 0.5 * parameters[6];
-    const double v26 = 1.0 / parameters[6];
-    const double v27 = 6.0 * parameters[6];
-    const V v28 = t2 + t18;
-    const V v29 = parameters[9] * t18;
-    const V v30 = v19 + v29;
-    const V v31 = parameters[9] * t16;
-    const V v32 = v17 + v31;
-    const V v33 = 1.0 / v21;
-    const V v34 = parameters[6] * v21;
-    const V v35 = v21 * t12;
-    const V v36 = 0.5 * t12;
-    const V v37 = 1.0 / v34;
-    const V v38 = 6.0 * t12;
-    const double v39 = v13 * v24;
-    const V v40 = v28 - t16;
-    const V v41 = 0.5 * t13;
-    const V v42 = v39 * t13;
-    const V v43 = v41 - v42;
-    const V v44 = t0 + t16;
-    const V v45 = v40 - t0;
-    const V v46 = v26 * t12;
-    const V v47 = v13 * v43;
-    const V v48 = 0.5 * v45;
-    const V v49 = parameters[6] * v48;
-    const V v50 = v35 + v49;
-    const V v51 = v33 * v48;
-    const V v52 = v37 * v50;
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]),
+        v4 = a1 + d2 * parameters[9], v5 = a0 + d0 * parameters[9];
+    const double v6 = 1.0 / parameters[7];
+    const V v7 = 0.5 * (X2 + d2 - X0 - d0), v8 = t1 + t17 - t6, v9 = t3 + t19 - t6;
+    const double v10 = 0.5 * (parameters[7] - 1.0), v11 = 0.5 * parameters[6],
+        v12 = 1.0 / parameters[6], v13 = 6.0 * parameters[6];
+    const V v14 = t2 + t18, v15 = t5 + d2 * t15 + parameters[9] * t18,
+        v16 = t4 + d0 * t15 + parameters[9] * t16, v17 = 1.0 / v7, v18 = 0.5 * t12,
+        v19 = 1.0 / (parameters[6] * v7), v20 = 6.0 * t12;
+    const double v21 = v6 * v10;
+    const V v22 = 0.5 * t13, v23 = t0 + t16, v24 = v12 * t12, v25 = v6 * (v22 - v21 * t13),
+        v26 = 0.5 * (v14 - t16 - t0), v27 = v17 * v26, v28 = v19 * (v7 * t12 + parameters[6] * v26);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
         V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0), tp4 = softehl_splat(0.0), tp5 = softehl_splat(0.0), tp6 = softehl_splat(0.0), tp7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            tp0 += B[8 * i] * t_lanes[20 + i];
-            tp1 += B[8 * i + 1] * t_lanes[20 + i];
-            tp2 += B[8 * i + 2] * t_lanes[20 + i];
-            tp3 += B[8 * i + 3] * t_lanes[20 + i];
-            tp4 += B[8 * i + 4] * t_lanes[20 + i];
-            tp5 += B[8 * i + 5] * t_lanes[20 + i];
-            tp6 += B[8 * i + 6] * t_lanes[20 + i];
-            tp7 += B[8 * i + 7] * t_lanes[20 + i];
+            tp0 += B[8 * i] * t_lanes[20 + i]; tp1 += B[8 * i + 1] * t_lanes[20 + i];
+            tp2 += B[8 * i + 2] * t_lanes[20 + i]; tp3 += B[8 * i + 3] * t_lanes[20 + i];
+            tp4 += B[8 * i + 4] * t_lanes[20 + i]; tp5 += B[8 * i + 5] * t_lanes[20 + i];
+            tp6 += B[8 * i + 6] * t_lanes[20 + i]; tp7 += B[8 * i + 7] * t_lanes[20 + i];
         }
         (void)tp0, (void)tp1, (void)tp2, (void)tp3, (void)tp4, (void)tp5, (void)tp6, (void)tp7;
-        const double v53 = 0.5 * w[0];
-        const V v54 = p0 * parameters[3];
-        const V v55 = softehl_vexp(v54);
-        const V v56 = p1 * v33;
-        const double v57 = 0.5 + v53;
-        const double v58 = 0.5 - v53;
-        const V v59 = w[3] * v48;
-        const V v60 = v57 * v8;
-        const V v61 = parameters[1] - v60;
-        const V v62 = v57 * v6;
-        const V v63 = v57 * v28;
-        const V v64 = v57 * v23;
-        const V v65 = v58 * v10;
-        const V v66 = v61 - v65;
-        const V v67 = v58 * v5;
-        const V v68 = v67 + v62;
-        const V v69 = v58 * v44;
-        const V v70 = v63 + v69;
-        const V v71 = v58 * v22;
-        const V v72 = v71 + v64;
-        const V v73 = 0.5 * v68;
-        const V v74 = parameters[6] * v68;
-        const V v75 = v73 * v56;
-        const V v76 = 1.0 / v74;
-        const V v77 = parameters[2] * v55;
-        const V v78 = v77 * v66;
-        const V v79 = v76 * v78;
-        const V v80 = v26 * v75;
-        const V v81 = v79 * v79;
-        const V v82 = 1.0 + v81;
-        const V v83 = softehl_vlog(v82);
-        const V v84 = v24 * v83;
-        const V v85 = softehl_vexp(v84);
-        const V v86 = v1 * v85;
-        const V v87 = parameters[8] + v86;
-        const V v88 = v79 * v87;
-        const V v89 = 0.932469514203152 * v80;
-        const V v90 = 0.6612093864662645 * v80;
-        const V v91 = 0.2386191860831969 * v80;
-        const V v92 = v88 + v89;
-        const V v93 = v88 + v90;
-        const V v94 = v88 + v91;
-        const V v95 = v88 - v91;
-        const V v96 = v88 - v90;
-        const V v97 = v88 - v89;
-        V v98[7];
-        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v24), softehl_splat(v1), softehl_splat(v39), v79, v89, v90, v91, v88, v92, v93, v94, v95, v96, v97}, v98, &failed);
-        const V v99 = v98[1];
-        const V v100 = v98[2];
-        const V v101 = v98[3];
-        const V v102 = v98[4];
-        const V v103 = v98[5];
-        const V v104 = v98[6];
-        const V v105 = v99 * v99;
-        const V v106 = v100 * v100;
-        const V v107 = v101 * v101;
-        const V v108 = v102 * v102;
-        const V v109 = v103 * v103;
-        const V v110 = v104 * v104;
-        const V v111 = 1.0 + v105;
-        const V v112 = 1.0 + v106;
-        const V v113 = 1.0 + v107;
-        const V v114 = 1.0 + v108;
-        const V v115 = 1.0 + v109;
-        const V v116 = 1.0 + v110;
-        const V v117 = softehl_vlog(v111);
-        const V v118 = softehl_vlog(v112);
-        const V v119 = softehl_vlog(v113);
-        const V v120 = softehl_vlog(v114);
-        const V v121 = softehl_vlog(v115);
-        const V v122 = softehl_vlog(v116);
-        const V v123 = 2.0 * v102;
-        const V v124 = 2.0 * v101;
-        const V v125 = 2.0 * v103;
-        const V v126 = 2.0 * v100;
-        const V v127 = 2.0 * v104;
-        const V v128 = 2.0 * v99;
-        const V v129 = 1.0 / v114;
-        const V v130 = 1.0 / v113;
-        const V v131 = 1.0 / v115;
-        const V v132 = 1.0 / v112;
-        const V v133 = 1.0 / v116;
-        const V v134 = 1.0 / v111;
-        const V v135 = v39 * v117;
-        const V v136 = v39 * v122;
-        const V v137 = v39 * v118;
-        const V v138 = v39 * v121;
-        const V v139 = v39 * v119;
-        const V v140 = softehl_vexp(v135);
-        const V v141 = softehl_vexp(v136);
-        const V v142 = softehl_vexp(v137);
-        const V v143 = softehl_vexp(v138);
-        const V v144 = softehl_vexp(v139);
-        const V v145 = v39 * v120;
-        const V v146 = softehl_vexp(v145);
-        const V v147 = v39 * v129;
-        const V v148 = v39 * v130;
-        const V v149 = v39 * v131;
-        const V v150 = v39 * v132;
-        const V v151 = v39 * v133;
-        const V v152 = v39 * v134;
-        const V v153 = v126 * v150;
-        const V v154 = v123 * v147;
-        const V v155 = v124 * v148;
-        const V v156 = v127 * v151;
-        const V v157 = v125 * v149;
-        const V v158 = v128 * v152;
-        const V v159 = v1 * v140;
-        const V v160 = v1 * v141;
-        const V v161 = v1 * v142;
-        const V v162 = v1 * v143;
-        const V v163 = v1 * v144;
-        const V v164 = v1 * v146;
-        const V v165 = 0.08566224618958518 * v99;
-        const V v166 = parameters[8] + v159;
-        const V v167 = parameters[8] + v160;
-        const V v168 = parameters[8] + v161;
-        const V v169 = parameters[8] + v162;
-        const V v170 = parameters[8] + v163;
-        const V v171 = parameters[8] + v164;
-        const V v172 = 1.0 / v166;
-        const V v173 = v166 * v166;
-        const V v174 = 1.0 / v167;
-        const V v175 = v167 * v167;
-        const V v176 = 1.0 / v168;
-        const V v177 = v168 * v168;
-        const V v178 = 1.0 / v169;
-        const V v179 = v169 * v169;
-        const V v180 = 1.0 / v173;
-        const V v181 = 1.0 / v175;
-        const V v182 = 1.0 / v170;
-        const V v183 = v170 * v170;
-        const V v184 = 1.0 / v177;
-        const V v185 = 1.0 / v179;
-        const V v186 = 1.0 / v171;
-        const V v187 = v171 * v171;
-        const V v188 = 1.0 / v183;
-        const V v189 = 1.0 / v187;
-        const V v190 = 0.08566224618958518 * v104;
-        const V v191 = 0.1803807865240693 * v100;
-        const V v192 = 0.1803807865240693 * v103;
-        const V v193 = 0.23395696728634552 * v101;
-        const V v194 = 0.23395696728634552 * v102;
-        const V v195 = v104 * v174;
-        const V v196 = v174 * v174;
-        const V v197 = 0.08566224618958518 * v174;
-        const V v198 = v172 * v172;
-        const V v199 = v99 * v172;
-        const V v200 = 0.08566224618958518 * v172;
-        const V v201 = v100 * v176;
-        const V v202 = v176 * v176;
-        const V v203 = 0.1803807865240693 * v176;
-        const V v204 = v202 * v191;
-        const V v205 = v198 * v165;
-        const V v206 = v196 * v190;
-        const V v207 = v103 * v178;
-        const V v208 = v178 * v178;
-        const V v209 = 0.1803807865240693 * v178;
-        const V v210 = v101 * v182;
-        const V v211 = v182 * v182;
-        const V v212 = 0.23395696728634552 * v182;
-        const V v213 = v208 * v192;
-        const V v214 = v159 * v205;
-        const V v215 = v160 * v206;
-        const V v216 = v161 * v204;
-        const V v217 = v211 * v193;
-        const V v218 = v158 * v214;
-        const V v219 = v200 - v218;
-        const V v220 = v156 * v215;
-        const V v221 = v197 - v220;
-        const V v222 = v162 * v213;
-        const V v223 = v153 * v216;
-        const V v224 = v203 - v223;
-        const V v225 = v186 * v186;
-        const V v226 = v102 * v186;
-        const V v227 = 0.23395696728634552 * v186;
-        const V v228 = v163 * v217;
-        const V v229 = v225 * v194;
-        const V v230 = v157 * v222;
-        const V v231 = v209 - v230;
-        const V v232 = v105 * v180;
-        const V v233 = 1.0 + v232;
-        const V v234 = v155 * v228;
-        const V v235 = v212 - v234;
-        const V v236 = softehl_vlog(v233);
-        const V v237 = v106 * v184;
-        const V v238 = 1.0 + v237;
-        const V v239 = v107 * v188;
-        const V v240 = 1.0 + v239;
-        const V v241 = v164 * v229;
-        const V v242 = softehl_vlog(v238);
-        const V v243 = softehl_vlog(v240);
-        const V v244 = v108 * v189;
-        const V v245 = 1.0 + v244;
-        const V v246 = v109 * v185;
-        const V v247 = 1.0 + v246;
-        const V v248 = softehl_vlog(v245);
-        const V v249 = softehl_vlog(v247);
-        const V v250 = v154 * v241;
-        const V v251 = v227 - v250;
-        const V v252 = v110 * v181;
-        const V v253 = 1.0 + v252;
-        const V v254 = softehl_vlog(v253);
-        const V v255 = 2.0 * v105;
-        const V v256 = 2.0 * v106;
-        const V v257 = 2.0 * v107;
-        const V v258 = 2.0 * v108;
-        const V v259 = 2.0 * v109;
-        const V v260 = v255 * v166;
-        const V v261 = v256 * v168;
-        const V v262 = v257 * v170;
-        const V v263 = 2.0 * v110;
-        const V v264 = v258 * v171;
-        const V v265 = v259 * v169;
-        const V v266 = v99 * v198;
-        const V v267 = v100 * v202;
-        const V v268 = v263 * v167;
-        const V v269 = v101 * v211;
-        const V v270 = v102 * v225;
-        const V v271 = v180 * v260;
-        const V v272 = v184 * v261;
-        const V v273 = v188 * v262;
-        const V v274 = v189 * v264;
-        const V v275 = v185 * v265;
-        const V v276 = v180 * v271;
-        const V v277 = v184 * v272;
-        const V v278 = v188 * v273;
-        const V v279 = v189 * v274;
-        const V v280 = v185 * v275;
-        const V v281 = v103 * v208;
-        const V v282 = v181 * v268;
-        const V v283 = v104 * v196;
-        const V v284 = 1.0 / v233;
-        const V v285 = 1.0 / v238;
-        const V v286 = 1.0 / v240;
-        const V v287 = v181 * v282;
-        const V v288 = 1.0 / v245;
-        const V v289 = 1.0 / v247;
-        const V v290 = 1.0 / v253;
-        const V v291 = v24 * v236;
-        const V v292 = v24 * v242;
-        const V v293 = v24 * v243;
-        const V v294 = v24 * v248;
-        const V v295 = v24 * v249;
-        const V v296 = softehl_vexp(v291);
-        const V v297 = softehl_vexp(v292);
-        const V v298 = softehl_vexp(v293);
-        const V v299 = softehl_vexp(v294);
-        const V v300 = softehl_vexp(v295);
-        const V v301 = v24 * v254;
-        const V v302 = softehl_vexp(v301);
-        const V v303 = v24 * v284;
-        const V v304 = v24 * v285;
-        const V v305 = v24 * v286;
-        const V v306 = v24 * v288;
-        const V v307 = v24 * v289;
-        const V v308 = v24 * v290;
-        const V v309 = v1 * v298;
-        const V v310 = v1 * v300;
-        const V v311 = v1 * v302;
-        const V v312 = parameters[8] + v309;
-        const V v313 = v309 * v210;
-        const V v314 = v313 * v305;
-        const V v315 = parameters[8] + v310;
-        const V v316 = v310 * v207;
-        const V v317 = v316 * v307;
-        const V v318 = parameters[8] + v311;
-        const V v319 = v311 * v195;
-        const V v320 = v319 * v308;
-        const V v321 = v1 * v296;
-        const V v322 = parameters[8] + v321;
-        const V v323 = v321 * v199;
-        const V v324 = v323 * v303;
-        const V v325 = v1 * v297;
-        const V v326 = v1 * v299;
-        const V v327 = parameters[8] + v325;
-        const V v328 = v325 * v201;
-        const V v329 = v328 * v304;
-        const V v330 = parameters[8] + v326;
-        const V v331 = v326 * v226;
-        const V v332 = v331 * v306;
-        const V v333 = v172 * v322;
-        const V v334 = v266 * v322;
-        const V v335 = v276 * v324;
-        const V v336 = v334 + v335;
-        const V v337 = v159 * v336;
-        const V v338 = v180 * v324;
-        const V v339 = v152 * v337;
-        const V v340 = v338 - v339;
-        const V v341 = v128 * v340;
-        const V v342 = v333 + v341;
-        const V v343 = v176 * v327;
-        const V v344 = v267 * v327;
-        const V v345 = v277 * v329;
-        const V v346 = v344 + v345;
-        const V v347 = v161 * v346;
-        const V v348 = v184 * v329;
-        const V v349 = v150 * v347;
-        const V v350 = v348 - v349;
-        const V v351 = v126 * v350;
-        const V v352 = v343 + v351;
-        const V v353 = v182 * v312;
-        const V v354 = v269 * v312;
-        const V v355 = v278 * v314;
-        const V v356 = v354 + v355;
-        const V v357 = v163 * v356;
-        const V v358 = v188 * v314;
-        const V v359 = v148 * v357;
-        const V v360 = v358 - v359;
-        const V v361 = v124 * v360;
-        const V v362 = v353 + v361;
-        const V v363 = v186 * v330;
-        const V v364 = v270 * v330;
-        const V v365 = v279 * v332;
-        const V v366 = v364 + v365;
-        const V v367 = v164 * v366;
-        const V v368 = v189 * v332;
-        const V v369 = v147 * v367;
-        const V v370 = v368 - v369;
-        const V v371 = v123 * v370;
-        const V v372 = v363 + v371;
-        const V v373 = v178 * v315;
-        const V v374 = v281 * v315;
-        const V v375 = v280 * v317;
-        const V v376 = v374 + v375;
-        const V v377 = v162 * v376;
-        const V v378 = v185 * v317;
-        const V v379 = v149 * v377;
-        const V v380 = v378 - v379;
-        const V v381 = v125 * v380;
-        const V v382 = v373 + v381;
-        const V v383 = v174 * v318;
-        const V v384 = v283 * v318;
-        const V v385 = v287 * v320;
-        const V v386 = v384 + v385;
-        const V v387 = v160 * v386;
-        const V v388 = v181 * v320;
-        const V v389 = v151 * v387;
-        const V v390 = v388 - v389;
-        const V v391 = v127 * v390;
-        const V v392 = v383 + v391;
-        V v393[49];
-        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v219, v224, v235, v251, v231, v221, softehl_splat((-1.0)), v342, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v352, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v362, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v372, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v382, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v392}, v393, &failed);
-        const V v394 = 0.5 * v56;
-        const V v395 = v98[0];
-        const V v396 = v236 * v323;
-        const V v397 = v242 * v328;
-        const V v398 = v243 * v313;
-        const V v399 = 1.0 - p6;
-        const V v400 = 1.0 - p4;
-        const V v401 = v248 * v331;
-        const V v402 = p0 * t9;
-        const V v403 = v249 * v316;
-        const V v404 = v55 * t8;
-        const V v405 = v254 * v319;
-        const V v406 = v57 * v30;
-        const V v407 = t7 - v406;
-        const V v408 = parameters[6] * v395;
-        const V v409 = v395 * t12;
-        const V v410 = v68 * t12;
-        const V v411 = parameters[3] * tp0;
-        const V v412 = v402 + v411;
-        const M v413 = softehl_lt(softehl_splat(0.0), v408);
-        const V v414 = v58 * v32;
-        const V v415 = v407 - v414;
-        const V v416 = v77 * v412;
-        const V v417 = v404 + v416;
-        const V v418 = v77 * v415;
-        const V v419 = parameters[6] * v72;
-        const V v420 = v410 + v419;
-        const V v421 = v394 * v72;
-        const V v422 = p1 * v51;
-        const V v423 = tp1 - v422;
-        const V v424 = v146 * v229;
-        const V v425 = v229 - v424;
-        const V v426 = v117 * v337;
-        const V v427 = v117 * v214;
-        const V v428 = v33 * v423;
-        const V v429 = v66 * v417;
-        const V v430 = v418 + v429;
-        const V v431 = v118 * v347;
-        const V v432 = v118 * v216;
-        const V v433 = v432 + v427;
-        const V v434 = v217 + v425;
-        const V v435 = v79 * v420;
-        const V v436 = v430 - v435;
-        const V v437 = v73 * v428;
-        const V v438 = v437 + v421;
-        const V v439 = v119 * v357;
-        const V v440 = v119 * v228;
-        const V v441 = v440 + v433;
-        const V v442 = v144 * v217;
-        const V v443 = v434 - v442;
-        const V v444 = v76 * v436;
-        const V v445 = v120 * v367;
-        const V v446 = v120 * v241;
-        const V v447 = v446 + v441;
-        const V v448 = v121 * v377;
-        const V v449 = v121 * v222;
-        const V v450 = v449 + v447;
-        const V v451 = v122 * v387;
-        const V v452 = v122 * v215;
-        const V v453 = v452 + v450;
-        const V v454 = v213 + v443;
-        const V v455 = v393[0];
-        const V v456 = v393[1];
-        const V v457 = v393[2];
-        const V v458 = v393[3];
-        const V v459 = v393[4];
-        const V v460 = v393[5];
-        const V v461 = v393[6];
-        const V v462 = v75 * v46;
-        const V v463 = v438 - v462;
-        const V v464 = v455 * v453;
-        const V v465 = v143 * v213;
-        const V v466 = v454 - v465;
-        const V v467 = v455 * v444;
-        const V v468 = v26 * v463;
-        const V v469 = v448 * v460;
-        const V v470 = v469 + v464;
-        const V v471 = v396 * v456;
-        const V v472 = v456 - v461;
-        const V v473 = v204 + v466;
-        const V v474 = v457 - v460;
-        const V v475 = v426 * v456;
-        const V v476 = v475 + v470;
-        const V v477 = 0.932469514203152 * v468;
-        const V v478 = v397 * v457;
-        const V v479 = v471 + v478;
-        const V v480 = 0.6612093864662645 * v468;
-        const V v481 = 0.2386191860831969 * v468;
-        const V v482 = v142 * v204;
-        const V v483 = v473 - v482;
-        const V v484 = v458 - v459;
-        const V v485 = v431 * v457;
-        const V v486 = v485 + v476;
-        const V v487 = v401 * v459;
-        const V v488 = v487 + v479;
-        const V v489 = v472 * v477;
-        const V v490 = v467 + v489;
-        const V v491 = v296 * v199;
-        const V v492 = v491 - v199;
-        const V v493 = v474 * v480;
-        const V v494 = v493 + v490;
-        const V v495 = v484 * v481;
-        const V v496 = v495 + v494;
-        const V v497 = v445 * v459;
-        const V v498 = v497 + v486;
-        const V v499 = v403 * v460;
-        const V v500 = v499 + v488;
-        const V v501 = v206 + v483;
-        const V v502 = v297 * v201;
-        const V v503 = v502 - v201;
-        const V v504 = v336 + v492;
-        const V v505 = v451 * v461;
-        const V v506 = v505 + v498;
-        const V v507 = v141 * v206;
-        const V v508 = v501 - v507;
-        const V v509 = v405 * v461;
-        const V v510 = v509 + v500;
-        const V v511 = v140 * v336;
-        const V v512 = v504 - v511;
-        const V v513 = v142 * v346;
-        const V v514 = v503 - v513;
-        const V v515 = v456 * v512;
-        const V v516 = v346 + v514;
-        const V v517 = v140 * v205;
-        const V v518 = v508 - v517;
-        const V v519 = v205 + v518;
-        const V v520 = v439 * v458;
-        const V v521 = v520 + v506;
-        const V v522 = v398 * v458;
-        const V v523 = v522 + v510;
-        const V v524 = v457 * v516;
-        const V v525 = v515 + v524;
-        const V v526 = v47 * v521;
-        const V v527 = v496 + v526;
-        const V v528 = v298 * v210;
-        const V v529 = v528 - v210;
-        const V v530 = v299 * v226;
-        const V v531 = v530 - v226;
-        const V v532 = v455 * v519;
-        const V v533 = v525 + v532;
-        const V v534 = v300 * v207;
-        const V v535 = v534 - v207;
-        const V v536 = v41 * v523;
-        const V v537 = v527 - v536;
-        const V v538 = v302 * v195;
-        const V v539 = v538 - v195;
-        const V v540 = v356 + v529;
-        const V v541 = v144 * v356;
-        const V v542 = v540 - v541;
-        const V v543 = v458 * v542;
-        const V v544 = v543 + v533;
-        const V v545 = v366 + v531;
-        const V v546 = v146 * v366;
-        const V v547 = v545 - v546;
-        const V v548 = v141 * v386;
-        const V v549 = v539 - v548;
-        const V v550 = v386 + v549;
-        const V v551 = v376 + v535;
-        const V v552 = v143 * v376;
-        const V v553 = v551 - v552;
-        const V v554 = v459 * v547;
-        const V v555 = v554 + v544;
-        const V v556 = v460 * v553;
-        const V v557 = v555 + v556;
-        const V v558 = v461 * v550;
-        const V v559 = v558 + v557;
-        const V v560 = t14 * v559;
-        const V v561 = v537 + v560;
-        const V v562 = parameters[6] * v561;
-        const V v563 = v409 + v562;
-        V v564 = softehl_splat(0.0);
-        V v565 = softehl_splat(0.0);
-        const M m566 = v413;
-        if (softehl_any(m566)) {
-            const V v567 = v400 * v563;
-            const V v568 = v408 * tp4;
-            const V v569 = v567 - v568;
-            v564 = softehl_blend(m566, v569, v564);
-            v565 = softehl_blend(m566, softehl_splat(0.0), v565);
+        const double v29 = 0.5 * w[0];
+        const V v30 = softehl_vexp(p0 * parameters[3]), v31 = p1 * v17;
+        const double v32 = 0.5 + v29, v33 = 0.5 - v29;
+        const V v34 = w[3] * v26, v35 = parameters[1] - v32 * v4 - v33 * v5,
+            v36 = v33 * v2 + v32 * v3, v37 = v32 * v14 + v33 * v23, v38 = v33 * v8 + v32 * v9,
+            v39 = 0.5 * v36, v40 = v39 * v31, v41 = 1.0 / (parameters[6] * v36),
+            v42 = parameters[2] * v30, v43 = v41 * (v42 * v35), v44 = v12 * v40,
+            v45 = softehl_vlog(1.0 + v43 * v43), v46 = softehl_vexp(v10 * v45),
+            v47 = v43 * (parameters[8] + v1 * v46), v48 = 0.932469514203152 * v44,
+            v49 = 0.6612093864662645 * v44, v50 = 0.2386191860831969 * v44, v51 = v47 + v48,
+            v52 = v47 + v49, v53 = v47 + v50, v54 = v47 - v50, v55 = v47 - v49, v56 = v47 - v48;
+        V v57[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v10), softehl_splat(v1), softehl_splat(v21), v43, v48, v49, v50, v47, v51, v52, v53, v54, v55, v56}, v57, &failed);
+        const V v58 = v57[1], v59 = v57[2], v60 = v57[3], v61 = v57[4], v62 = v57[5], v63 = v57[6],
+            v64 = v58 * v58, v65 = v59 * v59, v66 = v60 * v60, v67 = v61 * v61, v68 = v62 * v62,
+            v69 = v63 * v63, v70 = 1.0 + v64, v71 = 1.0 + v65, v72 = 1.0 + v66, v73 = 1.0 + v67,
+            v74 = 1.0 + v68, v75 = 1.0 + v69, v76 = softehl_vlog(v70), v77 = softehl_vlog(v71),
+            v78 = softehl_vlog(v72), v79 = softehl_vlog(v73), v80 = softehl_vlog(v74),
+            v81 = softehl_vlog(v75), v82 = 2.0 * v61, v83 = 2.0 * v60, v84 = 2.0 * v62,
+            v85 = 2.0 * v59, v86 = 2.0 * v63, v87 = 2.0 * v58, v88 = softehl_vexp(v21 * v76),
+            v89 = softehl_vexp(v21 * v81), v90 = softehl_vexp(v21 * v77),
+            v91 = softehl_vexp(v21 * v80), v92 = softehl_vexp(v21 * v78),
+            v93 = softehl_vexp(v21 * v79), v94 = v21 * (1.0 / v73), v95 = v21 * (1.0 / v72),
+            v96 = v21 * (1.0 / v74), v97 = v21 * (1.0 / v71), v98 = v21 * (1.0 / v75),
+            v99 = v21 * (1.0 / v70), v100 = v85 * v97, v101 = v82 * v94, v102 = v83 * v95,
+            v103 = v86 * v98, v104 = v84 * v96, v105 = v87 * v99, v106 = v1 * v88, v107 = v1 * v89,
+            v108 = v1 * v90, v109 = v1 * v91, v110 = v1 * v92, v111 = v1 * v93,
+            v112 = parameters[8] + v106, v113 = parameters[8] + v107, v114 = parameters[8] + v108,
+            v115 = parameters[8] + v109, v116 = parameters[8] + v110, v117 = parameters[8] + v111,
+            v118 = 1.0 / v112, v119 = 1.0 / v113, v120 = 1.0 / v114, v121 = 1.0 / v115,
+            v122 = 1.0 / (v112 * v112), v123 = 1.0 / (v113 * v113), v124 = 1.0 / v116,
+            v125 = 1.0 / (v114 * v114), v126 = 1.0 / (v115 * v115), v127 = 1.0 / v117,
+            v128 = 1.0 / (v116 * v116), v129 = 1.0 / (v117 * v117), v130 = v63 * v119,
+            v131 = v119 * v119, v132 = v118 * v118, v133 = v58 * v118, v134 = v59 * v120,
+            v135 = v120 * v120, v136 = v135 * (0.1803807865240693 * v59),
+            v137 = v132 * (0.08566224618958518 * v58), v138 = v131 * (0.08566224618958518 * v63),
+            v139 = v62 * v121, v140 = v121 * v121, v141 = v60 * v124, v142 = v124 * v124,
+            v143 = v140 * (0.1803807865240693 * v62), v144 = v106 * v137, v145 = v107 * v138,
+            v146 = v108 * v136, v147 = v142 * (0.23395696728634552 * v60),
+            v148 = 0.08566224618958518 * v118 - v105 * v144,
+            v149 = 0.08566224618958518 * v119 - v103 * v145, v150 = v109 * v143,
+            v151 = 0.1803807865240693 * v120 - v100 * v146, v152 = v127 * v127, v153 = v61 * v127,
+            v154 = v110 * v147, v155 = v152 * (0.23395696728634552 * v61),
+            v156 = 0.1803807865240693 * v121 - v104 * v150, v157 = 1.0 + v64 * v122,
+            v158 = 0.23395696728634552 * v124 - v102 * v154, v159 = softehl_vlog(v157),
+            v160 = 1.0 + v65 * v125, v161 = 1.0 + v66 * v128, v162 = v111 * v155,
+            v163 = softehl_vlog(v160), v164 = softehl_vlog(v161), v165 = 1.0 + v67 * v129,
+            v166 = 1.0 + v68 * v126, v167 = softehl_vlog(v165), v168 = softehl_vlog(v166),
+            v169 = 0.23395696728634552 * v127 - v101 * v162, v170 = 1.0 + v69 * v123,
+            v171 = softehl_vlog(v170), v172 = softehl_vexp(v10 * v159),
+            v173 = softehl_vexp(v10 * v163), v174 = softehl_vexp(v10 * v164),
+            v175 = softehl_vexp(v10 * v167), v176 = softehl_vexp(v10 * v168),
+            v177 = softehl_vexp(v10 * v171), v178 = v1 * v174, v179 = v1 * v176, v180 = v1 * v177,
+            v181 = parameters[8] + v178, v182 = v178 * v141, v183 = v182 * (v10 * (1.0 / v161)),
+            v184 = parameters[8] + v179, v185 = v179 * v139, v186 = v185 * (v10 * (1.0 / v166)),
+            v187 = parameters[8] + v180, v188 = v180 * v130, v189 = v188 * (v10 * (1.0 / v170)),
+            v190 = v1 * v172, v191 = parameters[8] + v190, v192 = v190 * v133,
+            v193 = v192 * (v10 * (1.0 / v157)), v194 = v1 * v173, v195 = v1 * v175,
+            v196 = parameters[8] + v194, v197 = v194 * v134, v198 = v197 * (v10 * (1.0 / v160)),
+            v199 = parameters[8] + v195, v200 = v195 * v153, v201 = v200 * (v10 * (1.0 / v165)),
+            v202 = v58 * v132 * v191 + v122 * (v122 * (2.0 * v64 * v112)) * v193,
+            v203 = v106 * v202, v204 = v118 * v191 + v87 * (v122 * v193 - v99 * v203),
+            v205 = v59 * v135 * v196 + v125 * (v125 * (2.0 * v65 * v114)) * v198,
+            v206 = v108 * v205, v207 = v120 * v196 + v85 * (v125 * v198 - v97 * v206),
+            v208 = v60 * v142 * v181 + v128 * (v128 * (2.0 * v66 * v116)) * v183,
+            v209 = v110 * v208, v210 = v124 * v181 + v83 * (v128 * v183 - v95 * v209),
+            v211 = v61 * v152 * v199 + v129 * (v129 * (2.0 * v67 * v117)) * v201,
+            v212 = v111 * v211, v213 = v127 * v199 + v82 * (v129 * v201 - v94 * v212),
+            v214 = v62 * v140 * v184 + v126 * (v126 * (2.0 * v68 * v115)) * v186,
+            v215 = v109 * v214, v216 = v121 * v184 + v84 * (v126 * v186 - v96 * v215),
+            v217 = v63 * v131 * v187 + v123 * (v123 * (2.0 * v69 * v113)) * v189,
+            v218 = v107 * v217, v219 = v119 * v187 + v86 * (v123 * v189 - v98 * v218);
+        V v220[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v148, v151, v158, v169, v156, v149, softehl_splat((-1.0)), v204, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v207, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v210, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v213, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v216, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v219}, v220, &failed);
+        const V v221 = v57[0], v222 = v159 * v192, v223 = v163 * v197, v224 = v164 * v182,
+            v225 = 1.0 - p6, v226 = 1.0 - p4, v227 = v167 * v200, v228 = v168 * v185,
+            v229 = v171 * v188, v230 = parameters[6] * v221;
+        const M v231 = softehl_lt(softehl_splat(0.0), v230);
+        const V v232 = t7 - v32 * v15 - v33 * v16,
+            v233 = v30 * t8 + v42 * (p0 * t9 + parameters[3] * tp0), v234 = v76 * v203,
+            v235 = v77 * v206,
+            v236 = v42 * v232 + v35 * v233 - v43 * (v36 * t12 + parameters[6] * v38),
+            v237 = v39 * (v17 * (tp1 - p1 * v27)) + 0.5 * v31 * v38, v238 = v78 * v209,
+            v239 = v41 * v236, v240 = v79 * v212, v241 = v80 * v215,
+            v242 = v80 * v150 + (v79 * v162 + (v78 * v154 + (v77 * v146 + v76 * v144))),
+            v243 = v81 * v218, v244 = v81 * v145 + v242, v245 = v220[0], v246 = v220[1],
+            v247 = v220[2], v248 = v220[3], v249 = v220[4], v250 = v220[5], v251 = v220[6],
+            v252 = v12 * (v237 - v40 * v24),
+            v253 = v136 + (v143 + (v147 + (v155 - v93 * v155) - v92 * v147) - v91 * v143),
+            v254 = 0.932469514203152 * v252, v255 = 0.6612093864662645 * v252,
+            v256 = 0.2386191860831969 * v252,
+            v257 = (v248 - v249) * v256 + ((v247 - v250) * v255 + (v245 * v239 + (v246 - v251) * v254)),
+            v258 = v240 * v249 + (v235 * v247 + (v234 * v246 + (v241 * v250 + v245 * v244))),
+            v259 = v229 * v251 + (v228 * v250 + (v227 * v249 + (v222 * v246 + v223 * v247))),
+            v260 = v202 + (v172 * v133 - v133) - v88 * v202,
+            v261 = v205 + (v173 * v134 - v134 - v90 * v205),
+            v262 = v137 + (v138 + (v253 - v90 * v136) - v89 * v138 - v88 * v137),
+            v263 = v257 + v25 * (v238 * v248 + (v243 * v251 + v258)) - v22 * (v224 * v248 + v259),
+            v264 = v208 + (v174 * v141 - v141) - v92 * v208,
+            v265 = v211 + (v175 * v153 - v153) - v93 * v211,
+            v266 = v217 + (v177 * v130 - v130 - v89 * v217),
+            v267 = v214 + (v176 * v139 - v139) - v91 * v214,
+            v268 = v249 * v265 + (v248 * v264 + (v246 * v260 + v247 * v261 + v245 * v262)),
+            v269 = parameters[6] * (v263 + t14 * (v251 * v266 + (v268 + v250 * v267))),
+            v270 = v221 * t12 + v269;
+        V v271 = softehl_splat(0.0), v272 = softehl_splat(0.0);
+        const M m273 = v231;
+        if (softehl_any(m273)) {
+            const V v274 = v226 * v270 - v230 * tp4; v271 = softehl_blend(m273, v274, v271);
+            v272 = softehl_blend(m273, softehl_splat(0.0), v272);
         }
-        const M m570 = ~v413;
-        if (softehl_any(m570)) {
-            const V v571 = v399 * v563;
-            const V v572 = v408 * tp6;
-            const V v573 = v571 - v572;
-            v564 = softehl_blend(m570, softehl_splat(0.0), v564);
-            v565 = softehl_blend(m570, v573, v565);
+        const M m275 = ~v231;
+        if (softehl_any(m275)) {
+            const V v276 = v225 * v270 - v230 * tp6;
+            v271 = softehl_blend(m275, softehl_splat(0.0), v271);
+            v272 = softehl_blend(m275, v276, v272);
         }
-        const double v574 = 0.5 * w[1];
-        const double v575 = 0.5 * w[2];
-        const V v576 = p2 * parameters[3];
-        const V v577 = softehl_vexp(v576);
-        const double v578 = 0.5 - v574;
-        const double v579 = 0.5 + v574;
-        const double v580 = 0.5 - v575;
-        const double v581 = 0.5 + v575;
-        const V v582 = v578 * v5;
-        const V v583 = v580 * v5;
-        const V v584 = v565 + v564;
-        const V v585 = v579 * v6;
-        const V v586 = v582 + v585;
-        const V v587 = v581 * v6;
-        const V v588 = v583 + v587;
-        const V v589 = v586 + v588;
-        const V v590 = parameters[2] * v577;
-        const V v591 = v590 * v66;
-        const V v592 = v584 - v438;
-        const V v593 = 0.5 * v589;
-        const V v594 = 0.25 * v589;
-        const V v595 = parameters[6] * v593;
-        const V v596 = 1.0 / v595;
-        const V v597 = v596 * v591;
-        const V v598 = p3 * v594;
-        const V v599 = v37 * v598;
-        const V v600 = v597 * v597;
-        const V v601 = 1.0 + v600;
-        const V v602 = softehl_vlog(v601);
-        const V v603 = v24 * v602;
-        const V v604 = softehl_vexp(v603);
-        const V v605 = v1 * v604;
-        const V v606 = parameters[8] + v605;
-        const V v607 = v597 * v606;
-        const V v608 = 0.932469514203152 * v599;
-        const V v609 = 0.6612093864662645 * v599;
-        const V v610 = 0.2386191860831969 * v599;
-        const V v611 = v607 + v608;
-        const V v612 = v607 + v609;
-        const V v613 = v607 + v610;
-        const V v614 = v607 - v610;
-        const V v615 = v607 - v609;
-        const V v616 = v607 - v608;
-        V v617[7];
-        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v597, softehl_splat(v24), softehl_splat(v1), softehl_splat(v39), v608, v609, v610, v607, v611, v612, v613, v614, v615, v616}, v617, &failed);
-        const V v618 = v617[1];
-        const V v619 = v617[2];
-        const V v620 = v617[3];
-        const V v621 = v617[4];
-        const V v622 = v617[5];
-        const V v623 = v617[6];
-        const V v624 = v618 * v618;
-        const V v625 = v619 * v619;
-        const V v626 = v620 * v620;
-        const V v627 = v621 * v621;
-        const V v628 = v622 * v622;
-        const V v629 = v623 * v623;
-        const V v630 = 1.0 + v624;
-        const V v631 = 1.0 + v625;
-        const V v632 = 1.0 + v626;
-        const V v633 = 1.0 + v627;
-        const V v634 = 1.0 + v628;
-        const V v635 = 1.0 + v629;
-        const V v636 = softehl_vlog(v630);
-        const V v637 = softehl_vlog(v631);
-        const V v638 = softehl_vlog(v632);
-        const V v639 = softehl_vlog(v633);
-        const V v640 = softehl_vlog(v634);
-        const V v641 = softehl_vlog(v635);
-        const V v642 = 2.0 * v621;
-        const V v643 = 2.0 * v620;
-        const V v644 = 2.0 * v622;
-        const V v645 = 2.0 * v619;
-        const V v646 = 2.0 * v623;
-        const V v647 = 2.0 * v618;
-        const V v648 = 1.0 / v633;
-        const V v649 = 1.0 / v632;
-        const V v650 = 1.0 / v634;
-        const V v651 = 1.0 / v631;
-        const V v652 = 1.0 / v635;
-        const V v653 = 1.0 / v630;
-        const V v654 = v39 * v637;
-        const V v655 = v39 * v638;
-        const V v656 = v39 * v636;
-        const V v657 = v39 * v641;
-        const V v658 = v39 * v639;
-        const V v659 = softehl_vexp(v654);
-        const V v660 = softehl_vexp(v655);
-        const V v661 = softehl_vexp(v656);
-        const V v662 = softehl_vexp(v657);
-        const V v663 = softehl_vexp(v658);
-        const V v664 = v39 * v640;
-        const V v665 = softehl_vexp(v664);
-        const V v666 = v39 * v648;
-        const V v667 = v39 * v649;
-        const V v668 = v39 * v650;
-        const V v669 = v39 * v651;
-        const V v670 = v39 * v652;
-        const V v671 = v39 * v653;
-        const V v672 = v645 * v669;
-        const V v673 = v647 * v671;
-        const V v674 = v642 * v666;
-        const V v675 = v643 * v667;
-        const V v676 = v646 * v670;
-        const V v677 = v644 * v668;
-        const V v678 = v1 * v659;
-        const V v679 = v1 * v660;
-        const V v680 = v1 * v661;
-        const V v681 = v1 * v662;
-        const V v682 = v1 * v663;
-        const V v683 = v1 * v665;
-        const V v684 = 0.08566224618958518 * v618;
-        const V v685 = parameters[8] + v678;
-        const V v686 = parameters[8] + v679;
-        const V v687 = parameters[8] + v680;
-        const V v688 = parameters[8] + v681;
-        const V v689 = parameters[8] + v682;
-        const V v690 = parameters[8] + v683;
-        const V v691 = 1.0 / v685;
-        const V v692 = v685 * v685;
-        const V v693 = 1.0 / v686;
-        const V v694 = v686 * v686;
-        const V v695 = 1.0 / v687;
-        const V v696 = v687 * v687;
-        const V v697 = 1.0 / v688;
-        const V v698 = v688 * v688;
-        const V v699 = 1.0 / v692;
-        const V v700 = 1.0 / v694;
-        const V v701 = 1.0 / v696;
-        const V v702 = 1.0 / v689;
-        const V v703 = v689 * v689;
-        const V v704 = 1.0 / v698;
-        const V v705 = 1.0 / v690;
-        const V v706 = v690 * v690;
-        const V v707 = 1.0 / v703;
-        const V v708 = 1.0 / v706;
-        const V v709 = 0.08566224618958518 * v623;
-        const V v710 = 0.1803807865240693 * v619;
-        const V v711 = 0.1803807865240693 * v622;
-        const V v712 = 0.23395696728634552 * v620;
-        const V v713 = 0.23395696728634552 * v621;
-        const V v714 = v619 * v691;
-        const V v715 = v691 * v691;
-        const V v716 = 0.1803807865240693 * v691;
-        const V v717 = v620 * v693;
-        const V v718 = v693 * v693;
-        const V v719 = 0.23395696728634552 * v693;
-        const V v720 = v715 * v710;
-        const V v721 = v718 * v712;
-        const V v722 = v623 * v697;
-        const V v723 = v697 * v697;
-        const V v724 = 0.08566224618958518 * v697;
-        const V v725 = v723 * v709;
-        const V v726 = v695 * v695;
-        const V v727 = v618 * v695;
-        const V v728 = 0.08566224618958518 * v695;
-        const V v729 = v621 * v702;
-        const V v730 = v702 * v702;
-        const V v731 = 0.23395696728634552 * v702;
-        const V v732 = v726 * v684;
-        const V v733 = v730 * v713;
-        const V v734 = v678 * v720;
-        const V v735 = v679 * v721;
-        const V v736 = v681 * v725;
-        const V v737 = v672 * v734;
-        const V v738 = v716 - v737;
-        const V v739 = v680 * v732;
-        const V v740 = v675 * v735;
-        const V v741 = v719 - v740;
-        const V v742 = v705 * v705;
-        const V v743 = v622 * v705;
-        const V v744 = 0.1803807865240693 * v705;
-        const V v745 = v676 * v736;
-        const V v746 = v724 - v745;
-        const V v747 = v682 * v733;
-        const V v748 = v742 * v711;
-        const V v749 = v673 * v739;
-        const V v750 = v728 - v749;
-        const V v751 = v624 * v701;
-        const V v752 = 1.0 + v751;
-        const V v753 = v674 * v747;
-        const V v754 = v731 - v753;
-        const V v755 = softehl_vlog(v752);
-        const V v756 = v625 * v699;
-        const V v757 = 1.0 + v756;
-        const V v758 = v683 * v748;
-        const V v759 = softehl_vlog(v757);
-        const V v760 = v626 * v700;
-        const V v761 = 1.0 + v760;
-        const V v762 = v627 * v707;
-        const V v763 = 1.0 + v762;
-        const V v764 = softehl_vlog(v761);
-        const V v765 = softehl_vlog(v763);
-        const V v766 = v628 * v708;
-        const V v767 = 1.0 + v766;
-        const V v768 = v677 * v758;
-        const V v769 = v744 - v768;
-        const V v770 = softehl_vlog(v767);
-        const V v771 = v629 * v704;
-        const V v772 = 1.0 + v771;
-        const V v773 = softehl_vlog(v772);
-        const V v774 = 2.0 * v624;
-        const V v775 = 2.0 * v625;
-        const V v776 = 2.0 * v626;
-        const V v777 = 2.0 * v627;
-        const V v778 = 2.0 * v628;
-        const V v779 = v774 * v687;
-        const V v780 = v775 * v685;
-        const V v781 = v776 * v686;
-        const V v782 = 2.0 * v629;
-        const V v783 = v777 * v689;
-        const V v784 = v778 * v690;
-        const V v785 = v618 * v726;
-        const V v786 = v619 * v715;
-        const V v787 = v782 * v688;
-        const V v788 = v620 * v718;
-        const V v789 = v621 * v730;
-        const V v790 = v701 * v779;
-        const V v791 = v699 * v780;
-        const V v792 = v700 * v781;
-        const V v793 = v707 * v783;
-        const V v794 = v708 * v784;
-        const V v795 = v701 * v790;
-        const V v796 = v699 * v791;
-        const V v797 = v700 * v792;
-        const V v798 = v707 * v793;
-        const V v799 = v708 * v794;
-        const V v800 = v622 * v742;
-        const V v801 = v704 * v787;
-        const V v802 = v623 * v723;
-        const V v803 = 1.0 / v752;
-        const V v804 = 1.0 / v757;
-        const V v805 = 1.0 / v761;
-        const V v806 = v704 * v801;
-        const V v807 = 1.0 / v763;
-        const V v808 = 1.0 / v767;
-        const V v809 = 1.0 / v772;
-        const V v810 = v24 * v755;
-        const V v811 = v24 * v759;
-        const V v812 = v24 * v764;
-        const V v813 = v24 * v765;
-        const V v814 = v24 * v770;
-        const V v815 = softehl_vexp(v810);
-        const V v816 = softehl_vexp(v811);
-        const V v817 = softehl_vexp(v812);
-        const V v818 = softehl_vexp(v813);
-        const V v819 = softehl_vexp(v814);
-        const V v820 = v24 * v773;
-        const V v821 = softehl_vexp(v820);
-        const V v822 = v24 * v803;
-        const V v823 = v24 * v804;
-        const V v824 = v24 * v805;
-        const V v825 = v24 * v807;
-        const V v826 = v24 * v808;
-        const V v827 = v24 * v809;
-        const V v828 = v1 * v817;
-        const V v829 = v1 * v819;
-        const V v830 = v1 * v821;
-        const V v831 = parameters[8] + v828;
-        const V v832 = v828 * v717;
-        const V v833 = v832 * v824;
-        const V v834 = parameters[8] + v829;
-        const V v835 = v829 * v743;
-        const V v836 = v835 * v826;
-        const V v837 = parameters[8] + v830;
-        const V v838 = v830 * v722;
-        const V v839 = v838 * v827;
-        const V v840 = v1 * v815;
-        const V v841 = parameters[8] + v840;
-        const V v842 = v840 * v727;
-        const V v843 = v842 * v822;
-        const V v844 = v1 * v816;
-        const V v845 = v1 * v818;
-        const V v846 = parameters[8] + v844;
-        const V v847 = v844 * v714;
-        const V v848 = v847 * v823;
-        const V v849 = parameters[8] + v845;
-        const V v850 = v845 * v729;
-        const V v851 = v850 * v825;
-        const V v852 = v695 * v841;
-        const V v853 = v785 * v841;
-        const V v854 = v795 * v843;
-        const V v855 = v853 + v854;
-        const V v856 = v680 * v855;
-        const V v857 = v701 * v843;
-        const V v858 = v671 * v856;
-        const V v859 = v857 - v858;
-        const V v860 = v647 * v859;
-        const V v861 = v852 + v860;
-        const V v862 = v691 * v846;
-        const V v863 = v786 * v846;
-        const V v864 = v796 * v848;
-        const V v865 = v863 + v864;
-        const V v866 = v678 * v865;
-        const V v867 = v699 * v848;
-        const V v868 = v669 * v866;
-        const V v869 = v867 - v868;
-        const V v870 = v645 * v869;
-        const V v871 = v862 + v870;
-        const V v872 = v693 * v831;
-        const V v873 = v788 * v831;
-        const V v874 = v797 * v833;
-        const V v875 = v873 + v874;
-        const V v876 = v679 * v875;
-        const V v877 = v700 * v833;
-        const V v878 = v667 * v876;
-        const V v879 = v877 - v878;
-        const V v880 = v643 * v879;
-        const V v881 = v872 + v880;
-        const V v882 = v702 * v849;
-        const V v883 = v789 * v849;
-        const V v884 = v798 * v851;
-        const V v885 = v883 + v884;
-        const V v886 = v682 * v885;
-        const V v887 = v707 * v851;
-        const V v888 = v666 * v886;
-        const V v889 = v887 - v888;
-        const V v890 = v642 * v889;
-        const V v891 = v882 + v890;
-        const V v892 = v705 * v834;
-        const V v893 = v800 * v834;
-        const V v894 = v799 * v836;
-        const V v895 = v893 + v894;
-        const V v896 = v683 * v895;
-        const V v897 = v708 * v836;
-        const V v898 = v668 * v896;
-        const V v899 = v897 - v898;
-        const V v900 = v644 * v899;
-        const V v901 = v892 + v900;
-        const V v902 = v697 * v837;
-        const V v903 = v802 * v837;
-        const V v904 = v806 * v839;
-        const V v905 = v903 + v904;
-        const V v906 = v681 * v905;
-        const V v907 = v704 * v839;
-        const V v908 = v670 * v906;
-        const V v909 = v907 - v908;
-        const V v910 = v646 * v909;
-        const V v911 = v902 + v910;
-        V v912[49];
-        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v750, v738, v741, v754, v769, v746, softehl_splat((-1.0)), v861, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v871, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v881, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v891, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v901, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v911}, v912, &failed);
-        const V v913 = v586 * v588;
-        const V v914 = v593 * v593;
-        const V v915 = 1.0 / v914;
-        const V v916 = v913 * v915;
-        const V v917 = v578 * v22;
-        const V v918 = v580 * v22;
-        const V v919 = v579 * v23;
-        const V v920 = v917 + v919;
-        const V v921 = v581 * v23;
-        const V v922 = v918 + v921;
-        const V v923 = v588 * v920;
-        const V v924 = v920 + v922;
-        const V v925 = v586 * v922;
-        const V v926 = v923 + v925;
-        const V v927 = 0.5 * v924;
-        const V v928 = v589 * v927;
-        const V v929 = v916 * v928;
-        const V v930 = v926 - v929;
-        const V v931 = v915 * v930;
-        const V v932 = 0.5 * p3;
-        const V v933 = 0.1192694691878821 * v619;
-        const V v934 = 0.05582662111236089 * v620;
-        const V v935 = 0.07987743308995329 * v618;
-        const V v936 = 0.07987743308995329 * v623;
-        const V v937 = 0.05582662111236089 * v621;
-        const V v938 = 0.1192694691878821 * v622;
-        const V v939 = v755 * v842;
-        const V v940 = v759 * v847;
-        const V v941 = v933 * v715;
-        const V v942 = v934 * v718;
-        const V v943 = v935 * v726;
-        const V v944 = v936 * v723;
-        const V v945 = v937 * v730;
-        const V v946 = v938 * v742;
-        const V v947 = v764 * v832;
-        const V v948 = v765 * v850;
-        const V v949 = v770 * v835;
-        const V v950 = v773 * v838;
-        const V v951 = v936 * v697;
-        const V v952 = p2 * t9;
-        const V v953 = v577 * t8;
-        const V v954 = v593 * t12;
-        const V v955 = v594 * tp3;
-        const V v956 = 1.0 - v659;
-        const V v957 = parameters[3] * tp2;
-        const V v958 = v952 + v957;
-        const V v959 = 1.0 - v660;
-        const V v960 = 1.0 - v661;
-        const V v961 = 1.0 - v662;
-        const V v962 = 1.0 - v663;
-        const V v963 = v598 * v52;
-        const V v964 = v955 - v963;
-        const V v965 = v590 * v958;
-        const V v966 = v953 + v965;
-        const V v967 = 1.0 / v590;
-        const V v968 = v590 * v415;
-        const V v969 = parameters[6] * v927;
-        const V v970 = v954 + v969;
-        const V v971 = v932 * v927;
-        const V v972 = v971 + v964;
-        const V v973 = v597 * v970;
-        const V v974 = v968 - v973;
-        const V v975 = v37 * v972;
-        const V v976 = v916 * v916;
-        const V v977 = 2.0 * v916;
-        const V v978 = v636 * v856;
-        const V v979 = v636 * v739;
-        const V v980 = v636 * v47;
-        const V v981 = v637 * v866;
-        const V v982 = v637 * v47;
-        const V v983 = v637 * v734;
-        const V v984 = v983 + v979;
-        const V v985 = v66 * v966;
-        const V v986 = v985 + v974;
-        const V v987 = v596 * v986;
-        const V v988 = 0.932469514203152 * v975;
-        const V v989 = 0.6612093864662645 * v975;
-        const V v990 = 0.2386191860831969 * v975;
-        const V v991 = v638 * v876;
-        const V v992 = v638 * v47;
-        const V v993 = v638 * v735;
-        const V v994 = v993 + v984;
-        const V v995 = v639 * v886;
-        const V v996 = v639 * v47;
-        const V v997 = v639 * v747;
-        const V v998 = v997 + v994;
-        const V v999 = v640 * v896;
-        const V v1000 = v640 * v47;
-        const V v1001 = v640 * v758;
-        const V v1002 = v1001 + v998;
-        const V v1003 = v641 * v906;
-        const V v1004 = v641 * v47;
-        const V v1005 = v641 * v736;
-        const V v1006 = v1005 + v1002;
-        const V v1007 = v912[7];
-        const V v1008 = v912[8];
-        const V v1009 = v912[9];
-        const V v1010 = v912[10];
-        const V v1011 = v912[11];
-        const V v1012 = v912[12];
-        const V v1013 = v912[13];
-        const V v1014 = v912[14];
-        const V v1015 = v912[15];
-        const V v1016 = v912[16];
-        const V v1017 = v912[17];
-        const V v1018 = v912[18];
-        const V v1019 = v912[19];
-        const V v1020 = v912[20];
-        const V v1021 = v912[21];
-        const V v1022 = v912[22];
-        const V v1023 = v912[23];
-        const V v1024 = v912[24];
-        const V v1025 = v912[25];
-        const V v1026 = v912[26];
-        const V v1027 = v912[27];
-        const V v1028 = v912[28];
-        const V v1029 = v912[29];
-        const V v1030 = v912[30];
-        const V v1031 = v912[31];
-        const V v1032 = v912[32];
-        const V v1033 = v912[33];
-        const V v1034 = v912[34];
-        const V v1035 = v912[35];
-        const V v1036 = v912[36];
-        const V v1037 = v912[37];
-        const V v1038 = v912[38];
-        const V v1039 = v912[39];
-        const V v1040 = v912[40];
-        const V v1041 = v912[41];
-        const V v1042 = v912[42];
-        const V v1043 = v912[43];
-        const V v1044 = v912[44];
-        const V v1045 = v912[45];
-        const V v1046 = v912[46];
-        const V v1047 = v912[47];
-        const V v1048 = v912[48];
-        const V v1049 = v914 * v36;
-        const V v1050 = v25 * v914;
-        const V v1051 = v25 * v928;
-        const V v1052 = v1049 + v1051;
-        const V v1053 = v1043 - v1048;
-        const V v1054 = v1038 - v1039;
-        const V v1055 = v1037 - v1040;
-        const V v1056 = v1050 * v977;
-        const V v1057 = v1050 * v976;
-        const V v1058 = v976 * v1052;
-        const V v1059 = v1045 - v1046;
-        const V v1060 = v1044 - v1047;
-        const V v1061 = v1056 * v931;
-        const V v1062 = v1058 + v1061;
-        const V v1063 = v1054 * v990;
-        const V v1064 = v1053 * v988;
-        const V v1065 = t14 * v956;
-        const V v1066 = t14 * v959;
-        const V v1067 = t14 * v960;
-        const V v1068 = t14 * v961;
-        const V v1069 = v1059 * v990;
-        const V v1070 = v1064 + v1069;
-        const V v1071 = t14 * v962;
-        const V v1072 = v663 * v733;
-        const V v1073 = v733 - v1072;
-        const V v1074 = v815 * v727;
-        const V v1075 = v1074 - v727;
-        const V v1076 = v816 * v714;
-        const V v1077 = v1076 - v714;
-        const V v1078 = v817 * v717;
-        const V v1079 = v1078 - v717;
-        const V v1080 = v721 + v1073;
-        const V v1081 = v818 * v729;
-        const V v1082 = v1081 - v729;
-        const V v1083 = v855 + v1075;
-        const V v1084 = v660 * v721;
-        const V v1085 = v1080 - v1084;
-        const V v1086 = v660 * v875;
-        const V v1087 = v1079 - v1086;
-        const V v1088 = v875 + v1087;
-        const V v1089 = v661 * v855;
-        const V v1090 = v1083 - v1089;
-        const V v1091 = v663 * v885;
-        const V v1092 = v1082 - v1091;
-        const V v1093 = v885 + v1092;
-        const V v1094 = v661 * v732;
-        const V v1095 = v1085 - v1094;
-        const V v1096 = v732 + v1095;
-        const V v1097 = v865 + v1077;
-        const V v1098 = v819 * v743;
-        const V v1099 = v1098 - v743;
-        const V v1100 = v659 * v865;
-        const V v1101 = v1097 - v1100;
-        const V v1102 = v659 * v720;
-        const V v1103 = v1096 - v1102;
-        const V v1104 = v720 + v1103;
-        const V v1105 = v821 * v722;
-        const V v1106 = v1105 - v722;
-        const V v1107 = v1008 * v1090;
-        const V v1108 = v895 + v1099;
-        const V v1109 = v748 + v1104;
-        const V v1110 = v665 * v895;
-        const V v1111 = v1108 - v1110;
-        const V v1112 = v665 * v748;
-        const V v1113 = v1109 - v1112;
-        const V v1114 = 1.0 - v665;
-        const V v1115 = v1008 - v1013;
-        const V v1116 = v1009 * v1101;
-        const V v1117 = v1107 + v1116;
-        const V v1118 = v1009 - v1012;
-        const V v1119 = v905 + v1106;
-        const V v1120 = v725 + v1113;
-        const V v1121 = v662 * v905;
-        const V v1122 = v1119 - v1121;
-        const V v1123 = v662 * v725;
-        const V v1124 = v1120 - v1123;
-        const V v1125 = v1012 * v1111;
-        const V v1126 = v1117 + v1125;
-        const V v1127 = v1115 * v988;
-        const V v1128 = v1010 - v1011;
-        const V v1129 = v1016 * v1101;
-        const V v1130 = v1128 * v990;
-        const V v1131 = v1127 + v1130;
-        const V v1132 = v1015 - v1020;
-        const V v1133 = v1016 - v1019;
-        const V v1134 = v1023 * v1101;
-        const V v1135 = v1017 - v1018;
-        const V v1136 = v1022 - v1027;
-        const V v1137 = v1132 * v988;
-        const V v1138 = v1023 - v1026;
-        const V v1139 = v1136 * v988;
-        const V v1140 = v1030 * v1101;
-        const V v1141 = v1024 - v1025;
-        const V v1142 = v1135 * v990;
-        const V v1143 = v1137 + v1142;
-        const V v1144 = v1141 * v990;
-        const V v1145 = v1139 + v1144;
-        const V v1146 = v1029 - v1034;
-        const V v1147 = v1030 - v1033;
-        const V v1148 = v1146 * v988;
-        const V v1149 = v1029 * v1090;
-        const V v1150 = v1140 + v1149;
-        const V v1151 = v948 * v1025;
-        const V v1152 = v948 * v1011;
-        const V v1153 = v1031 - v1032;
-        const V v1154 = v948 * v1032;
-        const V v1155 = v995 * v1011;
-        const V v1156 = v995 * v1025;
-        const V v1157 = v995 * v1032;
-        const V v1158 = v1032 * v1093;
-        const V v1159 = v1150 + v1158;
-        const V v1160 = v1153 * v990;
-        const V v1161 = v1148 + v1160;
-        const V v1162 = v1011 * v1093;
-        const V v1163 = v1126 + v1162;
-        const V v1164 = v1025 * v1093;
-        const V v1165 = v1134 + v1164;
-        const V v1166 = v939 * v1029;
-        const V v1167 = v1166 + v1154;
-        const V v1168 = v978 * v1029;
-        const V v1169 = v1168 + v1157;
-        const V v1170 = v939 * v1008;
-        const V v1171 = v1170 + v1152;
-        const V v1172 = v978 * v1008;
-        const V v1173 = v1172 + v1155;
-        const V v1174 = v939 * v1022;
-        const V v1175 = v1174 + v1151;
-        const V v1176 = v978 * v1022;
-        const V v1177 = v1176 + v1156;
-        const V v1178 = v1022 * v1090;
-        const V v1179 = v1165 + v1178;
-        const V v1180 = v939 * v1015;
-        const V v1181 = v978 * v1015;
-        const V v1182 = v1015 * v1090;
-        const V v1183 = v1129 + v1182;
-        const V v1184 = v1147 * v989;
-        const V v1185 = v1161 + v1184;
-        const V v1186 = v939 * v1036;
-        const V v1187 = v978 * v1036;
-        const V v1188 = v1036 * v1090;
-        const V v1189 = v939 * v1043;
-        const V v1190 = v978 * v1043;
-        const V v1191 = v1043 * v1090;
-        const V v1192 = v1118 * v989;
-        const V v1193 = v1131 + v1192;
-        const V v1194 = v1133 * v989;
-        const V v1195 = v1143 + v1194;
-        const V v1196 = v1138 * v989;
-        const V v1197 = v1145 + v1196;
-        const V v1198 = v1055 * v989;
-        const V v1199 = v1063 + v1198;
-        const V v1200 = v1060 * v989;
-        const V v1201 = v1070 + v1200;
-        const V v1202 = v1036 - v1041;
-        const V v1203 = v950 * v1041;
-        const V v1204 = v1186 + v1203;
-        const V v1205 = v1003 * v1041;
-        const V v1206 = v1187 + v1205;
-        const V v1207 = v1041 * v1122;
-        const V v1208 = v1188 + v1207;
-        const V v1209 = v1202 * v988;
-        const V v1210 = v1199 + v1209;
-        const V v1211 = v950 * v1048;
-        const V v1212 = v1189 + v1211;
-        const V v1213 = v1003 * v1048;
-        const V v1214 = v1190 + v1213;
-        const V v1215 = v1048 * v1122;
-        const V v1216 = v1191 + v1215;
-        const V v1217 = v933 * v691;
-        const V v1218 = v951 - v1217;
-        const V v1219 = v940 * v1037;
-        const V v1220 = v1219 + v1204;
-        const V v1221 = v981 * v1037;
-        const V v1222 = v1221 + v1206;
-        const V v1223 = v1037 * v1101;
-        const V v1224 = v1208 + v1223;
-        const V v1225 = v1044 * v1101;
-        const V v1226 = v1216 + v1225;
-        const V v1227 = v940 * v1044;
-        const V v1228 = v1227 + v1212;
-        const V v1229 = v981 * v1044;
-        const V v1230 = v1229 + v1214;
-        const V v1231 = v934 * v693;
-        const V v1232 = v1218 - v1231;
-        const V v1233 = v1035 * v987;
-        const V v1234 = v1210 + v1233;
-        const V v1235 = v1035 * v1006;
-        const V v1236 = v1222 + v1235;
-        const V v1237 = v1035 * v1124;
-        const V v1238 = v1224 + v1237;
-        const V v1239 = v1042 * v1124;
-        const V v1240 = v1226 + v1239;
-        const V v1241 = v1042 * v1006;
-        const V v1242 = v1230 + v1241;
-        const V v1243 = v1042 * v987;
-        const V v1244 = v1201 + v1243;
-        const V v1245 = v935 * v695;
-        const V v1246 = v1232 - v1245;
-        const V v1247 = v947 * v1038;
-        const V v1248 = v1247 + v1220;
-        const V v1249 = v991 * v1038;
-        const V v1250 = v1249 + v1236;
-        const V v1251 = v1038 * v1088;
-        const V v1252 = v1238 + v1251;
-        const V v1253 = v1045 * v1088;
-        const V v1254 = v1240 + v1253;
-        const V v1255 = v991 * v1045;
-        const V v1256 = v1255 + v1242;
-        const V v1257 = v947 * v1045;
-        const V v1258 = v1257 + v1228;
-        const V v1259 = v937 * v702;
-        const V v1260 = v1259 + v1246;
-        const V v1261 = t14 * v1114;
-        const V v1262 = v938 * v705;
-        const V v1263 = v1262 + v1260;
-        const V v1264 = v948 * v1039;
-        const V v1265 = v1264 + v1248;
-        const V v1266 = v995 * v1039;
-        const V v1267 = v1266 + v1250;
-        const V v1268 = v995 * v1046;
-        const V v1269 = v1268 + v1256;
-        const V v1270 = v948 * v1046;
-        const V v1271 = v1270 + v1258;
-        const V v1272 = v1046 * v1093;
-        const V v1273 = v1254 + v1272;
-        const V v1274 = v1062 * v1263;
-        const V v1275 = v967 * v1263;
-        const V v1276 = v1039 * v1093;
-        const V v1277 = v1252 + v1276;
-        const V v1278 = v948 * v1018;
-        const V v1279 = v1180 + v1278;
-        const V v1280 = v995 * v1018;
-        const V v1281 = v1181 + v1280;
-        const V v1282 = v1018 * v1093;
-        const V v1283 = v1183 + v1282;
-        const V v1284 = v949 * v1040;
-        const V v1285 = v1284 + v1265;
-        const V v1286 = v999 * v1040;
-        const V v1287 = v1286 + v1267;
-        const V v1288 = v1040 * v1111;
-        const V v1289 = v1277 + v1288;
-        const V v1290 = v949 * v1047;
-        const V v1291 = v1290 + v1271;
-        const V v1292 = v999 * v1047;
-        const V v1293 = v1292 + v1269;
-        const V v1294 = v1047 * v1111;
-        const V v1295 = v1273 + v1294;
-        const V v1296 = v949 * v1019;
-        const V v1297 = v1296 + v1279;
-        const V v1298 = v999 * v1019;
-        const V v1299 = v1298 + v1281;
-        const V v1300 = v1019 * v1111;
-        const V v1301 = v1283 + v1300;
-        const V v1302 = v41 * v1285;
-        const V v1303 = v1234 - v1302;
-        const V v1304 = v41 * v1291;
-        const V v1305 = v1244 - v1304;
-        const V v1306 = v47 * v1287;
-        const V v1307 = v1303 + v1306;
-        const V v1308 = v47 * v1293;
-        const V v1309 = v1305 + v1308;
-        const V v1310 = t14 * v1289;
-        const V v1311 = v1307 + v1310;
-        const V v1312 = t14 * v1295;
-        const V v1313 = v1309 + v1312;
-        const V v1314 = v940 * v1016;
-        const V v1315 = v1314 + v1297;
-        const V v1316 = v981 * v1016;
-        const V v1317 = v1316 + v1299;
-        const V v1318 = v705 * v1311;
-        const V v1319 = v677 * v1311;
-        const V v1320 = v1000 + v1319;
-        const V v1321 = v697 * v1313;
-        const V v1322 = v676 * v1313;
-        const V v1323 = v1004 + v1322;
-        const V v1324 = v1017 * v1088;
-        const V v1325 = v1301 + v1324;
-        const V v1326 = v947 * v1017;
-        const V v1327 = v1326 + v1315;
-        const V v1328 = v991 * v1017;
-        const V v1329 = v1328 + v1317;
-        const V v1330 = v683 * v1320;
-        const V v1331 = v1261 + v1330;
-        const V v1332 = v681 * v1323;
-        const V v1333 = v1068 + v1332;
-        const V v1334 = v940 * v1009;
-        const V v1335 = v1334 + v1171;
-        const V v1336 = v981 * v1009;
-        const V v1337 = v1336 + v1173;
-        const V v1338 = v950 * v1020;
-        const V v1339 = v1338 + v1327;
-        const V v1340 = v1020 * v1122;
-        const V v1341 = v1325 + v1340;
-        const V v1342 = v1003 * v1020;
-        const V v1343 = v1342 + v1329;
-        const V v1344 = v947 * v1010;
-        const V v1345 = v1344 + v1335;
-        const V v1346 = v991 * v1010;
-        const V v1347 = v1346 + v1337;
-        const V v1348 = v1010 * v1088;
-        const V v1349 = v1163 + v1348;
-        const V v1350 = v41 * v1339;
-        const V v1351 = v1195 - v1350;
-        const V v1352 = v950 * v1013;
-        const V v1353 = v1352 + v1345;
-        const V v1354 = v1003 * v1013;
-        const V v1355 = v1354 + v1347;
-        const V v1356 = v1013 * v1122;
-        const V v1357 = v1349 + v1356;
-        const V v1358 = v1014 * v1006;
-        const V v1359 = v1343 + v1358;
-        const V v1360 = v1014 * v1124;
-        const V v1361 = v1341 + v1360;
-        const V v1362 = v1014 * v987;
-        const V v1363 = v1351 + v1362;
-        const V v1364 = v1007 * v1006;
-        const V v1365 = v1355 + v1364;
-        const V v1366 = v1007 * v1124;
-        const V v1367 = v1357 + v1366;
-        const V v1368 = v1007 * v987;
-        const V v1369 = v1193 + v1368;
-        const V v1370 = v949 * v1012;
-        const V v1371 = v1370 + v1353;
-        const V v1372 = v999 * v1012;
-        const V v1373 = v1372 + v1365;
-        const V v1374 = v47 * v1359;
-        const V v1375 = v1363 + v1374;
-        const V v1376 = v47 * v1373;
-        const V v1377 = v1369 + v1376;
-        const V v1378 = t14 * v1361;
-        const V v1379 = v1375 + v1378;
-        const V v1380 = v949 * v1026;
-        const V v1381 = v1380 + v1175;
-        const V v1382 = v999 * v1026;
-        const V v1383 = v1382 + v1177;
-        const V v1384 = v949 * v1033;
-        const V v1385 = v1384 + v1167;
-        const V v1386 = v999 * v1033;
-        const V v1387 = v1386 + v1169;
-        const V v1388 = t14 * v1367;
-        const V v1389 = v1377 + v1388;
-        const V v1390 = v1026 * v1111;
-        const V v1391 = v1179 + v1390;
-        const V v1392 = v1033 * v1111;
-        const V v1393 = v1159 + v1392;
-        const V v1394 = v41 * v1371;
-        const V v1395 = v1389 - v1394;
-        const V v1396 = v1021 * v1006;
-        const V v1397 = v1383 + v1396;
-        const V v1398 = v1028 * v1006;
-        const V v1399 = v1387 + v1398;
-        const V v1400 = v1021 * v1124;
-        const V v1401 = v1391 + v1400;
-        const V v1402 = v1028 * v1124;
-        const V v1403 = v1393 + v1402;
-        const V v1404 = v1021 * v987;
-        const V v1405 = v1197 + v1404;
-        const V v1406 = v1028 * v987;
-        const V v1407 = v1185 + v1406;
-        const V v1408 = v672 * v1379;
-        const V v1409 = v982 + v1408;
-        const V v1410 = v691 * v1379;
-        const V v1411 = v1318 - v1410;
-        const V v1412 = v673 * v1395;
-        const V v1413 = v980 + v1412;
-        const V v1414 = v695 * v1395;
-        const V v1415 = v1321 - v1414;
-        const V v1416 = 0.1192694691878821 * v1411;
-        const V v1417 = v678 * v1409;
-        const V v1418 = v1065 + v1417;
-        const V v1419 = v680 * v1413;
-        const V v1420 = v1067 + v1419;
-        const V v1421 = v940 * v1023;
-        const V v1422 = v1421 + v1381;
-        const V v1423 = v981 * v1023;
-        const V v1424 = v1423 + v1397;
-        const V v1425 = v981 * v1030;
-        const V v1426 = v1425 + v1399;
-        const V v1427 = v940 * v1030;
-        const V v1428 = v1427 + v1385;
-        const V v1429 = v941 * v1418;
-        const V v1430 = v1416 + v1429;
-        const V v1431 = v1024 * v1088;
-        const V v1432 = v1401 + v1431;
-        const V v1433 = v1031 * v1088;
-        const V v1434 = v1403 + v1433;
-        const V v1435 = v947 * v1024;
-        const V v1436 = v1435 + v1422;
-        const V v1437 = v947 * v1031;
-        const V v1438 = v1437 + v1428;
-        const V v1439 = v991 * v1024;
-        const V v1440 = v1439 + v1424;
-        const V v1441 = v991 * v1031;
-        const V v1442 = v1441 + v1426;
-        const V v1443 = v943 * v1420;
-        const V v1444 = v1430 + v1443;
-        const V v1445 = 0.07987743308995329 * v1415;
-        const V v1446 = v1444 + v1445;
-        const V v1447 = v1027 * v1122;
-        const V v1448 = v1432 + v1447;
-        const V v1449 = v1034 * v1122;
-        const V v1450 = v1434 + v1449;
-        const V v1451 = v950 * v1027;
-        const V v1452 = v1451 + v1436;
-        const V v1453 = v950 * v1034;
-        const V v1454 = v1453 + v1438;
-        const V v1455 = v1003 * v1027;
-        const V v1456 = v1455 + v1440;
-        const V v1457 = v1003 * v1034;
-        const V v1458 = v1457 + v1442;
-        const V v1459 = t14 * v1448;
-        const V v1460 = v1405 + v1459;
-        const V v1461 = t14 * v1450;
-        const V v1462 = v1407 + v1461;
-        const V v1463 = v944 * v1333;
-        const V v1464 = v1446 - v1463;
-        const V v1465 = v41 * v1452;
-        const V v1466 = v1460 - v1465;
-        const V v1467 = v41 * v1454;
-        const V v1468 = v1462 - v1467;
-        const V v1469 = v47 * v1456;
-        const V v1470 = v1466 + v1469;
-        const V v1471 = v47 * v1458;
-        const V v1472 = v1468 + v1471;
-        const V v1473 = v946 * v1331;
-        const V v1474 = v1464 - v1473;
-        const V v1475 = v966 * v1275;
-        const V v1476 = v1474 - v1475;
-        const V v1477 = v702 * v1472;
-        const V v1478 = v674 * v1472;
-        const V v1479 = v996 + v1478;
-        const V v1480 = v675 * v1470;
-        const V v1481 = v992 + v1480;
-        const V v1482 = v693 * v1470;
-        const V v1483 = v1477 - v1482;
-        const V v1484 = 0.05582662111236089 * v1483;
-        const V v1485 = v1476 + v1484;
-        const V v1486 = v679 * v1481;
-        const V v1487 = v1066 + v1486;
-        const V v1488 = v682 * v1479;
-        const V v1489 = v1071 + v1488;
-        const V v1490 = v942 * v1487;
-        const V v1491 = v1485 + v1490;
-        const V v1492 = v945 * v1489;
-        const V v1493 = v1491 - v1492;
-        const V v1494 = v1057 * v1493;
-        const V v1495 = v1274 + v1494;
-        const V v1496 = v967 * v1495;
-        const M v1497 = softehl_lt(softehl_splat(0.0), v66);
-        V v1498 = softehl_splat(0.0);
-        V v1499 = softehl_splat(0.0);
-        V v1500 = softehl_splat(0.0);
-        V v1501 = softehl_splat(0.0);
-        const M m1502 = v1497;
-        if (softehl_any(m1502)) {
-            const V v1503 = v400 * v415;
-            const V v1504 = v66 * tp4;
-            const V v1505 = v1503 - v1504;
-            v1498 = softehl_blend(m1502, v1505, v1498);
-            v1499 = softehl_blend(m1502, softehl_splat(0.0), v1499);
-            v1500 = softehl_blend(m1502, v66, v1500);
-            v1501 = softehl_blend(m1502, softehl_splat(0.0), v1501);
+        const double v277 = 0.5 * w[1], v278 = 0.5 * w[2];
+        const V v279 = softehl_vexp(p2 * parameters[3]);
+        const double v280 = 0.5 - v277, v281 = 0.5 + v277, v282 = 0.5 - v278, v283 = 0.5 + v278;
+        const V v284 = v272 + v271, v285 = v280 * v2 + v281 * v3, v286 = v282 * v2 + v283 * v3,
+            v287 = v285 + v286, v288 = parameters[2] * v279, v289 = v284 - v237, v290 = 0.5 * v287,
+            v291 = 0.25 * v287, v292 = 1.0 / (parameters[6] * v290), v293 = v292 * (v288 * v35),
+            v294 = p3 * v291, v295 = v19 * v294, v296 = softehl_vlog(1.0 + v293 * v293),
+            v297 = softehl_vexp(v10 * v296), v298 = v293 * (parameters[8] + v1 * v297),
+            v299 = 0.932469514203152 * v295, v300 = 0.6612093864662645 * v295,
+            v301 = 0.2386191860831969 * v295, v302 = v298 + v299, v303 = v298 + v300,
+            v304 = v298 + v301, v305 = v298 - v301, v306 = v298 - v300, v307 = v298 - v299;
+        V v308[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v293, softehl_splat(v10), softehl_splat(v1), softehl_splat(v21), v299, v300, v301, v298, v302, v303, v304, v305, v306, v307}, v308, &failed);
+        const V v309 = v308[1], v310 = v308[2], v311 = v308[3], v312 = v308[4], v313 = v308[5],
+            v314 = v308[6], v315 = v309 * v309, v316 = v310 * v310, v317 = v311 * v311,
+            v318 = v312 * v312, v319 = v313 * v313, v320 = v314 * v314, v321 = 1.0 + v315,
+            v322 = 1.0 + v316, v323 = 1.0 + v317, v324 = 1.0 + v318, v325 = 1.0 + v319,
+            v326 = 1.0 + v320, v327 = softehl_vlog(v321), v328 = softehl_vlog(v322),
+            v329 = softehl_vlog(v323), v330 = softehl_vlog(v324), v331 = softehl_vlog(v325),
+            v332 = softehl_vlog(v326), v333 = 2.0 * v312, v334 = 2.0 * v311, v335 = 2.0 * v313,
+            v336 = 2.0 * v310, v337 = 2.0 * v314, v338 = 2.0 * v309,
+            v339 = softehl_vexp(v21 * v328), v340 = softehl_vexp(v21 * v329),
+            v341 = softehl_vexp(v21 * v327), v342 = softehl_vexp(v21 * v332),
+            v343 = softehl_vexp(v21 * v330), v344 = softehl_vexp(v21 * v331),
+            v345 = v21 * (1.0 / v324), v346 = v21 * (1.0 / v323), v347 = v21 * (1.0 / v325),
+            v348 = v21 * (1.0 / v322), v349 = v21 * (1.0 / v326), v350 = v21 * (1.0 / v321),
+            v351 = v336 * v348, v352 = v338 * v350, v353 = v333 * v345, v354 = v334 * v346,
+            v355 = v337 * v349, v356 = v335 * v347, v357 = v1 * v339, v358 = v1 * v340,
+            v359 = v1 * v341, v360 = v1 * v342, v361 = v1 * v343, v362 = v1 * v344,
+            v363 = parameters[8] + v357, v364 = parameters[8] + v358, v365 = parameters[8] + v359,
+            v366 = parameters[8] + v360, v367 = parameters[8] + v361, v368 = parameters[8] + v362,
+            v369 = 1.0 / v363, v370 = 1.0 / v364, v371 = 1.0 / v365, v372 = 1.0 / v366,
+            v373 = 1.0 / (v363 * v363), v374 = 1.0 / (v364 * v364), v375 = 1.0 / (v365 * v365),
+            v376 = 1.0 / v367, v377 = 1.0 / (v366 * v366), v378 = 1.0 / v368,
+            v379 = 1.0 / (v367 * v367), v380 = 1.0 / (v368 * v368), v381 = v310 * v369,
+            v382 = v369 * v369, v383 = v311 * v370, v384 = v370 * v370,
+            v385 = v382 * (0.1803807865240693 * v310), v386 = v384 * (0.23395696728634552 * v311),
+            v387 = v314 * v372, v388 = v372 * v372, v389 = v388 * (0.08566224618958518 * v314),
+            v390 = v371 * v371, v391 = v309 * v371, v392 = v312 * v376, v393 = v376 * v376,
+            v394 = v390 * (0.08566224618958518 * v309), v395 = v393 * (0.23395696728634552 * v312),
+            v396 = v357 * v385, v397 = v358 * v386, v398 = v360 * v389,
+            v399 = 0.1803807865240693 * v369 - v351 * v396, v400 = v359 * v394,
+            v401 = 0.23395696728634552 * v370 - v354 * v397, v402 = v378 * v378, v403 = v313 * v378,
+            v404 = 0.08566224618958518 * v372 - v355 * v398, v405 = v361 * v395,
+            v406 = v402 * (0.1803807865240693 * v313),
+            v407 = 0.08566224618958518 * v371 - v352 * v400, v408 = 1.0 + v315 * v375,
+            v409 = 0.23395696728634552 * v376 - v353 * v405, v410 = softehl_vlog(v408),
+            v411 = 1.0 + v316 * v373, v412 = v362 * v406, v413 = softehl_vlog(v411),
+            v414 = 1.0 + v317 * v374, v415 = 1.0 + v318 * v379, v416 = softehl_vlog(v414),
+            v417 = softehl_vlog(v415), v418 = 1.0 + v319 * v380,
+            v419 = 0.1803807865240693 * v378 - v356 * v412, v420 = softehl_vlog(v418),
+            v421 = 1.0 + v320 * v377, v422 = softehl_vlog(v421), v423 = softehl_vexp(v10 * v410),
+            v424 = softehl_vexp(v10 * v413), v425 = softehl_vexp(v10 * v416),
+            v426 = softehl_vexp(v10 * v417), v427 = softehl_vexp(v10 * v420),
+            v428 = softehl_vexp(v10 * v422), v429 = v1 * v425, v430 = v1 * v427, v431 = v1 * v428,
+            v432 = parameters[8] + v429, v433 = v429 * v383, v434 = v433 * (v10 * (1.0 / v414)),
+            v435 = parameters[8] + v430, v436 = v430 * v403, v437 = v436 * (v10 * (1.0 / v418)),
+            v438 = parameters[8] + v431, v439 = v431 * v387, v440 = v439 * (v10 * (1.0 / v421)),
+            v441 = v1 * v423, v442 = parameters[8] + v441, v443 = v441 * v391,
+            v444 = v443 * (v10 * (1.0 / v408)), v445 = v1 * v424, v446 = v1 * v426,
+            v447 = parameters[8] + v445, v448 = v445 * v381, v449 = v448 * (v10 * (1.0 / v411)),
+            v450 = parameters[8] + v446, v451 = v446 * v392, v452 = v451 * (v10 * (1.0 / v415)),
+            v453 = v309 * v390 * v442 + v375 * (v375 * (2.0 * v315 * v365)) * v444,
+            v454 = v359 * v453, v455 = v371 * v442 + v338 * (v375 * v444 - v350 * v454),
+            v456 = v310 * v382 * v447 + v373 * (v373 * (2.0 * v316 * v363)) * v449,
+            v457 = v357 * v456, v458 = v369 * v447 + v336 * (v373 * v449 - v348 * v457),
+            v459 = v311 * v384 * v432 + v374 * (v374 * (2.0 * v317 * v364)) * v434,
+            v460 = v358 * v459, v461 = v370 * v432 + v334 * (v374 * v434 - v346 * v460),
+            v462 = v312 * v393 * v450 + v379 * (v379 * (2.0 * v318 * v367)) * v452,
+            v463 = v361 * v462, v464 = v376 * v450 + v333 * (v379 * v452 - v345 * v463),
+            v465 = v313 * v402 * v435 + v380 * (v380 * (2.0 * v319 * v368)) * v437,
+            v466 = v362 * v465, v467 = v378 * v435 + v335 * (v380 * v437 - v347 * v466),
+            v468 = v314 * v388 * v438 + v377 * (v377 * (2.0 * v320 * v366)) * v440,
+            v469 = v360 * v468, v470 = v372 * v438 + v337 * (v377 * v440 - v349 * v469);
+        V v471[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v407, v399, v401, v409, v419, v404, softehl_splat((-1.0)), v455, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v458, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v461, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v464, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v467, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v470}, v471, &failed);
+        const V v472 = v290 * v290, v473 = 1.0 / v472, v474 = v285 * v286 * v473,
+            v475 = v280 * v8 + v281 * v9, v476 = v282 * v8 + v283 * v9, v477 = 0.5 * (v475 + v476),
+            v478 = v287 * v477, v479 = v473 * (v286 * v475 + v285 * v476 - v474 * v478),
+            v480 = 0.1192694691878821 * v310, v481 = 0.05582662111236089 * v311,
+            v482 = 0.07987743308995329 * v309, v483 = 0.07987743308995329 * v314,
+            v484 = 0.05582662111236089 * v312, v485 = 0.1192694691878821 * v313, v486 = v410 * v443,
+            v487 = v413 * v448, v488 = v416 * v433, v489 = v417 * v451, v490 = v420 * v436,
+            v491 = v422 * v439, v492 = v279 * t8 + v288 * (p2 * t9 + parameters[3] * tp2),
+            v493 = 1.0 / v288, v494 = v19 * (0.5 * p3 * v477 + (v291 * tp3 - v294 * v28)),
+            v495 = v474 * v474, v496 = v327 * v454, v497 = v328 * v457,
+            v498 = v35 * v492 + (v288 * v232 - v293 * (v290 * t12 + parameters[6] * v477)),
+            v499 = v292 * v498, v500 = 0.932469514203152 * v494, v501 = 0.6612093864662645 * v494,
+            v502 = 0.2386191860831969 * v494, v503 = v329 * v460, v504 = v330 * v463,
+            v505 = v331 * v466,
+            v506 = v331 * v412 + (v330 * v405 + (v329 * v397 + (v328 * v396 + v327 * v400))),
+            v507 = v332 * v469, v508 = v332 * v398 + v506, v509 = v471[7], v510 = v471[8],
+            v511 = v471[9], v512 = v471[10], v513 = v471[11], v514 = v471[12], v515 = v471[13],
+            v516 = v471[14], v517 = v471[15], v518 = v471[16], v519 = v471[17], v520 = v471[18],
+            v521 = v471[19], v522 = v471[20], v523 = v471[21], v524 = v471[22], v525 = v471[23],
+            v526 = v471[24], v527 = v471[25], v528 = v471[26], v529 = v471[27], v530 = v471[28],
+            v531 = v471[29], v532 = v471[30], v533 = v471[31], v534 = v471[32], v535 = v471[33],
+            v536 = v471[34], v537 = v471[35], v538 = v471[36], v539 = v471[37], v540 = v471[38],
+            v541 = v471[39], v542 = v471[40], v543 = v471[41], v544 = v471[42], v545 = v471[43],
+            v546 = v471[44], v547 = v471[45], v548 = v471[46], v549 = v471[47], v550 = v471[48],
+            v551 = v11 * v472, v552 = v459 + (v425 * v383 - v383 - v340 * v459),
+            v553 = v453 + (v423 * v391 - v391) - v341 * v453,
+            v554 = v462 + (v426 * v392 - v392 - v343 * v462),
+            v555 = v456 + (v424 * v381 - v381) - v339 * v456,
+            v556 = v394 + (v386 + (v395 - v343 * v395) - v340 * v386 - v341 * v394) - v339 * v385,
+            v557 = v465 + (v427 * v403 - v403) - v344 * v465,
+            v558 = v468 + (v428 * v387 - v387) - v342 * v468,
+            v559 = v389 + (v406 + (v385 + v556) - v344 * v406) - v342 * v389,
+            v560 = (v531 - v536) * v500 + (v533 - v534) * v502 + (v532 - v535) * v501,
+            v561 = (v510 - v515) * v500 + (v512 - v513) * v502 + (v511 - v514) * v501,
+            v562 = (v517 - v522) * v500 + (v519 - v520) * v502 + (v518 - v521) * v501,
+            v563 = (v524 - v529) * v500 + (v526 - v527) * v502 + (v525 - v528) * v501,
+            v564 = (v545 - v550) * v500 + (v547 - v548) * v502 + (v546 - v549) * v501,
+            v565 = (v540 - v541) * v502 + (v539 - v542) * v501 + (v538 - v543) * v500,
+            v566 = v503 * v540 + (v497 * v539 + (v496 * v538 + v507 * v543) + v537 * v508),
+            v567 = v538 * v553 + v543 * v558 + v539 * v555 + v537 * v559 + v540 * v552,
+            v568 = v545 * v553 + v550 * v558 + v546 * v555 + v544 * v559 + v547 * v552,
+            v569 = v503 * v547 + (v497 * v546 + (v496 * v545 + v507 * v550) + v544 * v508),
+            v570 = v484 * v376 + (v483 * v372 - v480 * v369 - v481 * v370 - v482 * v371),
+            v571 = v485 * v378 + v570,
+            v572 = v489 * v541 + (v488 * v540 + (v487 * v539 + (v486 * v538 + v491 * v543))),
+            v573 = v489 * v548 + (v488 * v547 + (v487 * v546 + (v486 * v545 + v491 * v550))),
+            v574 = (v495 * (v472 * v18 + v11 * v478) + v551 * (2.0 * v474) * v479) * v571,
+            v575 = v565 + v537 * v499 - v22 * (v490 * v542 + v572) + v25 * (v505 * v542 + (v504 * v541 + v566)),
+            v576 = v564 + v544 * v499 - v22 * (v490 * v549 + v573) + v25 * (v505 * v549 + (v504 * v548 + v569)),
+            v577 = v575 + t14 * (v567 + v541 * v554 + v542 * v557),
+            v578 = v576 + t14 * (v568 + v548 * v554 + v549 * v557),
+            v579 = v518 * v555 + v517 * v553 + v520 * v554 + v521 * v557 + v519 * v552,
+            v580 = v488 * v519 + (v487 * v518 + (v490 * v521 + (v486 * v517 + v489 * v520))),
+            v581 = v503 * v519 + (v497 * v518 + (v505 * v521 + (v496 * v517 + v504 * v520))),
+            v582 = v510 * v553 + v511 * v555 + v514 * v557 + v513 * v554 + v512 * v552,
+            v583 = v491 * v515 + (v488 * v512 + (v487 * v511 + (v486 * v510 + v489 * v513))),
+            v584 = v507 * v515 + (v503 * v512 + (v497 * v511 + (v496 * v510 + v504 * v513))),
+            v585 = v562 - v22 * (v491 * v522 + v580) + v516 * v499 + v25 * (v507 * v522 + v581 + v516 * v508),
+            v586 = v585 + t14 * (v579 + v522 * v558 + v516 * v559),
+            v587 = v561 + v509 * v499 + v25 * (v505 * v514 + (v584 + v509 * v508)) + t14 * (v582 + v515 * v558 + v509 * v559),
+            v588 = v587 - v22 * (v490 * v514 + v583),
+            v589 = v525 * v555 + v527 * v554 + v524 * v553 + v528 * v557 + v523 * v559,
+            v590 = v532 * v555 + v531 * v553 + v534 * v554 + v535 * v557 + v530 * v559,
+            v591 = v497 * v525 + (v505 * v528 + (v496 * v524 + v504 * v527) + v523 * v508),
+            v592 = v497 * v532 + (v505 * v535 + (v496 * v531 + v504 * v534) + v530 * v508),
+            v593 = v480 * v382 * (t14 * (1.0 - v339) + v357 * (v328 * v25 + v351 * v586)),
+            v594 = v488 * v526 + (v487 * v525 + (v490 * v528 + (v486 * v524 + v489 * v527))),
+            v595 = v488 * v533 + (v487 * v532 + (v490 * v535 + (v486 * v531 + v489 * v534))),
+            v596 = v482 * v390 * (t14 * (1.0 - v341) + v359 * (v327 * v25 + v352 * v588)),
+            v597 = 0.1192694691878821 * (v378 * v577 - v369 * v586) + v593 + v596 + 0.07987743308995329 * (v372 * v578 - v371 * v588),
+            v598 = v483 * v388 * (t14 * (1.0 - v342) + v360 * (v332 * v25 + v355 * v578)),
+            v599 = v563 + v523 * v499 + t14 * (v589 + v526 * v552 + v529 * v558) - v22 * (v491 * v529 + v594),
+            v600 = v560 + v530 * v499 + t14 * (v590 + v533 * v552 + v536 * v558) - v22 * (v491 * v536 + v595),
+            v601 = v599 + v25 * (v507 * v529 + (v503 * v526 + v591)),
+            v602 = v600 + v25 * (v507 * v536 + (v503 * v533 + v592)),
+            v603 = v485 * v402 * (t14 * (1.0 - v344) + v362 * (v331 * v25 + v356 * v577)),
+            v604 = v597 - v598 - v603 - v492 * (v493 * v571) + 0.05582662111236089 * (v376 * v602 - v370 * v601),
+            v605 = v481 * v384 * (t14 * (1.0 - v340) + v358 * (v329 * v25 + v354 * v601)),
+            v606 = v484 * v393 * (t14 * (1.0 - v343) + v361 * (v330 * v25 + v353 * v602)),
+            v607 = v493 * (v574 + v551 * v495 * (v604 + v605 - v606));
+        const M v608 = softehl_lt(softehl_splat(0.0), v35);
+        V v609 = softehl_splat(0.0), v610 = softehl_splat(0.0), v611 = softehl_splat(0.0),
+            v612 = softehl_splat(0.0);
+        const M m613 = v608;
+        if (softehl_any(m613)) {
+            const V v614 = v226 * v232 - v35 * tp4; v609 = softehl_blend(m613, v614, v609);
+            v610 = softehl_blend(m613, softehl_splat(0.0), v610);
+            v611 = softehl_blend(m613, v35, v611);
+            v612 = softehl_blend(m613, softehl_splat(0.0), v612);
         }
-        const M m1506 = ~v1497;
-        if (softehl_any(m1506)) {
-            const V v1507 = v399 * v415;
-            const V v1508 = v66 * tp6;
-            const V v1509 = v1507 - v1508;
-            v1498 = softehl_blend(m1506, softehl_splat(0.0), v1498);
-            v1499 = softehl_blend(m1506, v1509, v1499);
-            v1500 = softehl_blend(m1506, softehl_splat(0.0), v1500);
-            v1501 = softehl_blend(m1506, v66, v1501);
+        const M m615 = ~v608;
+        if (softehl_any(m615)) {
+            const V v616 = v225 * v232 - v35 * tp6;
+            v609 = softehl_blend(m615, softehl_splat(0.0), v609);
+            v610 = softehl_blend(m615, v616, v610);
+            v611 = softehl_blend(m615, softehl_splat(0.0), v611);
+            v612 = softehl_blend(m615, v35, v612);
         }
-        const V v1510 = v399 * v1501;
-        const V v1511 = v400 * v1500;
-        const V v1512 = v1510 + v1511;
-        const V v1513 = 0.5 * v1512;
-        const V v1514 = v1499 + v1498;
-        const V v1515 = v73 * v1514;
-        const V v1516 = v1513 * v72;
-        const V v1517 = v1516 + v1515;
-        const V v1518 = v68 * v1513;
-        const V v1519 = v1518 * v931;
-        const V v1520 = v1519 + v1496;
-        const V v1521 = v916 * v1517;
-        const V v1522 = v1521 + v1520;
-        const V v1523 = v438 + v584;
-        const V v1524 = 1.0 / v68;
-        const V v1525 = 0.1192694691878821 * v100;
-        const V v1526 = 0.05582662111236089 * v101;
-        const V v1527 = 0.07987743308995329 * v99;
-        const V v1528 = 0.07987743308995329 * v104;
-        const V v1529 = 0.05582662111236089 * v102;
-        const V v1530 = 0.1192694691878821 * v103;
-        const V v1531 = v202 * v1525;
-        const V v1532 = v211 * v1526;
-        const V v1533 = v198 * v1527;
-        const V v1534 = v196 * v1528;
-        const V v1535 = 1.0 - v142;
-        const V v1536 = v225 * v1529;
-        const V v1537 = 1.0 - v144;
-        const V v1538 = v208 * v1530;
-        const V v1539 = v174 * v1528;
-        const V v1540 = 1.0 - v140;
-        const V v1541 = 1.0 - v141;
-        const V v1542 = 1.0 - v146;
-        const V v1543 = 1.0 - v143;
-        const V v1544 = v172 * v1527;
-        const V v1545 = v1539 - v1544;
-        const V v1546 = v393[7];
-        const V v1547 = v393[8];
-        const V v1548 = v393[9];
-        const V v1549 = v393[10];
-        const V v1550 = v393[11];
-        const V v1551 = v393[12];
-        const V v1552 = v393[13];
-        const V v1553 = v393[14];
-        const V v1554 = v393[15];
-        const V v1555 = v393[16];
-        const V v1556 = v393[17];
-        const V v1557 = v393[18];
-        const V v1558 = v393[19];
-        const V v1559 = v393[20];
-        const V v1560 = v393[21];
-        const V v1561 = v393[22];
-        const V v1562 = v393[23];
-        const V v1563 = v393[24];
-        const V v1564 = v393[25];
-        const V v1565 = v393[26];
-        const V v1566 = v393[27];
-        const V v1567 = v393[28];
-        const V v1568 = v393[29];
-        const V v1569 = v393[30];
-        const V v1570 = v393[31];
-        const V v1571 = v393[32];
-        const V v1572 = v393[33];
-        const V v1573 = v393[34];
-        const V v1574 = v393[35];
-        const V v1575 = v393[36];
-        const V v1576 = v393[37];
-        const V v1577 = v393[38];
-        const V v1578 = v393[39];
-        const V v1579 = v393[40];
-        const V v1580 = v393[41];
-        const V v1581 = v393[42];
-        const V v1582 = v393[43];
-        const V v1583 = v393[44];
-        const V v1584 = v393[45];
-        const V v1585 = v393[46];
-        const V v1586 = v393[47];
-        const V v1587 = v393[48];
-        const V v1588 = v118 * v47;
-        const V v1589 = v119 * v47;
-        const V v1590 = v117 * v47;
-        const V v1591 = v122 * v47;
-        const V v1592 = v120 * v47;
-        const V v1593 = v121 * v47;
-        const V v1594 = v1577 - v1578;
-        const V v1595 = v1584 - v1585;
-        const V v1596 = v1583 - v1586;
-        const V v1597 = v1582 - v1587;
-        const V v1598 = v481 * v1594;
-        const V v1599 = v481 * v1595;
-        const V v1600 = v1547 - v1552;
-        const V v1601 = v1548 - v1551;
-        const V v1602 = v1549 - v1550;
-        const V v1603 = v1554 - v1559;
-        const V v1604 = v481 * v1602;
-        const V v1605 = v1555 - v1558;
-        const V v1606 = v1556 - v1557;
-        const V v1607 = v477 * v1603;
-        const V v1608 = v1561 - v1566;
-        const V v1609 = v1562 - v1565;
-        const V v1610 = v477 * v1608;
-        const V v1611 = v1563 - v1564;
-        const V v1612 = v480 * v1605;
-        const V v1613 = v1607 + v1612;
-        const V v1614 = v1568 - v1573;
-        const V v1615 = v1569 - v1572;
-        const V v1616 = t14 * v1535;
-        const V v1617 = t14 * v1537;
-        const V v1618 = v477 * v1614;
-        const V v1619 = v1570 - v1571;
-        const V v1620 = v480 * v1609;
-        const V v1621 = v1610 + v1620;
-        const V v1622 = t14 * v1540;
-        const V v1623 = t14 * v1541;
-        const V v1624 = t14 * v1542;
-        const V v1625 = t14 * v1543;
-        const V v1626 = v480 * v1615;
-        const V v1627 = v1618 + v1626;
-        const V v1628 = v401 * v1571;
-        const V v1629 = v401 * v1550;
-        const V v1630 = v445 * v1550;
-        const V v1631 = v445 * v1571;
-        const V v1632 = v547 * v1550;
-        const V v1633 = v547 * v1571;
-        const V v1634 = v401 * v1557;
-        const V v1635 = v445 * v1557;
-        const V v1636 = v547 * v1557;
-        const V v1637 = v401 * v1564;
-        const V v1638 = v445 * v1564;
-        const V v1639 = v547 * v1564;
-        const V v1640 = v481 * v1619;
-        const V v1641 = v1640 + v1627;
-        const V v1642 = v401 * v1578;
-        const V v1643 = v445 * v1578;
-        const V v1644 = v547 * v1578;
-        const V v1645 = v401 * v1585;
-        const V v1646 = v445 * v1585;
-        const V v1647 = v547 * v1585;
-        const V v1648 = v1524 * v72;
-        const V v1649 = v481 * v1606;
-        const V v1650 = v1649 + v1613;
-        const V v1651 = v481 * v1611;
-        const V v1652 = v1651 + v1621;
-        const V v1653 = v1576 - v1579;
-        const V v1654 = v403 * v1579;
-        const V v1655 = v1642 + v1654;
-        const V v1656 = v448 * v1579;
-        const V v1657 = v1643 + v1656;
-        const V v1658 = v553 * v1579;
-        const V v1659 = v1644 + v1658;
-        const V v1660 = v403 * v1586;
-        const V v1661 = v1645 + v1660;
-        const V v1662 = v448 * v1586;
-        const V v1663 = v1646 + v1662;
-        const V v1664 = v553 * v1586;
-        const V v1665 = v1647 + v1664;
-        const V v1666 = v1575 - v1580;
-        const V v1667 = v405 * v1580;
-        const V v1668 = v1667 + v1655;
-        const V v1669 = v451 * v1580;
-        const V v1670 = v1669 + v1657;
-        const V v1671 = v550 * v1580;
-        const V v1672 = v1671 + v1659;
-        const V v1673 = v405 * v1587;
-        const V v1674 = v1673 + v1661;
-        const V v1675 = v451 * v1587;
-        const V v1676 = v1675 + v1663;
-        const V v1677 = v550 * v1587;
-        const V v1678 = v1677 + v1665;
-        const V v1679 = v480 * v1653;
-        const V v1680 = v1679 + v1598;
-        const V v1681 = v480 * v1601;
-        const V v1682 = v1681 + v1604;
-        const V v1683 = v480 * v1596;
-        const V v1684 = v1683 + v1599;
-        const V v1685 = v477 * v1666;
-        const V v1686 = v1685 + v1680;
-        const V v1687 = v477 * v1600;
-        const V v1688 = v1687 + v1682;
-        const V v1689 = v477 * v1597;
-        const V v1690 = v1689 + v1684;
-        const V v1691 = v396 * v1575;
-        const V v1692 = v1691 + v1668;
-        const V v1693 = v426 * v1575;
-        const V v1694 = v1693 + v1670;
-        const V v1695 = v512 * v1575;
-        const V v1696 = v1695 + v1672;
-        const V v1697 = v396 * v1582;
-        const V v1698 = v1697 + v1674;
-        const V v1699 = v426 * v1582;
-        const V v1700 = v1699 + v1676;
-        const V v1701 = v512 * v1582;
-        const V v1702 = v1701 + v1678;
-        const V v1703 = v176 * v1525;
-        const V v1704 = v1545 - v1703;
-        const V v1705 = v444 * v1546;
-        const V v1706 = v1705 + v1688;
-        const V v1707 = v444 * v1574;
-        const V v1708 = v1707 + v1686;
-        const V v1709 = v453 * v1574;
-        const V v1710 = v1709 + v1694;
-        const V v1711 = v519 * v1574;
-        const V v1712 = v1711 + v1696;
-        const V v1713 = v453 * v1546;
-        const V v1714 = v1713 + v1630;
-        const V v1715 = v519 * v1546;
-        const V v1716 = v1632 + v1715;
-        const V v1717 = v182 * v1526;
-        const V v1718 = v1704 - v1717;
-        const V v1719 = v453 * v1581;
-        const V v1720 = v1719 + v1700;
-        const V v1721 = v519 * v1581;
-        const V v1722 = v1721 + v1702;
-        const V v1723 = v444 * v1581;
-        const V v1724 = v1723 + v1690;
-        const V v1725 = v186 * v1529;
-        const V v1726 = v1725 + v1718;
-        const V v1727 = v431 * v1576;
-        const V v1728 = v1727 + v1710;
-        const V v1729 = v431 * v1548;
-        const V v1730 = v1729 + v1714;
-        const V v1731 = v516 * v1548;
-        const V v1732 = v1731 + v1716;
-        const V v1733 = v178 * v1530;
-        const V v1734 = v1733 + v1726;
-        const V v1735 = v431 * v1583;
-        const V v1736 = v1735 + v1720;
-        const V v1737 = v516 * v1583;
-        const V v1738 = v1737 + v1722;
-        const V v1739 = v397 * v1548;
-        const V v1740 = v1739 + v1629;
-        const V v1741 = v397 * v1583;
-        const V v1742 = v1741 + v1698;
-        const V v1743 = v397 * v1576;
-        const V v1744 = v1743 + v1692;
-        const V v1745 = v516 * v1576;
-        const V v1746 = v1745 + v1712;
-        const V v1747 = v1648 * v1734;
-        const V v1748 = v439 * v1577;
-        const V v1749 = v1748 + v1728;
-        const V v1750 = v439 * v1584;
-        const V v1751 = v1750 + v1736;
-        const V v1752 = v542 * v1584;
-        const V v1753 = v1752 + v1738;
-        const V v1754 = v398 * v1584;
-        const V v1755 = v1754 + v1742;
-        const V v1756 = v398 * v1577;
-        const V v1757 = v1756 + v1744;
-        const V v1758 = v542 * v1577;
-        const V v1759 = v1758 + v1746;
-        const V v1760 = v398 * v1549;
-        const V v1761 = v1760 + v1740;
-        const V v1762 = v439 * v1549;
-        const V v1763 = v1762 + v1730;
-        const V v1764 = v542 * v1549;
-        const V v1765 = v1764 + v1732;
-        const V v1766 = v47 * v1749;
-        const V v1767 = v1708 + v1766;
-        const V v1768 = v47 * v1751;
-        const V v1769 = v1724 + v1768;
-        const V v1770 = v41 * v1757;
-        const V v1771 = v1767 - v1770;
-        const V v1772 = v41 * v1755;
-        const V v1773 = v1769 - v1772;
-        const V v1774 = t14 * v1759;
-        const V v1775 = v1771 + v1774;
-        const V v1776 = t14 * v1753;
-        const V v1777 = v1773 + v1776;
-        const V v1778 = v396 * v1547;
-        const V v1779 = v1778 + v1761;
-        const V v1780 = v426 * v1547;
-        const V v1781 = v1780 + v1763;
-        const V v1782 = v512 * v1547;
-        const V v1783 = v1782 + v1765;
-        const V v1784 = v178 * v1775;
-        const V v1785 = v157 * v1775;
-        const V v1786 = v1593 + v1785;
-        const V v1787 = v174 * v1777;
-        const V v1788 = v156 * v1777;
-        const V v1789 = v1591 + v1788;
-        const V v1790 = v403 * v1551;
-        const V v1791 = v1790 + v1779;
-        const V v1792 = v448 * v1551;
-        const V v1793 = v1792 + v1781;
-        const V v1794 = v553 * v1551;
-        const V v1795 = v1794 + v1783;
-        const V v1796 = v162 * v1786;
-        const V v1797 = v1625 + v1796;
-        const V v1798 = v160 * v1789;
-        const V v1799 = v1623 + v1798;
-        const V v1800 = v405 * v1552;
-        const V v1801 = v1800 + v1791;
-        const V v1802 = v451 * v1552;
-        const V v1803 = v1802 + v1793;
-        const V v1804 = v550 * v1552;
-        const V v1805 = v1804 + v1795;
-        const V v1806 = v396 * v1554;
-        const V v1807 = v1806 + v1634;
-        const V v1808 = v426 * v1554;
-        const V v1809 = v1808 + v1635;
-        const V v1810 = v512 * v1554;
-        const V v1811 = v1810 + v1636;
-        const V v1812 = v1538 * v1797;
-        const V v1813 = v1747 + v1812;
-        const V v1814 = v41 * v1801;
-        const V v1815 = v1706 - v1814;
-        const V v1816 = v405 * v1559;
-        const V v1817 = v1816 + v1807;
-        const V v1818 = v451 * v1559;
-        const V v1819 = v1818 + v1809;
-        const V v1820 = v550 * v1559;
-        const V v1821 = v1820 + v1811;
-        const V v1822 = v1534 * v1799;
-        const V v1823 = v1813 + v1822;
-        const V v1824 = t14 * v1805;
-        const V v1825 = v1815 + v1824;
-        const V v1826 = v47 * v1803;
-        const V v1827 = v1825 + v1826;
-        const V v1828 = v396 * v1561;
-        const V v1829 = v1828 + v1637;
-        const V v1830 = v426 * v1561;
-        const V v1831 = v1830 + v1638;
-        const V v1832 = v396 * v1568;
-        const V v1833 = v1832 + v1628;
-        const V v1834 = v426 * v1568;
-        const V v1835 = v1834 + v1631;
-        const V v1836 = v512 * v1561;
-        const V v1837 = v1836 + v1639;
-        const V v1838 = v512 * v1568;
-        const V v1839 = v1838 + v1633;
-        const V v1840 = v158 * v1827;
-        const V v1841 = v1590 + v1840;
-        const V v1842 = v172 * v1827;
-        const V v1843 = v1787 - v1842;
-        const V v1844 = v451 * v1566;
-        const V v1845 = v1844 + v1831;
-        const V v1846 = v451 * v1573;
-        const V v1847 = v1846 + v1835;
-        const V v1848 = v550 * v1566;
-        const V v1849 = v1848 + v1837;
-        const V v1850 = v550 * v1573;
-        const V v1851 = v1850 + v1839;
-        const V v1852 = v405 * v1566;
-        const V v1853 = v1852 + v1829;
-        const V v1854 = v405 * v1573;
-        const V v1855 = v1854 + v1833;
-        const V v1856 = 0.07987743308995329 * v1843;
-        const V v1857 = v1823 - v1856;
-        const V v1858 = v159 * v1841;
-        const V v1859 = v1622 + v1858;
-        const V v1860 = v1533 * v1859;
-        const V v1861 = v1857 - v1860;
-        const V v1862 = v453 * v1553;
-        const V v1863 = v1862 + v1819;
-        const V v1864 = v453 * v1560;
-        const V v1865 = v1864 + v1845;
-        const V v1866 = v453 * v1567;
-        const V v1867 = v1866 + v1847;
-        const V v1868 = v519 * v1553;
-        const V v1869 = v1868 + v1821;
-        const V v1870 = v519 * v1560;
-        const V v1871 = v1870 + v1849;
-        const V v1872 = v519 * v1567;
-        const V v1873 = v1872 + v1851;
-        const V v1874 = v444 * v1553;
-        const V v1875 = v1874 + v1650;
-        const V v1876 = v444 * v1560;
-        const V v1877 = v1876 + v1652;
-        const V v1878 = v444 * v1567;
-        const V v1879 = v1878 + v1641;
-        const V v1880 = v431 * v1555;
-        const V v1881 = v1880 + v1863;
-        const V v1882 = v431 * v1562;
-        const V v1883 = v1882 + v1865;
-        const V v1884 = v431 * v1569;
-        const V v1885 = v1884 + v1867;
-        const V v1886 = v397 * v1562;
-        const V v1887 = v1886 + v1853;
-        const V v1888 = v397 * v1569;
-        const V v1889 = v1888 + v1855;
-        const V v1890 = v516 * v1562;
-        const V v1891 = v1890 + v1871;
-        const V v1892 = v516 * v1569;
-        const V v1893 = v1892 + v1873;
-        const V v1894 = v516 * v1555;
-        const V v1895 = v1894 + v1869;
-        const V v1896 = v397 * v1555;
-        const V v1897 = v1896 + v1817;
-        const V v1898 = v439 * v1556;
-        const V v1899 = v1898 + v1881;
-        const V v1900 = v439 * v1563;
-        const V v1901 = v1900 + v1883;
-        const V v1902 = v439 * v1570;
-        const V v1903 = v1902 + v1885;
-        const V v1904 = v398 * v1563;
-        const V v1905 = v1904 + v1887;
-        const V v1906 = v398 * v1570;
-        const V v1907 = v1906 + v1889;
-        const V v1908 = v398 * v1556;
-        const V v1909 = v1908 + v1897;
-        const V v1910 = v542 * v1556;
-        const V v1911 = v1910 + v1895;
-        const V v1912 = v542 * v1563;
-        const V v1913 = v1912 + v1891;
-        const V v1914 = v542 * v1570;
-        const V v1915 = v1914 + v1893;
-        const V v1916 = v448 * v1558;
-        const V v1917 = v1916 + v1899;
-        const V v1918 = v448 * v1565;
-        const V v1919 = v1918 + v1901;
-        const V v1920 = v448 * v1572;
-        const V v1921 = v1920 + v1903;
-        const V v1922 = v403 * v1565;
-        const V v1923 = v1922 + v1905;
-        const V v1924 = v403 * v1558;
-        const V v1925 = v1924 + v1909;
-        const V v1926 = v403 * v1572;
-        const V v1927 = v1926 + v1907;
-        const V v1928 = v553 * v1558;
-        const V v1929 = v1928 + v1911;
-        const V v1930 = v553 * v1565;
-        const V v1931 = v1930 + v1913;
-        const V v1932 = v553 * v1572;
-        const V v1933 = v1932 + v1915;
-        const V v1934 = v47 * v1917;
-        const V v1935 = v1875 + v1934;
-        const V v1936 = v47 * v1919;
-        const V v1937 = v1877 + v1936;
-        const V v1938 = v47 * v1921;
-        const V v1939 = v1879 + v1938;
-        const V v1940 = v41 * v1925;
-        const V v1941 = v1935 - v1940;
-        const V v1942 = v41 * v1923;
-        const V v1943 = v1937 - v1942;
-        const V v1944 = v41 * v1927;
-        const V v1945 = v1939 - v1944;
-        const V v1946 = t14 * v1929;
-        const V v1947 = v1941 + v1946;
-        const V v1948 = t14 * v1931;
-        const V v1949 = v1943 + v1948;
-        const V v1950 = t14 * v1933;
-        const V v1951 = v1945 + v1950;
-        const V v1952 = v186 * v1951;
-        const V v1953 = v154 * v1951;
-        const V v1954 = v1592 + v1953;
-        const V v1955 = v153 * v1947;
-        const V v1956 = v1588 + v1955;
-        const V v1957 = v176 * v1947;
-        const V v1958 = v1784 - v1957;
-        const V v1959 = v155 * v1949;
-        const V v1960 = v1589 + v1959;
-        const V v1961 = v182 * v1949;
-        const V v1962 = v1952 - v1961;
-        const V v1963 = v161 * v1956;
-        const V v1964 = v1616 + v1963;
-        const V v1965 = v163 * v1960;
-        const V v1966 = v1617 + v1965;
-        const V v1967 = 0.1192694691878821 * v1958;
-        const V v1968 = v1861 - v1967;
-        const V v1969 = v164 * v1954;
-        const V v1970 = v1624 + v1969;
-        const V v1971 = v1531 * v1964;
-        const V v1972 = v1968 - v1971;
-        const V v1973 = v1532 * v1966;
-        const V v1974 = v1972 - v1973;
-        const V v1975 = v1536 * v1970;
-        const V v1976 = v1974 + v1975;
-        const V v1977 = 0.05582662111236089 * v1962;
-        const V v1978 = v1976 - v1977;
-        const V v1979 = v27 * v1978;
-        const V v1980 = v38 * v1734;
-        const V v1981 = v1979 - v1980;
-        const V v1982 = v1524 * v1981;
-        softehl_store4(R + 14 * q + 0, (14 * points), v70, v59, v72, tp0);
-        softehl_store4(R + 14 * q + 4, (14 * points), v592, v1522, v1523, v417);
-        softehl_store1(R + 14 * q + 8, (14 * points), v72);
-        softehl_store3(R + 14 * q + 11, (14 * points), tp4, tp6, v1982);
+        const V v617 = 0.5 * (v225 * v612 + v226 * v611),
+            v618 = v474 * (v617 * v38 + v39 * (v610 + v609)) + (v36 * v617 * v479 + v607),
+            v619 = v237 + v284, v620 = 1.0 / v36, v621 = 0.1192694691878821 * v59,
+            v622 = 0.05582662111236089 * v60, v623 = 0.07987743308995329 * v58,
+            v624 = 0.07987743308995329 * v63, v625 = 0.05582662111236089 * v61,
+            v626 = 0.1192694691878821 * v62, v627 = v220[7], v628 = v220[8], v629 = v220[9],
+            v630 = v220[10], v631 = v220[11], v632 = v220[12], v633 = v220[13], v634 = v220[14],
+            v635 = v220[15], v636 = v220[16], v637 = v220[17], v638 = v220[18], v639 = v220[19],
+            v640 = v220[20], v641 = v220[21], v642 = v220[22], v643 = v220[23], v644 = v220[24],
+            v645 = v220[25], v646 = v220[26], v647 = v220[27], v648 = v220[28], v649 = v220[29],
+            v650 = v220[30], v651 = v220[31], v652 = v220[32], v653 = v220[33], v654 = v220[34],
+            v655 = v220[35], v656 = v220[36], v657 = v220[37], v658 = v220[38], v659 = v220[39],
+            v660 = v220[40], v661 = v220[41], v662 = v220[42], v663 = v220[43], v664 = v220[44],
+            v665 = v220[45], v666 = v220[46], v667 = v220[47], v668 = v220[48],
+            v669 = v256 * (v651 - v652) + (v254 * (v649 - v654) + v255 * (v650 - v653)),
+            v670 = v256 * (v637 - v638) + (v254 * (v635 - v640) + v255 * (v636 - v639)),
+            v671 = v256 * (v644 - v645) + (v254 * (v642 - v647) + v255 * (v643 - v646)),
+            v672 = v254 * (v656 - v661) + (v255 * (v657 - v660) + v256 * (v658 - v659)),
+            v673 = v254 * (v628 - v633) + (v255 * (v629 - v632) + v256 * (v630 - v631)),
+            v674 = v254 * (v663 - v668) + (v255 * (v664 - v667) + v256 * (v665 - v666)),
+            v675 = v244 * v655 + (v234 * v656 + (v243 * v661 + (v240 * v659 + v241 * v660))),
+            v676 = v262 * v655 + (v260 * v656 + (v266 * v661 + (v265 * v659 + v267 * v660))),
+            v677 = v244 * v662 + (v234 * v663 + (v243 * v668 + (v240 * v666 + v241 * v667))),
+            v678 = v262 * v662 + (v260 * v663 + (v266 * v668 + (v265 * v666 + v267 * v667))),
+            v679 = v127 * v625 + (v119 * v624 - v118 * v623 - v120 * v621 - v124 * v622),
+            v680 = v121 * v626 + v679,
+            v681 = v223 * v664 + (v222 * v663 + (v229 * v668 + (v227 * v666 + v228 * v667))),
+            v682 = v223 * v657 + (v222 * v656 + (v229 * v661 + (v227 * v659 + v228 * v660))),
+            v683 = v239 * v655 + v672 + v25 * (v238 * v658 + (v235 * v657 + v675)) - v22 * (v224 * v658 + v682),
+            v684 = v239 * v662 + v674 + v25 * (v238 * v665 + (v235 * v664 + v677)) - v22 * (v224 * v665 + v681),
+            v685 = v683 + t14 * (v264 * v658 + (v261 * v657 + v676)),
+            v686 = v684 + t14 * (v264 * v665 + (v261 * v664 + v678)),
+            v687 = v234 * v628 + (v238 * v630 + (v235 * v629 + (v244 * v627 + v240 * v631))),
+            v688 = v260 * v628 + (v264 * v630 + (v261 * v629 + (v265 * v631 + v262 * v627))),
+            v689 = v228 * v632 + (v222 * v628 + (v224 * v630 + (v223 * v629 + v227 * v631))),
+            v690 = v140 * v626 * (t14 * (1.0 - v91) + v109 * (v80 * v25 + v104 * v685)),
+            v691 = v131 * v624 * (t14 * (1.0 - v89) + v107 * (v81 * v25 + v103 * v686)),
+            v692 = v239 * v627 + v673 - v22 * (v229 * v633 + v689) + t14 * (v266 * v633 + (v267 * v632 + v688)),
+            v693 = v692 + v25 * (v243 * v633 + (v241 * v632 + v687)),
+            v694 = v620 * v38 * v680 + v690 + v691 - 0.07987743308995329 * (v119 * v686 - v118 * v693),
+            v695 = v132 * v623 * (t14 * (1.0 - v88) + v106 * (v76 * v25 + v105 * v693)),
+            v696 = v235 * v636 + (v244 * v634 + (v243 * v640 + (v234 * v635 + v240 * v638))),
+            v697 = v235 * v643 + (v244 * v641 + (v243 * v647 + (v234 * v642 + v240 * v645))),
+            v698 = v235 * v650 + (v244 * v648 + (v243 * v654 + (v234 * v649 + v240 * v652))),
+            v699 = v261 * v643 + (v262 * v641 + (v266 * v647 + (v260 * v642 + v265 * v645))),
+            v700 = v261 * v650 + (v262 * v648 + (v266 * v654 + (v260 * v649 + v265 * v652))),
+            v701 = v261 * v636 + (v262 * v634 + (v266 * v640 + (v260 * v635 + v265 * v638))),
+            v702 = v224 * v644 + (v223 * v643 + (v229 * v647 + (v222 * v642 + v227 * v645))),
+            v703 = v224 * v651 + (v223 * v650 + (v229 * v654 + (v222 * v649 + v227 * v652))),
+            v704 = v224 * v637 + (v223 * v636 + (v229 * v640 + (v222 * v635 + v227 * v638))),
+            v705 = v239 * v634 + v670 + v25 * (v241 * v639 + (v238 * v637 + v696)) - v22 * (v228 * v639 + v704),
+            v706 = v239 * v641 + v671 + v25 * (v241 * v646 + (v238 * v644 + v697)) - v22 * (v228 * v646 + v702),
+            v707 = v239 * v648 + v669 + v25 * (v241 * v653 + (v238 * v651 + v698)) - v22 * (v228 * v653 + v703),
+            v708 = v705 + t14 * (v267 * v639 + (v264 * v637 + v701)),
+            v709 = v706 + t14 * (v267 * v646 + (v264 * v644 + v699)),
+            v710 = v707 + t14 * (v267 * v653 + (v264 * v651 + v700)),
+            v711 = v135 * v621 * (t14 * (1.0 - v90) + v108 * (v77 * v25 + v100 * v708)),
+            v712 = v694 - v695 - 0.1192694691878821 * (v121 * v685 - v120 * v708) - v711,
+            v713 = v142 * v622 * (t14 * (1.0 - v92) + v110 * (v78 * v25 + v102 * v709)),
+            v714 = v152 * v625 * (t14 * (1.0 - v93) + v111 * (v79 * v25 + v101 * v710)),
+            v715 = v712 - v713 + v714 - 0.05582662111236089 * (v127 * v710 - v124 * v709),
+            v716 = v620 * (v13 * v715 - v20 * v680);
+        softehl_store4(R + 14 * q + 0, (14 * points), v37, v34, v38, tp0);
+        softehl_store4(R + 14 * q + 4, (14 * points), v289, v618, v619, v233);
+        softehl_store1(R + 14 * q + 8, (14 * points), v38);
+        softehl_store3(R + 14 * q + 11, (14 * points), tp4, tp6, v716);
     }
     for (ptrdiff_t q = 0; q < points; ++q) {
         softehl_store2(R + 14 * q + 9, (14 * points), softehl_splat(0.0), softehl_splat(0.0));
@@ -4989,34 +1156,4 @@ static void softehl_film_conserving_carreau_fields_rate_group(
         softehl_spoil(failed, R, (14 * points));
     }
 }
-
-void softehl_film_conserving_carreau_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_carreau_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + (16 + (4 + modes)) * e, parameters, rule, basis, values + (14 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_carreau_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + (16 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (14 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double t[SOFTEHL_LANES * (16 + (4 + modes))];
-    softehl_pad(t, direction, (16 + (4 + modes)), n);
-    double R[SOFTEHL_LANES * (14 * points)];
-    softehl_film_conserving_carreau_fields_rate(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (14 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_conserving_carreau_fields_rate, 4, (4 + modes), 2, (16 + (4 + modes)), (14 * points), 0)

@@ -64,63 +64,14 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]);
-    const double v2 = p[5] * v1;
-    const double v3 = exp(v2);
-    const double v4 = p[5] * v3;
-    const double v5 = p[1] * p[6];
-    const double v6 = v5 * v4;
-    const double v7 = p[7] * v1;
-    const double v8 = exp(v7);
-    const double v9 = p[7] * v8;
-    const double v10 = p[2] * p[8];
-    const double v11 = v10 * v9;
-    const double v12 = v11 + v6;
-    const double v13 = p[3] * v1;
-    const double v14 = exp(v13);
-    const double v15 = p[3] * v14;
-    const double v16 = p[0] * p[4];
-    const double v17 = v16 * v15;
-    const double v18 = v12 + v17;
-    const double v19 = 1.0 / s[0];
-    const double v20 = v19 * v18;
-    const double v21 = log(s[1]);
-    const double v22 = p[5] * v21;
-    const double v23 = exp(v22);
-    const double v24 = p[5] * v23;
-    const double v25 = v5 * v24;
-    const double v26 = p[7] * v21;
-    const double v27 = exp(v26);
-    const double v28 = p[7] * v27;
-    const double v29 = v10 * v28;
-    const double v30 = v29 + v25;
-    const double v31 = p[3] * v21;
-    const double v32 = exp(v31);
-    const double v33 = p[3] * v32;
-    const double v34 = v16 * v33;
-    const double v35 = v30 + v34;
-    const double v36 = 1.0 / s[1];
-    const double v37 = v36 * v35;
-    const double v38 = log(s[2]);
-    const double v39 = p[5] * v38;
-    const double v40 = exp(v39);
-    const double v41 = p[5] * v40;
-    const double v42 = v5 * v41;
-    const double v43 = p[7] * v38;
-    const double v44 = exp(v43);
-    const double v45 = p[7] * v44;
-    const double v46 = v10 * v45;
-    const double v47 = v46 + v42;
-    const double v48 = p[3] * v38;
-    const double v49 = exp(v48);
-    const double v50 = p[3] * v49;
-    const double v51 = v16 * v50;
-    const double v52 = v47 + v51;
-    const double v53 = 1.0 / s[2];
-    const double v54 = v53 * v52;
-    w[0] = v20;
-    w[1] = v37;
-    w[2] = v54;
+    const double v1 = log(s[0]), v2 = exp(p[5] * v1), v3 = p[1] * p[6], v4 = exp(p[7] * v1),
+        v5 = p[2] * p[8], v6 = exp(p[3] * v1), v7 = p[0] * p[4],
+        v8 = 1.0 / s[0] * (v5 * (p[7] * v4) + v3 * (p[5] * v2) + v7 * (p[3] * v6)), v9 = log(s[1]),
+        v10 = exp(p[5] * v9), v11 = exp(p[7] * v9), v12 = exp(p[3] * v9),
+        v13 = 1.0 / s[1] * (v5 * (p[7] * v11) + v3 * (p[5] * v10) + v7 * (p[3] * v12)),
+        v14 = log(s[2]), v15 = exp(p[5] * v14), v16 = exp(p[7] * v14), v17 = exp(p[3] * v14),
+        v18 = 1.0 / s[2] * (v5 * (p[7] * v16) + v3 * (p[5] * v15) + v7 * (p[3] * v17));
+    w[0] = v8; w[1] = v13; w[2] = v18;
     return failed;
 }
 
@@ -181,108 +132,19 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_2_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]);
-    const double v2 = p[5] * v1;
-    const double v3 = exp(v2);
-    const double v4 = p[5] * v3;
-    const double v5 = p[1] * p[6];
-    const double v6 = v5 * v4;
-    const double v7 = p[7] * v1;
-    const double v8 = exp(v7);
-    const double v9 = p[7] * v8;
-    const double v10 = p[2] * p[8];
-    const double v11 = v10 * v9;
-    const double v12 = v11 + v6;
-    const double v13 = p[3] * v1;
-    const double v14 = exp(v13);
-    const double v15 = p[3] * v14;
-    const double v16 = p[0] * p[4];
-    const double v17 = v16 * v15;
-    const double v18 = v12 + v17;
-    const double v19 = 1.0 / s[0];
-    const double v20 = v19 * v18;
-    const double v21 = log(s[1]);
-    const double v22 = p[5] * v21;
-    const double v23 = exp(v22);
-    const double v24 = p[5] * v23;
-    const double v25 = v5 * v24;
-    const double v26 = p[7] * v21;
-    const double v27 = exp(v26);
-    const double v28 = p[7] * v27;
-    const double v29 = v10 * v28;
-    const double v30 = v29 + v25;
-    const double v31 = p[3] * v21;
-    const double v32 = exp(v31);
-    const double v33 = p[3] * v32;
-    const double v34 = v16 * v33;
-    const double v35 = v30 + v34;
-    const double v36 = 1.0 / s[1];
-    const double v37 = v36 * v35;
-    const double v38 = log(s[2]);
-    const double v39 = p[5] * v38;
-    const double v40 = exp(v39);
-    const double v41 = p[5] * v40;
-    const double v42 = v5 * v41;
-    const double v43 = p[7] * v38;
-    const double v44 = exp(v43);
-    const double v45 = p[7] * v44;
-    const double v46 = v10 * v45;
-    const double v47 = v46 + v42;
-    const double v48 = p[3] * v38;
-    const double v49 = exp(v48);
-    const double v50 = p[3] * v49;
-    const double v51 = v16 * v50;
-    const double v52 = v47 + v51;
-    const double v53 = 1.0 / s[2];
-    const double v54 = v53 * v52;
-    const double v55 = v3 * v5;
-    const double v56 = p[5] * p[5];
-    const double v57 = v55 * v56;
-    const double v58 = v8 * v10;
-    const double v59 = p[7] * p[7];
-    const double v60 = v58 * v59;
-    const double v61 = v60 + v57;
-    const double v62 = v14 * v16;
-    const double v63 = p[3] * p[3];
-    const double v64 = v62 * v63;
-    const double v65 = v61 + v64;
-    const double v66 = v19 * v65;
-    const double v67 = v66 - v20;
-    const double v68 = v19 * v67;
-    const double v69 = v23 * v5;
-    const double v70 = v69 * v56;
-    const double v71 = v27 * v10;
-    const double v72 = v71 * v59;
-    const double v73 = v72 + v70;
-    const double v74 = v32 * v16;
-    const double v75 = v74 * v63;
-    const double v76 = v73 + v75;
-    const double v77 = v36 * v76;
-    const double v78 = v77 - v37;
-    const double v79 = v36 * v78;
-    const double v80 = v40 * v5;
-    const double v81 = v80 * v56;
-    const double v82 = v44 * v10;
-    const double v83 = v82 * v59;
-    const double v84 = v83 + v81;
-    const double v85 = v49 * v16;
-    const double v86 = v85 * v63;
-    const double v87 = v84 + v86;
-    const double v88 = v53 * v87;
-    const double v89 = v88 - v54;
-    const double v90 = v53 * v89;
-    w[0] = v20;
-    w[1] = v37;
-    w[2] = v54;
-    w[3] = v68;
-    w[4] = 0.0;
-    w[5] = 0.0;
-    w[6] = 0.0;
-    w[7] = v79;
-    w[8] = 0.0;
-    w[9] = 0.0;
-    w[10] = 0.0;
-    w[11] = v90;
+    const double v1 = log(s[0]), v2 = exp(p[5] * v1), v3 = p[1] * p[6], v4 = exp(p[7] * v1),
+        v5 = p[2] * p[8], v6 = exp(p[3] * v1), v7 = p[0] * p[4], v8 = 1.0 / s[0],
+        v9 = v8 * (v5 * (p[7] * v4) + v3 * (p[5] * v2) + v7 * (p[3] * v6)), v10 = log(s[1]),
+        v11 = exp(p[5] * v10), v12 = exp(p[7] * v10), v13 = exp(p[3] * v10), v14 = 1.0 / s[1],
+        v15 = v14 * (v5 * (p[7] * v12) + v3 * (p[5] * v11) + v7 * (p[3] * v13)), v16 = log(s[2]),
+        v17 = exp(p[5] * v16), v18 = exp(p[7] * v16), v19 = exp(p[3] * v16), v20 = 1.0 / s[2],
+        v21 = v20 * (v5 * (p[7] * v18) + v3 * (p[5] * v17) + v7 * (p[3] * v19)), v22 = p[5] * p[5],
+        v23 = p[7] * p[7], v24 = p[3] * p[3],
+        v25 = v14 * (v14 * (v12 * v5 * v23 + v11 * v3 * v22 + v13 * v7 * v24) - v15),
+        v26 = v20 * (v20 * (v18 * v5 * v23 + v17 * v3 * v22 + v19 * v7 * v24) - v21);
+    w[0] = v9; w[1] = v15; w[2] = v21;
+    w[3] = (v8 * (v8 * (v4 * v5 * v23 + v2 * v3 * v22 + v6 * v7 * v24) - v9)); w[4] = 0.0;
+    w[5] = 0.0; w[6] = 0.0; w[7] = v25; w[8] = 0.0; w[9] = 0.0; w[10] = 0.0; w[11] = v26;
     return failed;
 }
 
@@ -335,28 +197,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_0_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[3] * p[4];
-    const double v2 = log(s[0]);
-    const double v3 = p[3] * v2;
-    const double v4 = exp(v3);
-    const double v5 = v4 * v1;
-    const double v6 = 1.0 / s[0];
-    const double v7 = v6 * v5;
-    const double v8 = log(s[1]);
-    const double v9 = p[3] * v8;
-    const double v10 = exp(v9);
-    const double v11 = v10 * v1;
-    const double v12 = 1.0 / s[1];
-    const double v13 = v12 * v11;
-    const double v14 = log(s[2]);
-    const double v15 = p[3] * v14;
-    const double v16 = exp(v15);
-    const double v17 = v16 * v1;
-    const double v18 = 1.0 / s[2];
-    const double v19 = v18 * v17;
-    w[0] = v7;
-    w[1] = v13;
-    w[2] = v19;
+    const double v1 = p[3] * p[4], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = log(s[1]),
+        v5 = exp(p[3] * v4), v6 = log(s[2]), v7 = exp(p[3] * v6);
+    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
+    w[2] = (1.0 / s[2] * (v7 * v1));
     return failed;
 }
 
@@ -395,28 +239,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_1_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[5] * p[6];
-    const double v2 = log(s[0]);
-    const double v3 = p[5] * v2;
-    const double v4 = exp(v3);
-    const double v5 = v4 * v1;
-    const double v6 = 1.0 / s[0];
-    const double v7 = v6 * v5;
-    const double v8 = log(s[1]);
-    const double v9 = p[5] * v8;
-    const double v10 = exp(v9);
-    const double v11 = v10 * v1;
-    const double v12 = 1.0 / s[1];
-    const double v13 = v12 * v11;
-    const double v14 = log(s[2]);
-    const double v15 = p[5] * v14;
-    const double v16 = exp(v15);
-    const double v17 = v16 * v1;
-    const double v18 = 1.0 / s[2];
-    const double v19 = v18 * v17;
-    w[0] = v7;
-    w[1] = v13;
-    w[2] = v19;
+    const double v1 = p[5] * p[6], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = log(s[1]),
+        v5 = exp(p[5] * v4), v6 = log(s[2]), v7 = exp(p[5] * v6);
+    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
+    w[2] = (1.0 / s[2] * (v7 * v1));
     return failed;
 }
 
@@ -455,28 +281,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_2_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[7] * p[8];
-    const double v2 = log(s[0]);
-    const double v3 = p[7] * v2;
-    const double v4 = exp(v3);
-    const double v5 = v4 * v1;
-    const double v6 = 1.0 / s[0];
-    const double v7 = v6 * v5;
-    const double v8 = log(s[1]);
-    const double v9 = p[7] * v8;
-    const double v10 = exp(v9);
-    const double v11 = v10 * v1;
-    const double v12 = 1.0 / s[1];
-    const double v13 = v12 * v11;
-    const double v14 = log(s[2]);
-    const double v15 = p[7] * v14;
-    const double v16 = exp(v15);
-    const double v17 = v16 * v1;
-    const double v18 = 1.0 / s[2];
-    const double v19 = v18 * v17;
-    w[0] = v7;
-    w[1] = v13;
-    w[2] = v19;
+    const double v1 = p[7] * p[8], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = log(s[1]),
+        v5 = exp(p[7] * v4), v6 = log(s[2]), v7 = exp(p[7] * v6);
+    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
+    w[2] = (1.0 / s[2] * (v7 * v1));
     return failed;
 }
 
@@ -515,34 +323,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_3_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]);
-    const double v2 = p[3] * v1;
-    const double v3 = 1.0 + v2;
-    const double v4 = p[0] * p[4];
-    const double v5 = v4 * v3;
-    const double v6 = exp(v2);
-    const double v7 = v6 * v5;
-    const double v8 = 1.0 / s[0];
-    const double v9 = v8 * v7;
-    const double v10 = log(s[1]);
-    const double v11 = p[3] * v10;
-    const double v12 = 1.0 + v11;
-    const double v13 = v4 * v12;
-    const double v14 = exp(v11);
-    const double v15 = v14 * v13;
-    const double v16 = 1.0 / s[1];
-    const double v17 = v16 * v15;
-    const double v18 = log(s[2]);
-    const double v19 = p[3] * v18;
-    const double v20 = 1.0 + v19;
-    const double v21 = v4 * v20;
-    const double v22 = exp(v19);
-    const double v23 = v22 * v21;
-    const double v24 = 1.0 / s[2];
-    const double v25 = v24 * v23;
-    w[0] = v9;
-    w[1] = v17;
-    w[2] = v25;
+    const double v1 = log(s[0]), v2 = p[3] * v1, v3 = p[0] * p[4], v4 = exp(v2), v5 = log(s[1]),
+        v6 = p[3] * v5, v7 = exp(v6), v8 = log(s[2]), v9 = p[3] * v8, v10 = exp(v9);
+    w[0] = (1.0 / s[0] * (v4 * (v3 * (1.0 + v2)))); w[1] = (1.0 / s[1] * (v7 * (v3 * (1.0 + v6))));
+    w[2] = (1.0 / s[2] * (v10 * (v3 * (1.0 + v9))));
     return failed;
 }
 
@@ -581,28 +365,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_4_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[0] * p[3];
-    const double v2 = log(s[0]);
-    const double v3 = p[3] * v2;
-    const double v4 = exp(v3);
-    const double v5 = v4 * v1;
-    const double v6 = 1.0 / s[0];
-    const double v7 = v6 * v5;
-    const double v8 = log(s[1]);
-    const double v9 = p[3] * v8;
-    const double v10 = exp(v9);
-    const double v11 = v10 * v1;
-    const double v12 = 1.0 / s[1];
-    const double v13 = v12 * v11;
-    const double v14 = log(s[2]);
-    const double v15 = p[3] * v14;
-    const double v16 = exp(v15);
-    const double v17 = v16 * v1;
-    const double v18 = 1.0 / s[2];
-    const double v19 = v18 * v17;
-    w[0] = v7;
-    w[1] = v13;
-    w[2] = v19;
+    const double v1 = p[0] * p[3], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = log(s[1]),
+        v5 = exp(p[3] * v4), v6 = log(s[2]), v7 = exp(p[3] * v6);
+    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
+    w[2] = (1.0 / s[2] * (v7 * v1));
     return failed;
 }
 
@@ -641,34 +407,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_5_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]);
-    const double v2 = p[5] * v1;
-    const double v3 = 1.0 + v2;
-    const double v4 = p[1] * p[6];
-    const double v5 = v4 * v3;
-    const double v6 = exp(v2);
-    const double v7 = v6 * v5;
-    const double v8 = 1.0 / s[0];
-    const double v9 = v8 * v7;
-    const double v10 = log(s[1]);
-    const double v11 = p[5] * v10;
-    const double v12 = 1.0 + v11;
-    const double v13 = v4 * v12;
-    const double v14 = exp(v11);
-    const double v15 = v14 * v13;
-    const double v16 = 1.0 / s[1];
-    const double v17 = v16 * v15;
-    const double v18 = log(s[2]);
-    const double v19 = p[5] * v18;
-    const double v20 = 1.0 + v19;
-    const double v21 = v4 * v20;
-    const double v22 = exp(v19);
-    const double v23 = v22 * v21;
-    const double v24 = 1.0 / s[2];
-    const double v25 = v24 * v23;
-    w[0] = v9;
-    w[1] = v17;
-    w[2] = v25;
+    const double v1 = log(s[0]), v2 = p[5] * v1, v3 = p[1] * p[6], v4 = exp(v2), v5 = log(s[1]),
+        v6 = p[5] * v5, v7 = exp(v6), v8 = log(s[2]), v9 = p[5] * v8, v10 = exp(v9);
+    w[0] = (1.0 / s[0] * (v4 * (v3 * (1.0 + v2)))); w[1] = (1.0 / s[1] * (v7 * (v3 * (1.0 + v6))));
+    w[2] = (1.0 / s[2] * (v10 * (v3 * (1.0 + v9))));
     return failed;
 }
 
@@ -707,28 +449,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_6_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[1] * p[5];
-    const double v2 = log(s[0]);
-    const double v3 = p[5] * v2;
-    const double v4 = exp(v3);
-    const double v5 = v4 * v1;
-    const double v6 = 1.0 / s[0];
-    const double v7 = v6 * v5;
-    const double v8 = log(s[1]);
-    const double v9 = p[5] * v8;
-    const double v10 = exp(v9);
-    const double v11 = v10 * v1;
-    const double v12 = 1.0 / s[1];
-    const double v13 = v12 * v11;
-    const double v14 = log(s[2]);
-    const double v15 = p[5] * v14;
-    const double v16 = exp(v15);
-    const double v17 = v16 * v1;
-    const double v18 = 1.0 / s[2];
-    const double v19 = v18 * v17;
-    w[0] = v7;
-    w[1] = v13;
-    w[2] = v19;
+    const double v1 = p[1] * p[5], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = log(s[1]),
+        v5 = exp(p[5] * v4), v6 = log(s[2]), v7 = exp(p[5] * v6);
+    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
+    w[2] = (1.0 / s[2] * (v7 * v1));
     return failed;
 }
 
@@ -767,34 +491,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_7_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]);
-    const double v2 = p[7] * v1;
-    const double v3 = 1.0 + v2;
-    const double v4 = p[2] * p[8];
-    const double v5 = v4 * v3;
-    const double v6 = exp(v2);
-    const double v7 = v6 * v5;
-    const double v8 = 1.0 / s[0];
-    const double v9 = v8 * v7;
-    const double v10 = log(s[1]);
-    const double v11 = p[7] * v10;
-    const double v12 = 1.0 + v11;
-    const double v13 = v4 * v12;
-    const double v14 = exp(v11);
-    const double v15 = v14 * v13;
-    const double v16 = 1.0 / s[1];
-    const double v17 = v16 * v15;
-    const double v18 = log(s[2]);
-    const double v19 = p[7] * v18;
-    const double v20 = 1.0 + v19;
-    const double v21 = v4 * v20;
-    const double v22 = exp(v19);
-    const double v23 = v22 * v21;
-    const double v24 = 1.0 / s[2];
-    const double v25 = v24 * v23;
-    w[0] = v9;
-    w[1] = v17;
-    w[2] = v25;
+    const double v1 = log(s[0]), v2 = p[7] * v1, v3 = p[2] * p[8], v4 = exp(v2), v5 = log(s[1]),
+        v6 = p[7] * v5, v7 = exp(v6), v8 = log(s[2]), v9 = p[7] * v8, v10 = exp(v9);
+    w[0] = (1.0 / s[0] * (v4 * (v3 * (1.0 + v2)))); w[1] = (1.0 / s[1] * (v7 * (v3 * (1.0 + v6))));
+    w[2] = (1.0 / s[2] * (v10 * (v3 * (1.0 + v9))));
     return failed;
 }
 
@@ -833,28 +533,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_8_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[2] * p[7];
-    const double v2 = log(s[0]);
-    const double v3 = p[7] * v2;
-    const double v4 = exp(v3);
-    const double v5 = v4 * v1;
-    const double v6 = 1.0 / s[0];
-    const double v7 = v6 * v5;
-    const double v8 = log(s[1]);
-    const double v9 = p[7] * v8;
-    const double v10 = exp(v9);
-    const double v11 = v10 * v1;
-    const double v12 = 1.0 / s[1];
-    const double v13 = v12 * v11;
-    const double v14 = log(s[2]);
-    const double v15 = p[7] * v14;
-    const double v16 = exp(v15);
-    const double v17 = v16 * v1;
-    const double v18 = 1.0 / s[2];
-    const double v19 = v18 * v17;
-    w[0] = v7;
-    w[1] = v13;
-    w[2] = v19;
+    const double v1 = p[2] * p[7], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = log(s[1]),
+        v5 = exp(p[7] * v4), v6 = log(s[2]), v7 = exp(p[7] * v6);
+    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
+    w[2] = (1.0 / s[2] * (v7 * v1));
     return failed;
 }
 
@@ -887,1473 +569,298 @@ static void softehl_solid_taylor_mean_ogden_isochoric_1_by_8_lanes(
     }
 }
 
-static void softehl_solid_taylor_mean_ogden_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 15, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 15, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
-    softehl_load4(t + 8, 15, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14;
-    softehl_load3(t + 12, 15, &t12, &t13, &t14);
-    (void)t12; (void)t13; (void)t14;
-    const double v1 = 0.5 * parameters[1];
-    const double v2 = 1.0 / parameters[1];
-    const double v3 = 0.5 * parameters[3];
-    const double v4 = 1.0 / parameters[3];
-    const double v5 = 0.5 * parameters[5];
-    const double v6 = 1.0 / parameters[5];
-    const double v7 = 0.5 * parameters[6];
-    const double v8 = 1.5707963267948966 * parameters[6];
-    const V v9 = X4 - X0;
-    const V v10 = X0 - X2;
-    const V v11 = X4 - X2;
-    const V v12 = v9 - X2;
-    const V v13 = X4 - X6;
-    const V v14 = X6 + v12;
-    const V v15 = X1 - X3;
-    const V v16 = X1 + X3;
-    const double v17 = v2 * v2;
-    const V v18 = v10 + v13;
-    const V v19 = 0.25 * v14;
-    const V v20 = 0.0625 * v14;
-    const double v21 = v4 * v4;
-    const V v22 = v13 - v10;
-    const double v23 = v6 * v6;
-    const V v24 = t9 * v17;
-    const V v25 = 0.5 * t9;
-    const V v26 = 0.25 * v22;
-    const V v27 = 0.0625 * v22;
-    const V v28 = t11 * v21;
-    const V v29 = 0.5 * t11;
-    const V v30 = t13 * v23;
-    const V v31 = 0.5 * t13;
-    const V v32 = X5 - X3;
-    const V v33 = X5 - X7;
-    const V v34 = X5 + X7;
-    const V v35 = d0 - d2;
-    const V v36 = d0 + d2;
-    const V v37 = v15 + v33;
-    const V v38 = v16 + v34;
-    const V v39 = d1 + d3;
-    const V v40 = d1 - d3;
-    const V v41 = v33 - v15;
-    const V v42 = v34 - v16;
-    const V v43 = 0.25 * v38;
-    const V v44 = 0.5 * v38;
-    const V v45 = 0.25 * v41;
-    const V v46 = 0.0625 * v41;
-    const V v47 = 0.25 * v42;
-    const V v48 = 0.0625 * v42;
-    const V v49 = 1.0 / v43;
-    const V v50 = v43 * v43;
-    const V v51 = v36 - d4;
-    const V v52 = 1.0 / v50;
-    const V v53 = v18 * v46;
-    const V v54 = v18 * v48;
-    const V v55 = v51 - d6;
-    const V v56 = d4 - d6;
-    const V v57 = v26 * v47;
-    const V v58 = d5 + d7;
-    const V v59 = d5 - d7;
-    const V v60 = v35 - v56;
-    const V v61 = v35 + v56;
-    const V v62 = v39 - v58;
-    const V v63 = v39 + v58;
-    const V v64 = t0 - t2;
-    const V v65 = t1 - t3;
-    const V v66 = t1 + t3;
-    const V v67 = v40 - v59;
-    const V v68 = v40 + v59;
-    const V v69 = 0.25 * v49;
-    const V v70 = v49 * v49;
-    const V v71 = v52 * v44;
-    const V v72 = t4 - t2;
-    const V v73 = t4 - t6;
-    const V v74 = t6 + v72;
-    const V v75 = v64 + v73;
-    const V v76 = v74 - t0;
-    const V v77 = t5 - t3;
-    const V v78 = v73 - v64;
-    const V v79 = t5 - t7;
-    const V v80 = t5 + t7;
-    const V v81 = 0.25 * v76;
-    const V v82 = 0.0625 * v76;
-    const V v83 = v65 + v79;
-    const V v84 = 0.25 * v78;
-    const V v85 = 0.0625 * v78;
-    const V v86 = v66 + v80;
-    const V v87 = v79 - v65;
-    const V v88 = v80 - v66;
-    const V v89 = v47 * v84;
-    const V v90 = 0.25 * v86;
-    const V v91 = 0.25 * v87;
-    const V v92 = 0.0625 * v87;
-    const V v93 = 0.25 * v88;
-    const V v94 = 0.0625 * v88;
-    const V v95 = v90 * v70;
-    const V v96 = v90 * v71;
-    const V v97 = v45 * v81;
-    const V v98 = v89 - v97;
-    const V v99 = v45 * v19;
-    const V v100 = v57 - v99;
-    const V v101 = v19 * v91;
-    const V v102 = v98 - v101;
-    const V v103 = 1.0 / v100;
-    const V v104 = v46 * v75;
-    const V v105 = v48 * v75;
-    const V v106 = v26 * v93;
-    const V v107 = v106 + v102;
-    const V v108 = v18 * v92;
-    const V v109 = v104 + v108;
-    const V v110 = v18 * v94;
-    const V v111 = v105 + v110;
-    const V v112 = v103 * v92;
-    const V v113 = v103 * v94;
-    const V v114 = v103 * v83;
-    const V v115 = v103 * v109;
-    const V v116 = v103 * v111;
-    const V v117 = v46 * v103;
-    const V v118 = v48 * v103;
-    const V v119 = v103 * v103;
-    const V v120 = v107 * v119;
-    const V v121 = v46 * v120;
-    const V v122 = v112 - v121;
-    const V v123 = v48 * v120;
-    const V v124 = v113 - v123;
-    const V v125 = v103 * v82;
-    const V v126 = v103 * v85;
-    const V v127 = v37 * v120;
-    const V v128 = v114 - v127;
-    const V v129 = v37 * v103;
-    const V v130 = v129 * v82;
-    const V v131 = v129 * v85;
-    const V v132 = v103 * v53;
-    const V v133 = v53 * v120;
-    const V v134 = v115 - v133;
-    const V v135 = v103 * v54;
-    const V v136 = v103 * v20;
-    const V v137 = v27 * v103;
-    const V v138 = v20 * v120;
-    const V v139 = v125 - v138;
-    const V v140 = v20 * v129;
-    const V v141 = v27 * v129;
-    const V v142 = v20 * v128;
-    const V v143 = v130 + v142;
-    const V v144 = 0.25 * v132;
-    const V v145 = 0.25 * v135;
-    const V v146 = v27 * v128;
-    const V v147 = v131 + v146;
-    const V v148 = v60 * v136;
-    const V v149 = v67 * v136;
-    const V v150 = 1.0 + v149;
-    const V v151 = v135 - v140;
-    const V v152 = 0.25 * v140;
-    const V v153 = v145 - v152;
-    const V v154 = 0.25 * v141;
-    const V v155 = v27 * v120;
-    const V v156 = v126 - v155;
-    const V v157 = v54 * v120;
-    const V v158 = v116 - v157;
-    const V v159 = v141 - v132;
-    const V v160 = v55 * v137;
-    const V v161 = v148 - v160;
-    const V v162 = v62 * v137;
-    const V v163 = v150 - v162;
-    const V v164 = v62 * v117;
-    const V v165 = v55 * v117;
-    const V v166 = 1.0 + v165;
-    const V v167 = v67 * v118;
-    const V v168 = v164 - v167;
-    const V v169 = v60 * v118;
-    const V v170 = v166 - v169;
-    const V v171 = v55 * v122;
-    const V v172 = v62 * v122;
-    const V v173 = v154 - v144;
-    const V v174 = v60 * v139;
-    const V v175 = v67 * v139;
-    const V v176 = v55 * v156;
-    const V v177 = v174 - v176;
-    const V v178 = v62 * v156;
-    const V v179 = v175 - v178;
-    const V v180 = v60 * v124;
-    const V v181 = v171 - v180;
-    const V v182 = v67 * v124;
-    const V v183 = v172 - v182;
-    const V v184 = v158 - v143;
-    const V v185 = v147 - v134;
-    V s186 = softehl_splat(0.0);
-    V s187 = softehl_splat(0.0);
-    V s188 = softehl_splat(0.0);
-    V s189 = softehl_splat(0.0);
-    V s190 = softehl_splat(0.0);
-    V s191 = softehl_splat(0.0);
-    V s192 = softehl_splat(0.0);
-    V s193 = softehl_splat(0.0);
-    V s194 = softehl_splat(0.0);
-    V s195 = softehl_splat(0.0);
-    V s196 = softehl_splat(0.0);
-    V s197 = softehl_splat(0.0);
-    V s198 = softehl_splat(0.0);
-    V s199 = softehl_splat(0.0);
-    V s200 = softehl_splat(0.0);
-    V s201 = softehl_splat(0.0);
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14;
+    softehl_load4(t + 0, 15, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 15, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 15, &t8, &t9, &t10, &t11); softehl_load3(t + 12, 15, &t12, &t13, &t14);
+    const double v1 = 0.5 * parameters[1], v2 = 1.0 / parameters[1], v3 = 0.5 * parameters[3],
+        v4 = 1.0 / parameters[3], v5 = 0.5 * parameters[5], v6 = 1.0 / parameters[5],
+        v7 = 0.5 * parameters[6], v8 = 1.5707963267948966 * parameters[6];
+    const V v9 = X0 - X2, v10 = X4 - X2, v11 = X4 - X6, v12 = X6 + (X4 - X0 - X2), v13 = X1 - X3,
+        v14 = X1 + X3, v15 = v9 + v11, v16 = 0.25 * v12, v17 = 0.0625 * v12, v18 = v11 - v9,
+        v19 = t9 * (v2 * v2), v20 = 0.5 * t9, v21 = 0.25 * v18, v22 = 0.0625 * v18,
+        v23 = t11 * (v4 * v4), v24 = 0.5 * t11, v25 = t13 * (v6 * v6), v26 = 0.5 * t13,
+        v27 = X5 - X3, v28 = X5 - X7, v29 = X5 + X7, v30 = d0 - d2, v31 = v13 + v28,
+        v32 = v14 + v29, v33 = d1 + d3, v34 = d1 - d3, v35 = v28 - v13, v36 = v29 - v14,
+        v37 = 0.25 * v32, v38 = 0.25 * v35, v39 = 0.0625 * v35, v40 = 0.25 * v36,
+        v41 = 0.0625 * v36, v42 = 1.0 / v37, v43 = 1.0 / (v37 * v37), v44 = v15 * v39,
+        v45 = v15 * v41, v46 = d0 + d2 - d4 - d6, v47 = d4 - d6, v48 = d5 + d7, v49 = d5 - d7,
+        v50 = v30 - v47, v51 = v30 + v47, v52 = v33 - v48, v53 = v33 + v48, v54 = t0 - t2,
+        v55 = t1 - t3, v56 = t1 + t3, v57 = v34 - v49, v58 = v34 + v49, v59 = 0.25 * v42,
+        v60 = t4 - t2, v61 = t4 - t6, v62 = v54 + v61, v63 = t6 + v60 - t0, v64 = t5 - t3,
+        v65 = v61 - v54, v66 = t5 - t7, v67 = t5 + t7, v68 = 0.25 * v63, v69 = 0.0625 * v63,
+        v70 = 0.25 * v65, v71 = 0.0625 * v65, v72 = v66 - v55, v73 = v67 - v56,
+        v74 = 0.25 * (v56 + v67), v75 = 0.25 * v72, v76 = 0.0625 * v72, v77 = 0.25 * v73,
+        v78 = 0.0625 * v73, v79 = v74 * (v42 * v42), v80 = v74 * (v43 * (0.5 * v32)),
+        v81 = 1.0 / (v21 * v40 - v38 * v16), v82 = v39 * v81, v83 = v41 * v81,
+        v84 = (v21 * v77 + (v40 * v70 - v38 * v68 - v16 * v75)) * (v81 * v81),
+        v85 = v81 * v76 - v39 * v84, v86 = v81 * v78 - v41 * v84,
+        v87 = v81 * (v55 + v66) - v31 * v84, v88 = v31 * v81, v89 = v81 * v44,
+        v90 = v81 * (v39 * v62 + v15 * v76) - v44 * v84, v91 = v81 * v45, v92 = v81 * v17,
+        v93 = v22 * v81, v94 = v81 * v69 - v17 * v84, v95 = v17 * v88, v96 = v22 * v88,
+        v97 = v88 * v69 + v17 * v87, v98 = 0.25 * v89, v99 = 0.25 * v91,
+        v100 = v88 * v71 + v22 * v87, v101 = v91 - v95, v102 = 0.25 * v95, v103 = v99 - v102,
+        v104 = 0.25 * v96, v105 = v81 * v71 - v22 * v84,
+        v106 = v81 * (v41 * v62 + v15 * v78) - v45 * v84, v107 = v96 - v89,
+        v108 = v50 * v92 - v46 * v93, v109 = 1.0 + v57 * v92 - v52 * v93,
+        v110 = v52 * v82 - v57 * v83, v111 = 1.0 + v46 * v82 - v50 * v83, v112 = v104 - v98,
+        v113 = v50 * v94 - v46 * v105, v114 = v57 * v94 - v52 * v105, v115 = v46 * v85 - v50 * v86,
+        v116 = v52 * v85 - v57 * v86, v117 = v106 - v97, v118 = v100 - v90;
+    V s119 = {0}, s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0}, s125 = {0},
+        s126 = {0}, s127 = {0}, s128 = {0}, s129 = {0}, s130 = {0}, s131 = {0}, s132 = {0},
+        s133 = {0}, s134 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v202 = 1.0 - w[1];
-        const double v203 = 1.0 + w[1];
-        const double v204 = 0.25 * w[1];
-        const double v205 = 1.0 - w[0];
-        const double v206 = 1.0 + w[0];
-        const double v207 = 0.25 * v202;
-        const double v208 = 0.25 * v203;
-        const double v209 = 0.25 * w[0];
-        const double v210 = 0.25 - v204;
-        const double v211 = 0.25 + v204;
-        const double v212 = 0.25 + v209;
-        const double v213 = 0.25 - v209;
-        const double v214 = v207 * v205;
-        const double v215 = v207 * v206;
-        const double v216 = v206 * v208;
-        const double v217 = v205 * v208;
-        const double v218 = v204 - 0.25;
-        const V v219 = X2 * v210;
-        const double v220 = v209 - 0.25;
-        const V v221 = v211 * v33;
-        const V v222 = X6 * v213;
-        const V v223 = v212 * v32;
-        const V v224 = X5 * v216;
-        const V v225 = v216 * t5;
-        const V v226 = v211 * v13;
-        const V v227 = v219 + v226;
-        const V v228 = v210 * t2;
-        const V v229 = v213 * t6;
-        const V v230 = v212 * v11;
-        const V v231 = v222 + v230;
-        const V v232 = v211 * v79;
-        const V v233 = v211 * v73;
-        const V v234 = v228 + v233;
-        const V v235 = v212 * v77;
-        const V v236 = v212 * v72;
-        const V v237 = v229 + v236;
-        const V v238 = X0 * v218;
-        const V v239 = v238 + v227;
-        const V v240 = X0 * v220;
-        const V v241 = v240 + v231;
-        const V v242 = X3 * v210;
-        const V v243 = v242 + v221;
-        const V v244 = X3 * v215;
-        const V v245 = v224 + v244;
-        const V v246 = v210 * t3;
-        const V v247 = v246 + v232;
-        const V v248 = v215 * t3;
-        const V v249 = v225 + v248;
-        const V v250 = v218 * t0;
-        const V v251 = v250 + v234;
-        const V v252 = v220 * t0;
-        const V v253 = v252 + v237;
-        const V v254 = X7 * v213;
-        const V v255 = v254 + v223;
-        const V v256 = X7 * v217;
-        const V v257 = v256 + v245;
-        const V v258 = v213 * t7;
-        const V v259 = v258 + v235;
-        const V v260 = v217 * t7;
-        const V v261 = v260 + v249;
-        const V v262 = X1 * v218;
-        const V v263 = v262 + v243;
-        const V v264 = v218 * t1;
-        const V v265 = v264 + v247;
-        const V v266 = X1 * v220;
-        const V v267 = v266 + v255;
-        const V v268 = v220 * t1;
-        const V v269 = v268 + v259;
-        const V v270 = X1 * v214;
-        const V v271 = v270 + v257;
-        const V v272 = v214 * t1;
-        const V v273 = v272 + v261;
-        const V v274 = w[0] * v239;
-        const V v275 = w[0] * v251;
-        const V v276 = v267 * v251;
-        const V v277 = v267 * v239;
-        const V v278 = w[1] * v267;
-        const V v279 = w[1] * v241;
-        const V v280 = v274 - v279;
-        const V v281 = w[1] * v269;
-        const V v282 = v239 * v269;
-        const V v283 = v276 + v282;
-        const V v284 = w[1] * v253;
-        const V v285 = v275 - v284;
-        const double v286 = w[1] * w[2];
-        const V v287 = v241 * v263;
-        const V v288 = v277 - v287;
-        const V v289 = w[0] * v263;
-        const V v290 = v278 - v289;
-        const V v291 = v263 * v253;
-        const V v292 = v283 - v291;
-        const V v293 = w[2] * v271;
-        const V v294 = w[0] * v265;
-        const V v295 = v281 - v294;
-        const V v296 = v241 * v265;
-        const V v297 = v292 - v296;
-        const V v298 = w[2] * v273;
-        const V v299 = v288 * v273;
-        const V v300 = 0.25 * v288;
-        const V v301 = v288 * v271;
-        const V v302 = v285 * v293;
-        const V v303 = v293 * v295;
-        const V v304 = v290 * v293;
-        s192 += v304;
-        const V v305 = v280 * v293;
-        s193 += v305;
-        const V v306 = v271 * v297;
-        const V v307 = v299 + v306;
-        const V v308 = 0.25 * v297;
-        const V v309 = v280 * v298;
-        s201 += v302;
-        s201 += v309;
-        const V v310 = v290 * v298;
-        s200 += v303;
-        s200 += v310;
-        const V v311 = w[2] * v300;
-        s186 += v311;
-        const V v312 = v286 * v300;
-        s188 += v312;
-        const V v313 = w[2] * v301;
-        s189 += v313;
-        const V v314 = v286 * v301;
-        s191 += v314;
-        const V v315 = w[0] * v311;
-        s187 += v315;
-        const V v316 = w[2] * v308;
-        s194 += v316;
-        const V v317 = v286 * v308;
-        s196 += v317;
-        const V v318 = w[2] * v307;
-        s197 += v318;
-        const V v319 = v286 * v307;
-        s199 += v319;
-        const V v320 = w[0] * v313;
-        s190 += v320;
-        const V v321 = w[0] * v316;
-        s195 += v321;
-        const V v322 = w[0] * v318;
-        s198 += v322;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v135 = 1.0 - w[1], v136 = 1.0 + w[1], v137 = 0.25 * w[1], v138 = 1.0 - w[0],
+            v139 = 1.0 + w[0], v140 = 0.25 * v135, v141 = 0.25 * v136, v142 = 0.25 * w[0],
+            v143 = 0.25 - v137, v144 = 0.25 + v137, v145 = 0.25 + v142, v146 = 0.25 - v142,
+            v147 = v140 * v138, v148 = v140 * v139, v149 = v139 * v141, v150 = v138 * v141,
+            v151 = v137 - 0.25;
+        const V v152 = X2 * v143; const double v153 = v142 - 0.25;
+        const V v154 = v144 * v28, v155 = X6 * v146, v156 = v145 * v27, v157 = X5 * v149,
+            v158 = v149 * t5, v159 = v144 * v11, v160 = v152 + v159, v161 = v143 * t2,
+            v162 = v146 * t6, v163 = v145 * v10, v164 = v155 + v163, v165 = v144 * v66,
+            v166 = v144 * v61, v167 = v161 + v166, v168 = v145 * v64, v169 = v145 * v60,
+            v170 = v162 + v169, v171 = X0 * v151, v172 = v171 + v160, v173 = X0 * v153,
+            v174 = v173 + v164, v175 = X3 * v143, v176 = v175 + v154, v177 = X3 * v148,
+            v178 = v143 * t3, v179 = v178 + v165, v180 = v148 * t3, v181 = v151 * t0,
+            v182 = v181 + v167, v183 = v153 * t0, v184 = v183 + v170, v185 = X7 * v146,
+            v186 = v185 + v156, v187 = X7 * v150, v188 = v146 * t7, v189 = v188 + v168,
+            v190 = v150 * t7, v191 = X1 * v151, v192 = v191 + v176, v193 = v151 * t1,
+            v194 = v193 + v179, v195 = X1 * v153, v196 = v195 + v186, v197 = v153 * t1,
+            v198 = v197 + v189, v199 = X1 * v147, v200 = v199 + (v187 + (v157 + v177)),
+            v201 = v147 * t1, v202 = v201 + (v190 + (v158 + v180)), v203 = v196 * v172,
+            v204 = w[0] * v172 - w[1] * v174;
+        const double v205 = w[1] * w[2];
+        const V v206 = v174 * v192, v207 = v203 - v206, v208 = w[1] * v196 - w[0] * v192,
+            v209 = w[2] * v200, v210 = v196 * v182 + v172 * v198 - v192 * v184 - v174 * v194,
+            v211 = w[2] * v202, v212 = 0.25 * v207, v213 = v207 * v200, v214 = v208 * v209;
+        s125 += v214; const V v215 = v204 * v209; s126 += v215;
+        const V v216 = v207 * v202 + v200 * v210, v217 = 0.25 * v210;
+        s134 += (w[0] * v182 - w[1] * v184) * v209; s134 += v204 * v211;
+        s133 += v209 * (w[1] * v198 - w[0] * v194); s133 += v208 * v211; const V v218 = w[2] * v212;
+        s119 += v218; const V v219 = v205 * v212; s121 += v219; const V v220 = w[2] * v213;
+        s122 += v220; const V v221 = v205 * v213; s124 += v221; const V v222 = w[0] * v218;
+        s120 += v222; const V v223 = w[2] * v217; s127 += v223; const V v224 = v205 * v217;
+        s129 += v224; const V v225 = w[2] * v216; s130 += v225; const V v226 = v205 * v216;
+        s132 += v226; const V v227 = w[0] * v220; s123 += v227; const V v228 = w[0] * v223;
+        s128 += v228; const V v229 = w[0] * v225; s131 += v229;
     }
-    const V v323 = 1.0 / s189;
-    const V v324 = 0.5 * s189;
-    const V v325 = v8 * s189;
-    const V v326 = t14 * v324;
-    const V v327 = v323 * v323;
-    const V v328 = v327 * s197;
-    const V v329 = v7 * s197;
-    const V v330 = v326 + v329;
-    const V v331 = 3.141592653589793 * v330;
-    const V v332 = v323 * s194;
-    const V v333 = v323 * s195;
-    const V v334 = v323 * s196;
-    const V v335 = v323 * s200;
-    const V v336 = v323 * s201;
-    const V v337 = s192 * v328;
-    const V v338 = v335 - v337;
-    const V v339 = v323 * s192;
-    const V v340 = 0.25 * v339;
-    const V v341 = s190 * v323;
-    const V v342 = s190 * v328;
-    const V v343 = v323 * s191;
-    const V v344 = v323 * s193;
-    const V v345 = s193 * v328;
-    const V v346 = v336 - v345;
-    const V v347 = s186 * v323;
-    const V v348 = s187 * v323;
-    const V v349 = s188 * v323;
-    const V v350 = 0.25 * v344;
-    const V v351 = s191 * v328;
-    const V v352 = v152 * v344;
-    const V v353 = v152 * v339;
-    const V v354 = v154 * v339;
-    const V v355 = v154 * v344;
-    const V v356 = v144 * v339;
-    const V v357 = v144 * v344;
-    const V v358 = v145 * v339;
-    const V v359 = v145 * v344;
-    const V v360 = v339 * v134;
-    const V v361 = v344 * v134;
-    const V v362 = v339 * v158;
-    const V v363 = v344 * v158;
-    const V v364 = v358 - v353;
-    const V v365 = v356 - v354;
-    const V v366 = v354 - v356;
-    const V v367 = v353 - v358;
-    const V v368 = v357 - v355;
-    const V v369 = v355 - v357;
-    const V v370 = 0.25 * v338;
-    const V v371 = v132 * v338;
-    const V v372 = v360 + v371;
-    const V v373 = v135 * v338;
-    const V v374 = v362 + v373;
-    const V v375 = v135 * v346;
-    const V v376 = v363 + v375;
-    const V v377 = 0.25 * v346;
-    const V v378 = v132 * v346;
-    const V v379 = v361 + v378;
-    const V v380 = v352 - v359;
-    const V v381 = v359 - v352;
-    const V v382 = v140 * v338;
-    const V v383 = v140 * v346;
-    const V v384 = v141 * v338;
-    const V v385 = v141 * v346;
-    const V v386 = v323 * s198;
-    const V v387 = v342 - v386;
-    const V v388 = v323 * s199;
-    const V v389 = v351 - v388;
-    const V v390 = v45 * v387;
-    const V v391 = v47 * v389;
-    const V v392 = v26 * v387;
-    const V v393 = v69 * v387;
-    const V v394 = v69 * v389;
-    const V v395 = v19 * v389;
-    const V v396 = v392 - v395;
-    const V v397 = v339 * v143;
-    const V v398 = v382 + v397;
-    const V v399 = v339 * v147;
-    const V v400 = v384 + v399;
-    const V v401 = v344 * v143;
-    const V v402 = v383 + v401;
-    const V v403 = v344 * v147;
-    const V v404 = v385 + v403;
-    const V v405 = v374 - v398;
-    const V v406 = v376 - v402;
-    const V v407 = v379 - v404;
-    const V v408 = v372 - v400;
-    const V v409 = 0.25 * v405;
-    const V v410 = v402 - v376;
-    const V v411 = v404 - v379;
-    const V v412 = v398 - v374;
-    const V v413 = 0.25 * v406;
-    const V v414 = 0.25 * v408;
-    const V v415 = 0.25 * v407;
-    const V v416 = v400 - v372;
-    const V v417 = 0.25 * v410;
-    const V v418 = 0.25 * v411;
-    const V v419 = 0.25 * v412;
-    const V v420 = 0.25 * v416;
-    const V v421 = s186 * v328;
-    const V v422 = v332 - v421;
-    const V v423 = s187 * v328;
-    const V v424 = v333 - v423;
-    const V v425 = s188 * v328;
-    const V v426 = v334 - v425;
-    const V v427 = v424 + v393;
-    const V v428 = v426 + v394;
-    const V v429 = v63 * v422;
-    const V v430 = v63 * v347;
-    const V v431 = 1.0 + v430;
-    const V v432 = v60 * v409;
-    const V v433 = v181 + v432;
-    const V v434 = v60 * v364;
-    const V v435 = v170 + v434;
-    const V v436 = v60 * v381;
-    const V v437 = v161 + v436;
-    const V v438 = v60 * v413;
-    const V v439 = v177 + v438;
-    const V v440 = v67 * v364;
-    const V v441 = v168 + v440;
-    const V v442 = v67 * v348;
-    const V v443 = v431 - v442;
-    const V v444 = v67 * v381;
-    const V v445 = v163 + v444;
-    const V v446 = v67 * v424;
-    const V v447 = v429 - v446;
-    const V v448 = v67 * v409;
-    const V v449 = v183 + v448;
-    const V v450 = v67 * v413;
-    const V v451 = v179 + v450;
-    const V v452 = v61 * v340;
-    const V v453 = v452 + v435;
-    const V v454 = v61 * v377;
-    const V v455 = v454 + v439;
-    const V v456 = v68 * v340;
-    const V v457 = v456 + v441;
-    const V v458 = v68 * v350;
-    const V v459 = v458 + v445;
-    const V v460 = v68 * v377;
-    const V v461 = v460 + v451;
-    const V v462 = v68 * v370;
-    const V v463 = v462 + v449;
-    const V v464 = v61 * v350;
-    const V v465 = v464 + v437;
-    const V v466 = v61 * v370;
-    const V v467 = v466 + v433;
-    const V v468 = v55 * v366;
-    const V v469 = v468 + v453;
-    const V v470 = v62 * v366;
-    const V v471 = v470 + v457;
-    const V v472 = v55 * v418;
-    const V v473 = v472 + v455;
-    const V v474 = v62 * v418;
-    const V v475 = v474 + v461;
-    const V v476 = v62 * v369;
-    const V v477 = v476 + v459;
-    const V v478 = v55 * v369;
-    const V v479 = v478 + v465;
-    const V v480 = v55 * v420;
-    const V v481 = v480 + v467;
-    const V v482 = v62 * v420;
-    const V v483 = v482 + v463;
-    const V v484 = v469 * v475;
-    const V v485 = v469 * v477;
-    const V v486 = v62 * v349;
-    const V v487 = v443 - v486;
-    const V v488 = v62 * v426;
-    const V v489 = v447 - v488;
-    const V v490 = 2.0 * v487;
-    const V v491 = v487 * v487;
-    const V v492 = v477 * v481;
-    const V v493 = v484 + v492;
-    const V v494 = v471 * v479;
-    const V v495 = v485 - v494;
-    const V v496 = v479 * v483;
-    const V v497 = v493 - v496;
-    const V v498 = 2.0 * v495;
-    const V v499 = v495 * v495;
-    const V v500 = v489 * v490;
-    const V v501 = v471 * v473;
-    const V v502 = v497 - v501;
-    const V v503 = v491 * v499;
-    const V v504 = 1.0 / v503;
-    const V v505 = v498 * v502;
-    const V v506 = v499 * v500;
-    const V v507 = v491 * v505;
-    const V v508 = v506 + v507;
-    const V v509 = v325 * v504;
-    const V v510 = v504 * v509;
-    const V v511 = v508 * v510;
-    const V v512 = 1.0 - v504;
-    const V v513 = v331 * v512;
-    const V v514 = v511 + v513;
-    const V v515 = v325 - v509;
-    const V v516 = v500 * v515;
-    const V v517 = v505 * v515;
-    const V v518 = v499 * v514;
-    const V v519 = v517 + v518;
-    const V v520 = v491 * v514;
-    const V v521 = v516 + v520;
-    const V v522 = v499 * v515;
-    const V v523 = v491 * v515;
-    const V v524 = v498 * v521;
-    const V v525 = v498 * v523;
-    const V v526 = 2.0 * v523;
-    const V v527 = v502 * v526;
-    const V v528 = v524 + v527;
-    const V v529 = v483 * v525;
-    const V v530 = v473 * v525;
-    const V v531 = v490 * v519;
-    const V v532 = v490 * v522;
-    const V v533 = 2.0 * v522;
-    const V v534 = v489 * v533;
-    const V v535 = v531 + v534;
-    const V v536 = v471 * v528;
-    const V v537 = v529 + v536;
-    const V v538 = v471 * v525;
-    const V v539 = v479 * v528;
-    const V v540 = v530 + v539;
-    const V v541 = v479 * v525;
-    const V v542 = v424 * v532;
-    const V v543 = v426 * v532;
-    const V v544 = v422 * v532;
-    const V v545 = v347 * v535;
-    const V v546 = v544 + v545;
-    const V v547 = v348 * v535;
-    const V v548 = v349 * v535;
-    const V v549 = v365 * v540;
-    const V v550 = v367 * v540;
-    const V v551 = v340 * v540;
-    const V v552 = v368 * v537;
-    const V v553 = v380 * v537;
-    const V v554 = v350 * v537;
-    const V v555 = v414 * v541;
-    const V v556 = v419 * v541;
-    const V v557 = v370 * v541;
-    const V v558 = v415 * v538;
-    const V v559 = v417 * v538;
-    const V v560 = v377 * v538;
-    const V v561 = v475 * v525;
-    const V v562 = v481 * v525;
-    const V v563 = v477 * v525;
-    const V v564 = v370 * v563;
-    const V v565 = v420 * v563;
-    const V v566 = v558 + v565;
-    const V v567 = v409 * v563;
-    const V v568 = v559 + v567;
-    const V v569 = v477 * v528;
-    const V v570 = v561 + v569;
-    const V v571 = v469 * v528;
-    const V v572 = v562 + v571;
-    const V v573 = v469 * v525;
-    const V v574 = v377 * v573;
-    const V v575 = v350 * v572;
-    const V v576 = v574 + v575;
-    const V v577 = v418 * v573;
-    const V v578 = v555 + v577;
-    const V v579 = v413 * v573;
-    const V v580 = v556 + v579;
-    const V v581 = v340 * v570;
-    const V v582 = v564 + v581;
-    const V v583 = v369 * v572;
-    const V v584 = v381 * v572;
-    const V v585 = v366 * v570;
-    const V v586 = v364 * v570;
-    V s587 = softehl_splat(0.0);
-    V s588 = softehl_splat(0.0);
-    V s589 = softehl_splat(0.0);
-    V s590 = softehl_splat(0.0);
-    V s591 = softehl_splat(0.0);
-    V s592 = softehl_splat(0.0);
-    V s593 = softehl_splat(0.0);
-    V s594 = softehl_splat(0.0);
-    V s595 = softehl_splat(0.0);
-    V s596 = softehl_splat(0.0);
-    V s597 = softehl_splat(0.0);
-    V s598 = softehl_splat(0.0);
-    V s599 = softehl_splat(0.0);
-    V s600 = softehl_splat(0.0);
-    V s601 = softehl_splat(0.0);
+    const V v230 = 1.0 / s122, v231 = v8 * s122, v232 = v230 * v230 * s130,
+        v233 = v230 * s133 - s125 * v232, v234 = v230 * s125, v235 = 0.25 * v234,
+        v236 = s123 * v230, v237 = v230 * s124, v238 = v230 * s126,
+        v239 = v230 * s134 - s126 * v232, v240 = s119 * v230, v241 = s120 * v230,
+        v242 = s121 * v230, v243 = 0.25 * v238, v244 = v102 * v238, v245 = v102 * v234,
+        v246 = v104 * v234, v247 = v104 * v238, v248 = v98 * v234, v249 = v98 * v238,
+        v250 = v99 * v234, v251 = v99 * v238, v252 = v250 - v245, v253 = v246 - v248,
+        v254 = v247 - v249, v255 = 0.25 * v233, v256 = v234 * v90 + v89 * v233,
+        v257 = v234 * v106 + v91 * v233, v258 = v238 * v106 + v91 * v239, v259 = 0.25 * v239,
+        v260 = v238 * v90 + v89 * v239, v261 = v251 - v244, v262 = s123 * v232 - v230 * s131,
+        v263 = s124 * v232 - v230 * s132, v264 = v38 * v262, v265 = v40 * v263,
+        v266 = v21 * v262 - v16 * v263, v267 = v95 * v233 + v234 * v97,
+        v268 = v96 * v233 + v234 * v100, v269 = v95 * v239 + v238 * v97,
+        v270 = v96 * v239 + v238 * v100, v271 = 0.25 * (v257 - v267), v272 = 0.25 * (v258 - v269),
+        v273 = 0.25 * (v270 - v260), v274 = 0.25 * (v268 - v256), v275 = v230 * s127 - s119 * v232,
+        v276 = v230 * s128 - s120 * v232, v277 = v230 * s129 - s121 * v232,
+        v278 = v276 + v59 * v262, v279 = v277 + v59 * v263,
+        v280 = v46 * v253 + (v51 * v235 + (v111 + v50 * v252)),
+        v281 = v52 * v253 + (v58 * v235 + (v110 + v57 * v252)),
+        v282 = v46 * v273 + (v51 * v259 + (v113 + v50 * v272)),
+        v283 = v52 * v273 + (v58 * v259 + (v114 + v57 * v272)),
+        v284 = v52 * v254 + (v58 * v243 + (v109 + v57 * v261)),
+        v285 = v46 * v254 + (v51 * v243 + (v108 + v50 * v261)),
+        v286 = v46 * v274 + (v51 * v255 + (v115 + v50 * v271)),
+        v287 = v52 * v274 + (v58 * v255 + (v116 + v57 * v271)),
+        v288 = 1.0 + v53 * v240 - v57 * v241 - v52 * v242,
+        v289 = v53 * v275 - v57 * v276 - v52 * v277, v290 = 2.0 * v288, v291 = v288 * v288,
+        v292 = v280 * v284 - v281 * v285, v293 = 2.0 * v292, v294 = v292 * v292, v295 = v289 * v290,
+        v296 = v280 * v283 + v284 * v286 - v285 * v287 - v281 * v282, v297 = 1.0 / (v291 * v294),
+        v298 = v293 * v296, v299 = v231 * v297,
+        v300 = 3.141592653589793 * (t14 * (0.5 * s122) + v7 * s130) * (1.0 - v297),
+        v301 = (v294 * v295 + v291 * v298) * (v297 * v299) + v300, v302 = v231 - v299,
+        v303 = v294 * v302, v304 = v291 * v302, v305 = v293 * v304,
+        v306 = v293 * (v295 * v302 + v291 * v301) + v296 * (2.0 * v304), v307 = v290 * v303,
+        v308 = v290 * (v298 * v302 + v294 * v301) + v289 * (2.0 * v303),
+        v309 = v287 * v305 + v281 * v306, v310 = v281 * v305, v311 = v282 * v305 + v285 * v306,
+        v312 = v285 * v305, v313 = v276 * v307, v314 = v277 * v307,
+        v315 = v275 * v307 + v240 * v308, v316 = v241 * v308, v317 = v242 * v308,
+        v318 = (v248 - v246) * v311, v319 = (v245 - v250) * v311, v320 = v235 * v311,
+        v321 = (v249 - v247) * v309, v322 = (v244 - v251) * v309, v323 = v243 * v309,
+        v324 = v255 * v312, v325 = v259 * v310, v326 = v284 * v305,
+        v327 = 0.25 * (v260 - v270) * v310 + v274 * v326,
+        v328 = 0.25 * (v269 - v258) * v310 + v271 * v326, v329 = v283 * v305 + v284 * v306,
+        v330 = v286 * v305 + v280 * v306, v331 = v280 * v305, v332 = v259 * v331 + v243 * v330,
+        v333 = 0.25 * (v256 - v268) * v312 + v273 * v331,
+        v334 = 0.25 * (v267 - v257) * v312 + v272 * v331, v335 = v255 * v326 + v235 * v329,
+        v336 = v254 * v330, v337 = v261 * v330, v338 = v253 * v329, v339 = v252 * v329;
+    V s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0}, s344 = {0}, s345 = {0}, s346 = {0},
+        s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0}, s351 = {0}, s352 = {0}, s353 = {0},
+        s354 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v602 = w[0] - v341;
-        const V v603 = w[1] - v343;
-        const V v604 = v45 * v602;
-        const V v605 = 0.25 * v602;
-        const V v606 = v26 * v602;
-        const V v607 = v47 * v603;
-        const V v608 = 0.25 * v603;
-        const V v609 = v19 * v603;
-        const V v610 = v606 - v609;
-        const V v611 = v49 * v605;
-        const V v612 = v348 + v611;
-        const V v613 = v49 * v608;
-        const V v614 = v349 + v613;
-        const V v615 = v103 * v610;
-        const V v616 = v344 + v615;
-        const V v617 = v607 + v604;
-        const V v618 = v607 - v604;
-        const V v619 = v103 * v618;
-        const V v620 = v339 + v619;
-        const V v621 = 0.25 * v617;
-        const V v622 = v67 * v612;
-        const V v623 = 1.0 - v622;
-        const V v624 = 0.25 * v616;
-        const V v625 = v52 * v621;
-        const V v626 = v347 - v625;
-        const V v627 = v173 * v616;
-        const V v628 = v153 * v616;
-        const V v629 = v62 * v614;
-        const V v630 = v623 - v629;
-        const V v631 = v173 * v620;
-        const V v632 = v153 * v620;
-        const V v633 = 0.25 * v620;
-        const V v634 = v62 * v627;
-        const V v635 = v163 + v634;
-        const V v636 = v55 * v627;
-        const V v637 = v161 + v636;
-        const V v638 = v63 * v626;
-        const V v639 = v638 + v630;
-        const V v640 = v55 * v631;
-        const V v641 = v170 + v640;
-        const V v642 = v62 * v631;
-        const V v643 = v168 + v642;
-        const V v644 = v67 * v628;
-        const V v645 = v644 + v635;
-        const V v646 = v60 * v628;
-        const V v647 = v646 + v637;
-        const V v648 = v68 * v624;
-        const V v649 = v648 + v645;
-        const V v650 = v61 * v624;
-        const V v651 = v650 + v647;
-        const V v652 = v639 * v639;
-        const V v653 = v61 * v633;
-        const V v654 = v653 + v641;
-        const V v655 = v68 * v633;
-        const V v656 = v655 + v643;
-        const V v657 = v60 * v632;
-        const V v658 = v657 + v654;
-        const V v659 = v67 * v632;
-        const V v660 = v659 + v656;
-        const V v661 = v649 * v649;
-        const V v662 = v649 * v658;
-        const V v663 = v649 * v660;
-        const V v664 = v658 * v658;
-        const V v665 = v651 * v651;
-        const V v666 = v661 + v665;
-        const V v667 = v651 * v658;
-        const V v668 = v663 + v667;
-        const V v669 = v651 * v660;
-        const V v670 = v662 - v669;
-        const V v671 = v660 * v660;
-        const V v672 = v664 + v671;
-        const V v673 = v670 * v670;
-        const V v674 = softehl_vrcbrt(v652);
-        const V v675 = v674 * v674;
-        const V v676 = v652 * v675;
-        const V v677 = softehl_vrcbrt(v673);
-        const V v678 = v677 * v677;
-        const V v679 = v673 * v678;
-        const V v680 = v676 * v679;
-        const V v681 = 1.0 / v680;
-        const V v682 = v672 * v681;
-        const V v683 = v668 * v681;
-        const V v684 = v666 * v681;
-        const V v685 = v652 * v681;
-        V v686[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v686, &failed);
-        const double v687 = 6.283185307179586 * w[2];
-        const double v688 = 1.0 - w[0];
-        const double v689 = 1.0 + w[0];
-        const double v690 = 0.25 * w[0];
-        const double v691 = 1.0 - w[1];
-        const double v692 = 1.0 + w[1];
-        const double v693 = 0.25 * w[1];
-        const V v694 = 2.0 * v670;
-        const double v695 = 0.25 * v691;
-        const double v696 = 0.25 * v692;
-        const double v697 = 0.25 + v690;
-        const double v698 = 0.25 - v690;
-        const double v699 = 0.25 - v693;
-        const double v700 = 0.25 + v693;
-        const V v701 = 0.3333333333333333 * v678;
-        const double v702 = v690 - 0.25;
-        const double v703 = v695 * v688;
-        const double v704 = v695 * v689;
-        const double v705 = v689 * v696;
-        const double v706 = v688 * v696;
-        const double v707 = v693 - 0.25;
-        const V v708 = X2 * v699;
-        const V v709 = X6 * v698;
-        const V v710 = X3 * v699;
-        const V v711 = X3 * v704;
-        const V v712 = X7 * v698;
-        const V v713 = X7 * v706;
-        const V v714 = v713 + v711;
-        const V v715 = v700 * v13;
-        const V v716 = v708 + v715;
-        const V v717 = v700 * v33;
-        const V v718 = v710 + v717;
-        const V v719 = v697 * v11;
-        const V v720 = v709 + v719;
-        const V v721 = v697 * v32;
-        const V v722 = v712 + v721;
-        const V v723 = X5 * v705;
-        const V v724 = v723 + v714;
-        const V v725 = 2.0 * v658;
-        const V v726 = X0 * v707;
-        const V v727 = v726 + v716;
-        const V v728 = X0 * v702;
-        const V v729 = v728 + v720;
-        const V v730 = X1 * v707;
-        const V v731 = v730 + v718;
-        const V v732 = X1 * v702;
-        const V v733 = v732 + v722;
-        const V v734 = X1 * v703;
-        const V v735 = v734 + v724;
-        const V v736 = v733 * v727;
-        const V v737 = 2.0 * v660;
-        const V v738 = 2.0 * v651;
-        const V v739 = v729 * v731;
-        const V v740 = v736 - v739;
-        const V v741 = v740 * v735;
-        const V v742 = 2.0 * v649;
-        const V v743 = v686[0];
-        const V v744 = v686[1];
-        const V v745 = v686[2];
-        const V v746 = v686[3];
-        const V v747 = v681 * v681;
-        const V v748 = v687 * v741;
-        const V v749 = v743 * v748;
-        const V v750 = v744 * v748;
-        const V v751 = v745 * v748;
-        const V v752 = v746 * v748;
-        const V v753 = v652 * v751;
-        const V v754 = v681 * v750;
-        const V v755 = v666 * v750;
-        const V v756 = v753 + v755;
-        const V v757 = v742 * v754;
-        const V v758 = v738 * v754;
-        const V v759 = v681 * v752;
-        const V v760 = v668 * v752;
-        const V v761 = v756 + v760;
-        const V v762 = v681 * v749;
-        const V v763 = v672 * v749;
-        const V v764 = v761 + v763;
-        const V v765 = v747 * v764;
-        const V v766 = v676 * v765;
-        const V v767 = v701 * v766;
-        const V v768 = v694 * v767;
-        const V v769 = v737 * v762;
-        const V v770 = v725 * v762;
-        const V v771 = v649 * v759;
-        const V v772 = v769 + v771;
-        const V v773 = v649 * v768;
-        const V v774 = v770 - v773;
-        const V v775 = v651 * v759;
-        const V v776 = v774 + v775;
-        s590 += v776;
-        const V v777 = v651 * v768;
-        const V v778 = v772 + v777;
-        s588 += v778;
-        const V v779 = v660 * v759;
-        const V v780 = v757 + v779;
-        const V v781 = v658 * v759;
-        const V v782 = v758 + v781;
-        const V v783 = v660 * v768;
-        const V v784 = v782 + v783;
-        s589 += v784;
-        const V v785 = v658 * v768;
-        const V v786 = v780 - v785;
-        s587 += v786;
-        V v787[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_1_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v787, &failed);
-        const V v788 = v787[2];
-        const V v789 = t10 * v788;
-        V v790[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_0_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v790, &failed);
-        const V v791 = v790[2];
-        const V v792 = t8 * v791;
-        const V v793 = v792 + v789;
-        V v794[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_2_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v794, &failed);
-        const V v795 = v794[2];
-        const V v796 = t12 * v795;
-        const V v797 = v796 + v793;
-        V v798[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_3_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v798, &failed);
-        const V v799 = v798[2];
-        const V v800 = v25 * v799;
-        const V v801 = v800 + v797;
-        V v802[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_5_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v802, &failed);
-        const V v803 = v802[2];
-        const V v804 = v29 * v803;
-        const V v805 = v804 + v801;
-        V v806[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_7_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v806, &failed);
-        const V v807 = v806[2];
-        const V v808 = v31 * v807;
-        const V v809 = v808 + v805;
-        V v810[21];
-        softehl_solid_taylor_mean_ogden_isochoric_1_2_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v810, &failed);
-        const V v811 = 2.0 * v639;
-        const V v812 = 0.3333333333333333 * v675;
-        const V v813 = v96 * v621;
-        const V v814 = v603 * v93;
-        const V v815 = v814 + v391;
-        const V v816 = v603 * v81;
-        const V v817 = v396 - v816;
-        const V v818 = v602 * v91;
-        const V v819 = v818 + v390;
-        const V v820 = v602 * v84;
-        const V v821 = v820 + v817;
-        const V v822 = v618 * v120;
-        const V v823 = v338 - v822;
-        const V v824 = v610 * v120;
-        const V v825 = v346 - v824;
-        const V v826 = v95 * v605;
-        const V v827 = v427 - v826;
-        const V v828 = v95 * v608;
-        const V v829 = v428 - v828;
-        const V v830 = v103 * v821;
-        const V v831 = v825 + v830;
-        const V v832 = v815 - v819;
-        const V v833 = v103 * v832;
-        const V v834 = v833 + v823;
-        const V v835 = v815 + v819;
-        const V v836 = 0.25 * v835;
-        const V v837 = v813 - v836;
-        const V v838 = 0.25 * v831;
-        const V v839 = v810[2];
-        const V v840 = v810[7];
-        const V v841 = v810[11];
-        const V v842 = v810[12];
-        const V v843 = v52 * v837;
-        const V v844 = v422 + v843;
-        const V v845 = v159 * v831;
-        const V v846 = v151 * v831;
-        const V v847 = v159 * v834;
-        const V v848 = v151 * v834;
-        const V v849 = 0.25 * v834;
-        const V v850 = v68 * v838;
-        const V v851 = v179 + v850;
-        const V v852 = v61 * v838;
-        const V v853 = v177 + v852;
-        const V v854 = v616 * v185;
-        const V v855 = v854 + v845;
-        const V v856 = v616 * v184;
-        const V v857 = v856 + v846;
-        const V v858 = 0.25 * v855;
-        const V v859 = v620 * v185;
-        const V v860 = v859 + v847;
-        const V v861 = v620 * v184;
-        const V v862 = v861 + v848;
-        const V v863 = 0.25 * v857;
-        const V v864 = v63 * v844;
-        const V v865 = 0.25 * v860;
-        const V v866 = 0.25 * v862;
-        const V v867 = v61 * v849;
-        const V v868 = v181 + v867;
-        const V v869 = v68 * v849;
-        const V v870 = v183 + v869;
-        const V v871 = v62 * v829;
-        const V v872 = v864 - v871;
-        const V v873 = v62 * v858;
-        const V v874 = v851 + v873;
-        const V v875 = v55 * v858;
-        const V v876 = v853 + v875;
-        const V v877 = v55 * v865;
-        const V v878 = v868 + v877;
-        const V v879 = v62 * v865;
-        const V v880 = v870 + v879;
-        const V v881 = v67 * v827;
-        const V v882 = v872 - v881;
-        const V v883 = v811 * v882;
-        const V v884 = v67 * v863;
-        const V v885 = v874 + v884;
-        const V v886 = v60 * v863;
-        const V v887 = v876 + v886;
-        const V v888 = v60 * v866;
-        const V v889 = v878 + v888;
-        const V v890 = v67 * v866;
-        const V v891 = v880 + v890;
-        const V v892 = v742 * v885;
-        const V v893 = v725 * v889;
-        const V v894 = v658 * v885;
-        const V v895 = v658 * v887;
-        const V v896 = v812 * v883;
-        const V v897 = v738 * v887;
-        const V v898 = v892 + v897;
-        const V v899 = v681 * v883;
-        const V v900 = v681 * v898;
-        const V v901 = v660 * v887;
-        const V v902 = v894 - v901;
-        const V v903 = v660 * v885;
-        const V v904 = v895 + v903;
-        const V v905 = v737 * v891;
-        const V v906 = v893 + v905;
-        const V v907 = v679 * v896;
-        const V v908 = v681 * v906;
-        const V v909 = v649 * v889;
-        const V v910 = v902 + v909;
-        const V v911 = v649 * v891;
-        const V v912 = v904 + v911;
-        const V v913 = v651 * v891;
-        const V v914 = v910 - v913;
-        const V v915 = v651 * v889;
-        const V v916 = v912 + v915;
-        const V v917 = v681 * v916;
-        const V v918 = v694 * v914;
-        const V v919 = v701 * v918;
-        const V v920 = v676 * v919;
-        const V v921 = v907 + v920;
-        const V v922 = v747 * v921;
-        const V v923 = v672 * v922;
-        const V v924 = v908 - v923;
-        const V v925 = v668 * v922;
-        const V v926 = v917 - v925;
-        const V v927 = v666 * v922;
-        const V v928 = v900 - v927;
-        const V v929 = v652 * v922;
-        const V v930 = v899 - v929;
-        const V v931 = v839 * v924;
-        const V v932 = v809 + v931;
-        const V v933 = v840 * v928;
-        const V v934 = v932 + v933;
-        const V v935 = v841 * v930;
-        const V v936 = v934 + v935;
-        const V v937 = v842 * v926;
-        const V v938 = v936 + v937;
-        V v939[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_4_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v939, &failed);
-        const V v940 = v939[2];
-        const V v941 = v24 * v940;
-        const V v942 = v938 - v941;
-        V v943[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_6_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v943, &failed);
-        const V v944 = v943[2];
-        const V v945 = v28 * v944;
-        const V v946 = v942 - v945;
-        V v947[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_by_8_lanes(softehl_mask(1), (const V[]){v682, v684, v685, v683, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v947, &failed);
-        const V v948 = 0.2222222222222222 * v674;
-        const V v949 = v705 * t5;
-        const V v950 = 0.2222222222222222 * v677;
-        const V v951 = 2.0 * v754;
-        const V v952 = 2.0 * v762;
-        const V v953 = 2.0 * v767;
-        const V v954 = v675 * v948;
-        const V v955 = v675 * v954;
-        const V v956 = v678 * v950;
-        const V v957 = v678 * v956;
-        const V v958 = v914 * v953;
-        const V v959 = v703 * t1;
-        const V v960 = v959 + v949;
-        const V v961 = v810[0];
-        const V v962 = v810[1];
-        const V v963 = v810[3];
-        const V v964 = v810[6];
-        const V v965 = v810[8];
-        const V v966 = v810[15];
-        const V v967 = 2.0 * v681;
-        const V v968 = v706 * t7;
-        const V v969 = v968 + v960;
-        const V v970 = v698 * t7;
-        const V v971 = v698 * t6;
-        const V v972 = v957 * v766;
-        const V v973 = v967 * v764;
-        const V v974 = v961 * v924;
-        const V v975 = v962 * v924;
-        const V v976 = v963 * v924;
-        const V v977 = v704 * t3;
-        const V v978 = v977 + v969;
-        const V v979 = v699 * t3;
-        const V v980 = v699 * t2;
-        const V v981 = v740 * v978;
-        const V v982 = v962 * v928;
-        const V v983 = v974 + v982;
-        const V v984 = v964 * v928;
-        const V v985 = v975 + v984;
-        const V v986 = v965 * v928;
-        const V v987 = v976 + v986;
-        const V v988 = v697 * v72;
-        const V v989 = v971 + v988;
-        const V v990 = v697 * v77;
-        const V v991 = v970 + v990;
-        const V v992 = v700 * v79;
-        const V v993 = v979 + v992;
-        const V v994 = v700 * v73;
-        const V v995 = v980 + v994;
-        const V v996 = v963 * v926;
-        const V v997 = v996 + v983;
-        const V v998 = v965 * v926;
-        const V v999 = v998 + v985;
-        const V v1000 = v966 * v926;
-        const V v1001 = v1000 + v987;
-        const V v1002 = v790[0];
-        const V v1003 = v790[1];
-        const V v1004 = v790[3];
-        const V v1005 = v787[0];
-        const V v1006 = v787[1];
-        const V v1007 = v787[3];
-        const V v1008 = t8 * v1002;
-        const V v1009 = v1008 + v997;
-        const V v1010 = t8 * v1003;
-        const V v1011 = v1010 + v999;
-        const V v1012 = t8 * v1004;
-        const V v1013 = v1012 + v1001;
-        const V v1014 = v794[0];
-        const V v1015 = v794[1];
-        const V v1016 = v794[3];
-        const V v1017 = v798[0];
-        const V v1018 = v798[1];
-        const V v1019 = v798[3];
-        const V v1020 = t10 * v1005;
-        const V v1021 = v1020 + v1009;
-        const V v1022 = t10 * v1006;
-        const V v1023 = v1022 + v1011;
-        const V v1024 = t10 * v1007;
-        const V v1025 = v1024 + v1013;
-        const V v1026 = v939[0];
-        const V v1027 = v939[1];
-        const V v1028 = v939[3];
-        const V v1029 = t12 * v1014;
-        const V v1030 = v1029 + v1021;
-        const V v1031 = t12 * v1015;
-        const V v1032 = v1031 + v1023;
-        const V v1033 = t12 * v1016;
-        const V v1034 = v1033 + v1025;
-        const V v1035 = v802[0];
-        const V v1036 = v802[1];
-        const V v1037 = v802[3];
-        const V v1038 = v25 * v1017;
-        const V v1039 = v1038 + v1030;
-        const V v1040 = v25 * v1018;
-        const V v1041 = v1040 + v1032;
-        const V v1042 = v25 * v1019;
-        const V v1043 = v1042 + v1034;
-        const V v1044 = v943[0];
-        const V v1045 = v943[1];
-        const V v1046 = v943[3];
-        const V v1047 = v24 * v1026;
-        const V v1048 = v1039 - v1047;
-        const V v1049 = v24 * v1027;
-        const V v1050 = v1041 - v1049;
-        const V v1051 = v24 * v1028;
-        const V v1052 = v1043 - v1051;
-        const V v1053 = v806[0];
-        const V v1054 = v806[1];
-        const V v1055 = v806[3];
-        const V v1056 = v29 * v1035;
-        const V v1057 = v1056 + v1048;
-        const V v1058 = v29 * v1036;
-        const V v1059 = v1058 + v1050;
-        const V v1060 = v29 * v1037;
-        const V v1061 = v1060 + v1052;
-        const V v1062 = v947[0];
-        const V v1063 = v947[1];
-        const V v1064 = v947[2];
-        const V v1065 = v947[3];
-        const V v1066 = v28 * v1044;
-        const V v1067 = v1057 - v1066;
-        const V v1068 = v28 * v1045;
-        const V v1069 = v1059 - v1068;
-        const V v1070 = v28 * v1046;
-        const V v1071 = v1061 - v1070;
-        const V v1072 = v707 * t0;
-        const V v1073 = v1072 + v995;
-        const V v1074 = v707 * t1;
-        const V v1075 = v1074 + v993;
-        const V v1076 = v702 * t0;
-        const V v1077 = v1076 + v989;
-        const V v1078 = v702 * t1;
-        const V v1079 = v1078 + v991;
-        const V v1080 = v733 * v1073;
-        const V v1081 = v31 * v1053;
-        const V v1082 = v1081 + v1067;
-        const V v1083 = v31 * v1054;
-        const V v1084 = v1083 + v1069;
-        const V v1085 = v31 * v1055;
-        const V v1086 = v1085 + v1071;
-        const V v1087 = v30 * v1064;
-        const V v1088 = v946 - v1087;
-        const V v1089 = v30 * v1062;
-        const V v1090 = v1082 - v1089;
-        const V v1091 = v30 * v1063;
-        const V v1092 = v1084 - v1091;
-        const V v1093 = v30 * v1065;
-        const V v1094 = v1086 - v1093;
-        const V v1095 = v727 * v1079;
-        const V v1096 = v1080 + v1095;
-        const V v1097 = v731 * v1077;
-        const V v1098 = v1096 - v1097;
-        const V v1099 = v729 * v1075;
-        const V v1100 = v1098 - v1099;
-        const V v1101 = v1088 * v748;
-        const V v1102 = v839 * v930;
-        const V v1103 = v1102 + v1090;
-        const V v1104 = v840 * v930;
-        const V v1105 = v1104 + v1092;
-        const V v1106 = v842 * v930;
-        const V v1107 = v1106 + v1094;
-        const V v1108 = v735 * v1100;
-        const V v1109 = v981 + v1108;
-        const V v1110 = v748 * v1103;
-        const V v1111 = v748 * v1105;
-        const V v1112 = v748 * v1107;
-        const V v1113 = v687 * v1109;
-        const V v1114 = v898 * v750;
-        const V v1115 = v896 * v765;
-        const V v1116 = v919 * v765;
-        const V v1117 = v679 * v765;
-        const V v1118 = v955 * v1117;
-        const V v1119 = v916 * v752;
-        const V v1120 = v1114 + v1119;
-        const V v1121 = v743 * v1113;
-        const V v1122 = v1110 + v1121;
-        const V v1123 = v744 * v1113;
-        const V v1124 = v1111 + v1123;
-        const V v1125 = v745 * v1113;
-        const V v1126 = v1101 + v1125;
-        const V v1127 = v746 * v1113;
-        const V v1128 = v1112 + v1127;
-        const V v1129 = v906 * v749;
-        const V v1130 = v1129 + v1120;
-        const V v1131 = v681 * v751;
-        const V v1132 = v812 * v1117;
-        const V v1133 = v1131 - v1132;
-        const V v1134 = v883 * v1118;
-        const V v1135 = v883 * v751;
-        const V v1136 = v1135 + v1130;
-        const V v1137 = 2.0 * v1133;
-        const V v1138 = v811 * v1133;
-        const V v1139 = v652 * v1126;
-        const V v1140 = v1136 + v1139;
-        const V v1141 = v681 * v1124;
-        const V v1142 = v681 * v1128;
-        const V v1143 = v681 * v1122;
-        const V v1144 = v681 * v1126;
-        const V v1145 = v1134 + v1144;
-        const V v1146 = v882 * v1137;
-        const V v1147 = v666 * v1124;
-        const V v1148 = v1140 + v1147;
-        const V v1149 = v668 * v1128;
-        const V v1150 = v1148 + v1149;
-        const V v1151 = v672 * v1122;
-        const V v1152 = v1150 + v1151;
-        const V v1153 = v922 * v749;
-        const V v1154 = v1143 - v1153;
-        const V v1155 = v922 * v751;
-        const V v1156 = v1145 - v1155;
-        const V v1157 = v922 * v750;
-        const V v1158 = v1141 - v1157;
-        const V v1159 = v922 * v752;
-        const V v1160 = v1142 - v1159;
-        const V v1161 = v844 * v1138;
-        const V v1162 = v747 * v1152;
-        const V v1163 = v737 * v1154;
-        const V v1164 = v725 * v1154;
-        const V v1165 = v922 * v973;
-        const V v1166 = v1162 - v1165;
-        const V v1167 = v742 * v1158;
-        const V v1168 = v738 * v1158;
-        const V v1169 = v858 * v786;
-        const V v1170 = v858 * v784;
-        const V v1171 = v863 * v786;
-        const V v1172 = v863 * v784;
-        const V v1173 = v838 * v786;
-        const V v1174 = v838 * v784;
-        const V v1175 = v829 * v1138;
-        s598 += v1169;
-        s598 -= v1175;
-        const V v1176 = v827 * v1138;
-        s597 += v1171;
-        s597 -= v1176;
-        const V v1177 = v649 * v1160;
-        const V v1178 = v1163 + v1177;
-        const V v1179 = v660 * v1160;
-        const V v1180 = v1167 + v1179;
-        const V v1181 = v651 * v1160;
-        const V v1182 = v1164 + v1181;
-        const V v1183 = v658 * v1160;
-        const V v1184 = v1168 + v1183;
-        const V v1185 = v679 * v1166;
-        const V v1186 = v1116 + v1185;
-        const V v1187 = v676 * v1166;
-        const V v1188 = v1115 + v1187;
-        const V v1189 = v701 * v1188;
-        const V v1190 = v812 * v1186;
-        const V v1191 = v1156 - v1190;
-        const V v1192 = v885 * v759;
-        const V v1193 = v1192 + v1178;
-        const V v1194 = v885 * v951;
-        const V v1195 = v1194 + v1180;
-        const V v1196 = v885 * v768;
-        const V v1197 = v1182 - v1196;
-        const V v1198 = v887 * v951;
-        const V v1199 = v1198 + v1184;
-        const V v1200 = v887 * v768;
-        const V v1201 = v1200 + v1193;
-        const V v1202 = v887 * v759;
-        const V v1203 = v1202 + v1197;
-        const V v1204 = v918 * v972;
-        const V v1205 = v1189 - v1204;
-        const V v1206 = v891 * v759;
-        const V v1207 = v1206 + v1195;
-        const V v1208 = v889 * v759;
-        const V v1209 = v1208 + v1199;
-        const V v1210 = v811 * v1191;
-        const V v1211 = v1146 + v1210;
-        const V v1212 = v694 * v1205;
-        const V v1213 = v958 + v1212;
-        const V v1214 = v889 * v768;
-        const V v1215 = v1207 - v1214;
-        const V v1216 = v891 * v768;
-        const V v1217 = v1216 + v1209;
-        const V v1218 = v891 * v952;
-        const V v1219 = v1218 + v1201;
-        const V v1220 = v889 * v952;
-        const V v1221 = v1220 + v1203;
-        const V v1222 = v660 * v1213;
-        const V v1223 = v1217 + v1222;
-        s594 += v1223;
-        const V v1224 = v651 * v1213;
-        const V v1225 = v1219 + v1224;
-        s593 += v1225;
-        const V v1226 = v649 * v1213;
-        const V v1227 = v1221 - v1226;
-        s595 += v1227;
-        const V v1228 = v658 * v1213;
-        const V v1229 = v1215 - v1228;
-        s592 += v1229;
-        const V v1230 = v612 * v1211;
-        s597 -= v1230;
-        const V v1231 = v614 * v1211;
-        s598 -= v1231;
-        const V v1232 = v626 * v1211;
-        s591 += v1161;
-        s591 += v1232;
-        const V v1233 = v849 * v778;
-        s596 += v1173;
-        s596 += v1233;
-        const V v1234 = v849 * v776;
-        s599 += v1174;
-        s599 += v1234;
-        const V v1235 = v865 * v778;
-        s598 += v1235;
-        const V v1236 = v865 * v776;
-        s601 += v1170;
-        s601 += v1236;
-        const V v1237 = v866 * v778;
-        s597 += v1237;
-        const V v1238 = v866 * v776;
-        s600 += v1172;
-        s600 += v1238;
-        const V v1239 = v624 * v1229;
-        s596 += v1239;
-        const V v1240 = v624 * v1223;
-        s599 += v1240;
-        const V v1241 = v627 * v1229;
-        s598 += v1241;
-        const V v1242 = v627 * v1223;
-        s601 += v1242;
-        const V v1243 = v628 * v1229;
-        s597 += v1243;
-        const V v1244 = v628 * v1223;
-        s600 += v1244;
-        const V v1245 = v631 * v1225;
-        s598 += v1245;
-        const V v1246 = v631 * v1227;
-        s601 += v1246;
-        const V v1247 = v633 * v1225;
-        s596 += v1247;
-        const V v1248 = v633 * v1227;
-        s599 += v1248;
-        const V v1249 = v632 * v1225;
-        s597 += v1249;
-        const V v1250 = v632 * v1227;
-        s600 += v1250;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v355 = w[0] - v236, v356 = w[1] - v237, v357 = v38 * v355, v358 = 0.25 * v355,
+            v359 = v40 * v356, v360 = 0.25 * v356, v361 = v21 * v355 - v16 * v356,
+            v362 = v241 + v42 * v358, v363 = v242 + v42 * v360, v364 = v238 + v81 * v361,
+            v365 = v359 - v357, v366 = v234 + v81 * v365, v367 = 0.25 * (v359 + v357),
+            v368 = 0.25 * v364, v369 = v240 - v43 * v367, v370 = v112 * v364, v371 = v103 * v364,
+            v372 = v112 * v366, v373 = v103 * v366, v374 = 0.25 * v366,
+            v375 = v53 * v369 + (1.0 - v57 * v362 - v52 * v363),
+            v376 = v58 * v368 + (v57 * v371 + (v109 + v52 * v370)),
+            v377 = v51 * v368 + (v50 * v371 + (v108 + v46 * v370)), v378 = v375 * v375,
+            v379 = v50 * v373 + (v51 * v374 + (v111 + v46 * v372)),
+            v380 = v57 * v373 + (v58 * v374 + (v110 + v52 * v372)),
+            v381 = v376 * v376 + v377 * v377, v382 = v376 * v380 + v377 * v379,
+            v383 = v376 * v379 - v377 * v380, v384 = v379 * v379 + v380 * v380, v385 = v383 * v383,
+            v386 = softehl_vrcbrt(v378), v387 = v386 * v386, v388 = v378 * v387,
+            v389 = softehl_vrcbrt(v385), v390 = v389 * v389, v391 = v385 * v390,
+            v392 = 1.0 / (v388 * v391), v393 = v384 * v392, v394 = v382 * v392, v395 = v381 * v392,
+            v396 = v378 * v392;
+        V v397[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v397, &failed);
+        const double v398 = 6.283185307179586 * w[2], v399 = 1.0 - w[0], v400 = 1.0 + w[0],
+            v401 = 0.25 * w[0], v402 = 1.0 - w[1], v403 = 1.0 + w[1], v404 = 0.25 * w[1];
+        const V v405 = 2.0 * v383;
+        const double v406 = 0.25 * v402, v407 = 0.25 * v403, v408 = 0.25 + v401, v409 = 0.25 - v401,
+            v410 = 0.25 - v404, v411 = 0.25 + v404;
+        const V v412 = 0.3333333333333333 * v390;
+        const double v413 = v401 - 0.25, v414 = v406 * v399, v415 = v406 * v400, v416 = v400 * v407,
+            v417 = v399 * v407, v418 = v404 - 0.25;
+        const V v419 = X2 * v410, v420 = X6 * v409, v421 = X3 * v410, v422 = X3 * v415,
+            v423 = X7 * v409, v424 = X7 * v417, v425 = v411 * v11, v426 = v419 + v425,
+            v427 = v411 * v28, v428 = v421 + v427, v429 = v408 * v10, v430 = v420 + v429,
+            v431 = v408 * v27, v432 = v423 + v431, v433 = X5 * v416, v434 = 2.0 * v379,
+            v435 = X0 * v418, v436 = v435 + v426, v437 = X0 * v413, v438 = v437 + v430,
+            v439 = X1 * v418, v440 = v439 + v428, v441 = X1 * v413, v442 = v441 + v432,
+            v443 = X1 * v414, v444 = v443 + (v433 + (v424 + v422)), v445 = v442 * v436,
+            v446 = 2.0 * v380, v447 = 2.0 * v377, v448 = v438 * v440, v449 = v445 - v448,
+            v450 = v449 * v444, v451 = 2.0 * v376, v452 = v397[0], v453 = v397[1], v454 = v397[2],
+            v455 = v397[3], v456 = v392 * v392, v457 = v398 * v450, v458 = v452 * v457,
+            v459 = v453 * v457, v460 = v454 * v457, v461 = v455 * v457, v462 = v392 * v459,
+            v463 = v392 * v461, v464 = v392 * v458,
+            v465 = v378 * v460 + v381 * v459 + v382 * v461 + v384 * v458, v466 = v456 * v465,
+            v467 = v388 * v466, v468 = v412 * v467, v469 = v405 * v468,
+            v470 = v434 * v464 - v376 * v469 + v377 * v463;
+        s343 += v470; const V v471 = v446 * v464 + v376 * v463 + v377 * v469; s341 += v471;
+        const V v472 = v447 * v462 + v379 * v463 + v380 * v469; s342 += v472;
+        const V v473 = v451 * v462 + v380 * v463 - v379 * v469; s340 += v473; V v474[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_1_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v474, &failed);
+        const V v475 = v474[2]; V v476[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_0_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v476, &failed);
+        const V v477 = v476[2]; V v478[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_2_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v478, &failed);
+        const V v479 = v478[2]; V v480[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_3_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v480, &failed);
+        const V v481 = v480[2]; V v482[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_5_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v482, &failed);
+        const V v483 = v482[2],
+            v484 = v24 * v483 + (v20 * v481 + (t12 * v479 + (t8 * v477 + t10 * v475)));
+        V v485[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_7_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v485, &failed);
+        const V v486 = v485[2]; V v487[21];
+        softehl_solid_taylor_mean_ogden_isochoric_1_2_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v487, &failed);
+        const V v488 = 2.0 * v375, v489 = 0.3333333333333333 * v387, v490 = v356 * v77 + v265,
+            v491 = v355 * v75 + v264, v492 = v278 - v79 * v358, v493 = v279 - v79 * v360,
+            v494 = v239 - v361 * v84 + v81 * (v355 * v70 + (v266 - v356 * v68)),
+            v495 = v81 * (v490 - v491) + (v233 - v365 * v84), v496 = 0.25 * v494, v497 = v487[2],
+            v498 = v487[7], v499 = v487[11], v500 = v487[12],
+            v501 = v275 + v43 * (v80 * v367 - 0.25 * (v490 + v491)), v502 = 0.25 * v495,
+            v503 = 0.25 * (v364 * v118 + v107 * v494), v504 = 0.25 * (v364 * v117 + v101 * v494),
+            v505 = 0.25 * (v366 * v118 + v107 * v495), v506 = 0.25 * (v366 * v117 + v101 * v495),
+            v507 = v53 * v501 - v52 * v493 - v57 * v492, v508 = v488 * v507,
+            v509 = v114 + v58 * v496 + v52 * v503 + v57 * v504,
+            v510 = v113 + v51 * v496 + v46 * v503 + v50 * v504,
+            v511 = v115 + v51 * v502 + v46 * v505 + v50 * v506,
+            v512 = v116 + v58 * v502 + v52 * v505 + v57 * v506, v513 = v489 * v508,
+            v514 = v451 * v509 + v447 * v510, v515 = v434 * v511 + v446 * v512,
+            v516 = v379 * v509 - v380 * v510 + v376 * v511 - v377 * v512,
+            v517 = v379 * v510 + v380 * v509 + v376 * v512 + v377 * v511, v518 = v405 * v516,
+            v519 = v412 * v518, v520 = v456 * (v391 * v513 + v388 * v519),
+            v521 = v392 * v515 - v384 * v520, v522 = v392 * v517 - v382 * v520,
+            v523 = v392 * v514 - v381 * v520, v524 = v392 * v508 - v378 * v520,
+            v525 = v26 * v486 + v484 + v497 * v521 + v498 * v523 + v499 * v524 + v500 * v522;
+        V v526[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_4_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v526, &failed);
+        const V v527 = v526[2]; V v528[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_6_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v528, &failed);
+        const V v529 = v528[2]; V v530[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_8_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v530, &failed);
+        const V v531 = v416 * t5, v532 = 2.0 * v462, v533 = 2.0 * v464, v534 = v414 * t1,
+            v535 = v487[0], v536 = v487[1], v537 = v487[3], v538 = v487[6], v539 = v487[8],
+            v540 = v487[15], v541 = v417 * t7, v542 = v409 * t7, v543 = v409 * t6, v544 = v415 * t3,
+            v545 = v544 + (v541 + (v534 + v531)), v546 = v410 * t3, v547 = v410 * t2,
+            v548 = v408 * v60, v549 = v543 + v548, v550 = v408 * v64, v551 = v542 + v550,
+            v552 = v411 * v66, v553 = v546 + v552, v554 = v411 * v61, v555 = v547 + v554,
+            v556 = v476[0], v557 = v476[1], v558 = v476[3], v559 = v474[0], v560 = v474[1],
+            v561 = v474[3], v562 = v478[0], v563 = v478[1], v564 = v478[3], v565 = v480[0],
+            v566 = v480[1], v567 = v480[3],
+            v568 = t10 * v559 + (t8 * v556 + (v537 * v522 + (v535 * v521 + v536 * v523))),
+            v569 = t10 * v560 + (t8 * v557 + (v539 * v522 + (v536 * v521 + v538 * v523))),
+            v570 = t10 * v561 + (t8 * v558 + (v540 * v522 + (v537 * v521 + v539 * v523))),
+            v571 = v526[0], v572 = v526[1], v573 = v526[3], v574 = v482[0], v575 = v482[1],
+            v576 = v482[3], v577 = v528[0], v578 = v528[1], v579 = v528[3], v580 = v485[0],
+            v581 = v485[1], v582 = v485[3], v583 = v530[0], v584 = v530[1], v585 = v530[2],
+            v586 = v530[3],
+            v587 = v24 * v574 + (v20 * v565 + (t12 * v562 + v568) - v19 * v571) - v23 * v577,
+            v588 = v24 * v575 + (v20 * v566 + (t12 * v563 + v569) - v19 * v572) - v23 * v578,
+            v589 = v24 * v576 + (v20 * v567 + (t12 * v564 + v570) - v19 * v573) - v23 * v579,
+            v590 = v418 * t0, v591 = v590 + v555, v592 = v418 * t1, v593 = v592 + v553,
+            v594 = v413 * t0, v595 = v594 + v549, v596 = v413 * t1, v597 = v596 + v551,
+            v598 = v442 * v591 + v436 * v597 - v440 * v595 - v438 * v593,
+            v599 = v449 * v545 + v444 * v598, v600 = v398 * v599, v601 = v391 * v466,
+            v602 = v457 * (v497 * v524 + (v26 * v580 + v587 - v25 * v583)) + v452 * v600,
+            v603 = v457 * (v498 * v524 + (v26 * v581 + v588 - v25 * v584)) + v453 * v600,
+            v604 = (v525 - v19 * v527 - v23 * v529 - v25 * v585) * v457 + v454 * v600,
+            v605 = v457 * (v500 * v524 + (v26 * v582 + v589 - v25 * v586)) + v455 * v600,
+            v606 = v392 * v460 - v489 * v601, v607 = v488 * v606,
+            v608 = v508 * v460 + (v515 * v458 + (v514 * v459 + v517 * v461)) + v378 * v604,
+            v609 = v508 * (v387 * (v387 * (0.2222222222222222 * v386)) * v601) + v392 * v604,
+            v610 = v392 * v602 - v520 * v458, v611 = v392 * v603 - v520 * v459,
+            v612 = v392 * v605 - v520 * v461,
+            v613 = v456 * (v608 + v381 * v603 + v382 * v605 + v384 * v602) - v520 * (2.0 * v392 * v465);
+        s351 += v503 * v473; s351 -= v493 * v607; s350 += v504 * v473; s350 -= v492 * v607;
+        const V v614 = v412 * (v513 * v466 + v388 * v613) - v518 * (v390 * (v390 * (0.2222222222222222 * v389)) * v467),
+            v615 = v507 * (2.0 * v606) + v488 * (v609 - v520 * v460 - v489 * (v519 * v466 + v391 * v613)),
+            v616 = v516 * (2.0 * v468) + v405 * v614,
+            v617 = v512 * v463 + (v509 * v532 + (v451 * v611 + v380 * v612)) - v511 * v469,
+            v618 = v512 * v469 + (v511 * v463 + (v510 * v532 + (v447 * v611 + v379 * v612))),
+            v619 = v512 * v533 + (v510 * v469 + (v509 * v463 + (v446 * v610 + v376 * v612))),
+            v620 = v511 * v533 + (v510 * v463 + (v434 * v610 + v377 * v612 - v509 * v469)),
+            v621 = v618 + v380 * v616;
+        s347 += v621; const V v622 = v619 + v377 * v616; s346 += v622;
+        const V v623 = v620 - v376 * v616; s348 += v623; const V v624 = v617 - v379 * v616;
+        s345 += v624; s350 -= v362 * v615; s351 -= v363 * v615; s344 += v501 * v607;
+        s344 += v369 * v615; s349 += v496 * v473; s349 += v502 * v471; s352 += v496 * v472;
+        s352 += v502 * v470; s351 += v505 * v471; s354 += v503 * v472; s354 += v505 * v470;
+        s350 += v506 * v471; s353 += v504 * v472; s353 += v506 * v470; s349 += v368 * v624;
+        s352 += v368 * v621; s351 += v370 * v624; s354 += v370 * v621; s350 += v371 * v624;
+        s353 += v371 * v621; s351 += v372 * v622; s354 += v372 * v623; s349 += v374 * v622;
+        s352 += v374 * v623; s350 += v373 * v622; s353 += v373 * v623;
     }
-    const V v1251 = v563 + s590;
-    const V v1252 = v573 + s587;
-    const V v1253 = s588 - v541;
-    const V v1254 = s589 - v538;
-    const V v1255 = v570 + s595;
-    const V v1256 = v572 + s592;
-    const V v1257 = v583 - v543;
-    const V v1258 = v584 - v542;
-    const V v1259 = v552 + v585;
-    const V v1260 = v553 + v586;
-    const V v1261 = s591 + v546;
-    const V v1262 = v1257 - v548;
-    const V v1263 = s593 - v540;
-    const V v1264 = v1258 - v547;
-    const V v1265 = s601 + v1259;
-    const V v1266 = s594 - v537;
-    const V v1267 = s600 + v1260;
-    const V v1268 = v549 + v1262;
-    const V v1269 = v550 + v1264;
-    const V v1270 = s596 - v557;
-    const V v1271 = v566 + v1265;
-    const V v1272 = v568 + v1267;
-    const V v1273 = s598 + v1268;
-    const V v1274 = s597 + v1269;
-    const V v1275 = v1270 - v551;
-    const V v1276 = s599 - v560;
-    const V v1277 = v156 * v1254;
-    const V v1278 = v1271 - v1277;
-    const V v1279 = v156 * v1252;
-    const V v1280 = v1273 - v1279;
-    const V v1281 = v139 * v1254;
-    const V v1282 = v1281 + v1272;
-    const V v1283 = v139 * v1252;
-    const V v1284 = v1283 + v1274;
-    const V v1285 = v576 + v1275;
-    const V v1286 = v582 + v1276;
-    const V v1287 = v578 + v1280;
-    const V v1288 = v1261 - v1285;
-    const V v1289 = v1261 + v1285;
-    const V v1290 = v580 + v1284;
-    const V v1291 = v137 * v1266;
-    const V v1292 = v1278 - v1291;
-    const V v1293 = v137 * v1256;
-    const V v1294 = v1287 - v1293;
-    const V v1295 = v136 * v1266;
-    const V v1296 = v1295 + v1282;
-    const V v1297 = v136 * v1256;
-    const V v1298 = v1297 + v1290;
-    const V v1299 = v1286 - v554;
-    const V v1300 = v554 - v1286;
-    const V v1301 = v122 * v1253;
-    const V v1302 = v1301 + v1294;
-    const V v1303 = v122 * v1251;
-    const V v1304 = v1303 + v1292;
-    const V v1305 = v124 * v1251;
-    const V v1306 = v1296 - v1305;
-    const V v1307 = v124 * v1253;
-    const V v1308 = v1298 - v1307;
-    const V v1309 = v117 * v1263;
-    const V v1310 = v1309 + v1302;
-    const V v1311 = v117 * v1255;
-    const V v1312 = v1311 + v1304;
-    const V v1313 = v118 * v1255;
-    const V v1314 = v1306 - v1313;
-    const V v1315 = v118 * v1263;
-    const V v1316 = v1308 - v1315;
-    const V v1317 = v1310 + v1316;
-    const V v1318 = v1312 + v1314;
-    const V v1319 = v1314 - v1312;
-    const V v1320 = v1316 - v1310;
-    const V v1321 = v1299 + v1318;
-    const V v1322 = v1299 - v1318;
-    const V v1323 = v1289 + v1317;
-    const V v1324 = v1289 - v1317;
-    const V v1325 = v1300 - v1319;
-    const V v1326 = v1288 - v1320;
-    softehl_store4(R + 0, 8, v1321, v1323, v1325, v1326);
-    const V v1327 = v1288 + v1320;
-    const V v1328 = v1319 - v1299;
-    softehl_store4(R + 4, 8, v1322, v1324, v1328, v1327);
+    const V v625 = v326 + s343, v626 = v331 + s340, v627 = s341 - v312, v628 = s342 - v310,
+        v629 = v329 + s348, v630 = v330 + s345, v631 = s344 + v315, v632 = s346 - v311,
+        v633 = s347 - v309, v634 = v332 + (s349 - v324 - v320), v635 = v335 + (s352 - v325),
+        v636 = v631 - v634, v637 = v631 + v634,
+        v638 = v333 + (s351 + (v318 + (v336 - v314 - v317)) - v105 * v626) - v93 * v630,
+        v639 = v92 * v630 + (v334 + (v94 * v626 + (s350 + (v319 + (v337 - v313 - v316))))),
+        v640 = v635 - v323,
+        v641 = v85 * v625 + (v327 + (s354 + (v321 + v338)) - v105 * v628 - v93 * v633),
+        v642 = v92 * v633 + (v94 * v628 + (v328 + (s353 + (v322 + v339)))) - v86 * v625,
+        v643 = v82 * v632 + (v85 * v627 + v638), v644 = v82 * v629 + v641, v645 = v642 - v83 * v629,
+        v646 = v639 - v86 * v627 - v83 * v632, v647 = v643 + v646, v648 = v644 + v645,
+        v649 = v645 - v644, v650 = v646 - v643, v651 = v640 + v648, v652 = v640 - v648,
+        v653 = v637 + v647, v654 = v637 - v647, v655 = v323 - v635 - v649, v656 = v636 - v650;
+    softehl_store4(R + 0, 8, v651, v653, v655, v656);
+    const V v657 = v636 + v650, v658 = v649 - v640;
+    softehl_store4(R + 4, 8, v652, v654, v658, v657);
     if (softehl_any(failed)) {
         softehl_spoil(failed, R, 8);
     }
 }
-
-void softehl_solid_taylor_mean_ogden_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_ogden_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, direction + 15 * e, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_ogden_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, direction + 15 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double t[SOFTEHL_LANES * 15];
-    softehl_pad(t, direction, 15, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_ogden_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_ogden_pseudo_load, 8, 8, 0, 15, 8, 0)

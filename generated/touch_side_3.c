@@ -23,152 +23,44 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_touch_side_3_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_touch_side_3_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8;
+    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
     softehl_load1(X + 8, 9, &X8);
-    (void)X8;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
-    softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V a0;
-    softehl_load1(a + 0, 1, &a0);
-    (void)a0;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11;
+    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
+    softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11); (void)d0; (void)d1; (void)d2; (void)d3;
+    (void)d4; (void)d5; (void)d6; (void)d7; (void)d8; V a0; softehl_load1(a + 0, 1, &a0);
     softehl_store4(R + 0, 12, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 4, 12, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X4 - X1;
-    const V v3 = X0 - X3;
-    const V v4 = X5 - X2;
-    const V v5 = X8 - X2;
-    const V v6 = X3 - X0;
-    const V v7 = X0 - X6;
-    const V v8 = X6 - X0;
-    const V v9 = v3 * v5;
-    const V v10 = v2 * v5;
-    const V v11 = v7 * v2;
-    const V v12 = X1 - X7;
-    const V v13 = X7 - X1;
-    const V v14 = v6 * v13;
-    const V v15 = v14 + v11;
-    const V v16 = v8 * v4;
-    const V v17 = v16 + v9;
-    const V v18 = v4 * v12;
-    const V v19 = v10 + v18;
-    const V v20 = v17 * v17;
-    const V v21 = v15 * v15;
-    const V v22 = v21 + v20;
-    const V v23 = v19 * v19;
-    const V v24 = v22 + v23;
-    const V v25 = softehl_vsqrt(v24);
-    const V v26 = v1 * v25;
-    V s27 = softehl_splat(0.0);
-    V s28 = softehl_splat(0.0);
-    V s29 = softehl_splat(0.0);
+    const V v1 = 1.0 / a0, v2 = X4 - X1, v3 = X5 - X2, v4 = X8 - X2,
+        v5 = (X3 - X0) * (X7 - X1) + (X0 - X6) * v2, v6 = (X6 - X0) * v3 + (X0 - X3) * v4,
+        v7 = v2 * v4 + v3 * (X1 - X7), v8 = softehl_vsqrt(v5 * v5 + v6 * v6 + v7 * v7),
+        v9 = v1 * v8;
+    V s10 = {0}, s11 = {0}, s12 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v30 = w[1] * v26;
-        const V v31 = d11 * w[1];
-        const double v32 = 1.0 - w[1];
-        const V v33 = w[0] * v1;
-        const double v34 = v32 - w[0];
-        const V v35 = d10 * w[0];
-        const V v36 = v31 + v35;
-        const V v37 = v34 * v1;
-        const V v38 = d9 * v34;
-        const V v39 = v38 + v36;
-        const V v40 = w[2] * v33;
-        const V v41 = w[2] * v37;
-        const V v42 = v30 * v39;
-        const V v43 = v25 * v39;
-        const V v44 = w[2] * v42;
-        s27 += v44;
-        const V v45 = v40 * v43;
-        s28 += v45;
-        const V v46 = v41 * v43;
-        s29 += v46;
+        const double *restrict w = rule + 3 * q; (void)w; const double v13 = 1.0 - w[1] - w[0];
+        const V v14 = d9 * v13 + (d11 * w[1] + d10 * w[0]), v15 = v8 * v14,
+            v16 = w[2] * (w[1] * v9 * v14);
+        s10 += v16; const V v17 = w[2] * (w[0] * v1) * v15; s11 += v17;
+        const V v18 = w[2] * (v13 * v1) * v15; s12 += v18;
     }
-    const V v47 = -s27;
-    const V v48 = -s28;
-    const V v49 = -s29;
-    softehl_store4(R + 8, 12, softehl_splat(0.0), v49, v48, v47);
+    softehl_store4(R + 8, 12, softehl_splat(0.0), -s12, -s11, -s10);
 }
+SOFTEHL_BATCH(softehl_touch_side_3_residual, 9, 12, 1, 0, 12, 0)
 
-void softehl_touch_side_3_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_side_3_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_3_residual_group(points, modes, coordinates + 9 * e, dofs + 12 * e, data + 1 * e, 0, parameters, rule, basis, values + 12 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_3_residual_group(points, modes, coordinates + 9 * (n - SOFTEHL_LANES), dofs + 12 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 12 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 9];
-    softehl_pad(X, coordinates, 9, n);
-    double d[SOFTEHL_LANES * 12];
-    softehl_pad(d, dofs, 12, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * 12];
-    softehl_touch_side_3_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 12 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_touch_side_3_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8;
+    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
     softehl_load1(X + 8, 9, &X8);
-    (void)X8;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
-    softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V a0;
-    softehl_load1(a + 0, 1, &a0);
-    (void)a0;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11;
+    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
+    softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11); (void)d0; (void)d1; (void)d2; (void)d3;
+    (void)d4; (void)d5; (void)d6; (void)d7; (void)d8; V a0; softehl_load1(a + 0, 1, &a0);
     softehl_store4(R + 0, 12, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 4, 12, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 0, 144, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -204,279 +96,56 @@ static void softehl_touch_side_3_tangent_group(
     softehl_store4(K + 124, 144, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 132, 144, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 136, 144, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X4 - X1;
-    const V v3 = X0 - X3;
-    const V v4 = X5 - X2;
-    const V v5 = X8 - X2;
-    const V v6 = X3 - X0;
-    const V v7 = X0 - X6;
-    const V v8 = X6 - X0;
-    const V v9 = v3 * v5;
-    const V v10 = v2 * v5;
-    const V v11 = v7 * v2;
-    const V v12 = X1 - X7;
-    const V v13 = X7 - X1;
-    const V v14 = v6 * v13;
-    const V v15 = v14 + v11;
-    const V v16 = v8 * v4;
-    const V v17 = v16 + v9;
-    const V v18 = v4 * v12;
-    const V v19 = v10 + v18;
-    const V v20 = v17 * v17;
-    const V v21 = v15 * v15;
-    const V v22 = v21 + v20;
-    const V v23 = v19 * v19;
-    const V v24 = v22 + v23;
-    const V v25 = softehl_vsqrt(v24);
-    V s26 = softehl_splat(0.0);
-    V s27 = softehl_splat(0.0);
-    V s28 = softehl_splat(0.0);
-    V s29 = softehl_splat(0.0);
-    V s30 = softehl_splat(0.0);
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
-    V s34 = softehl_splat(0.0);
-    V s35 = softehl_splat(0.0);
+    const V v1 = 1.0 / a0, v2 = X4 - X1, v3 = X5 - X2, v4 = X8 - X2,
+        v5 = (X3 - X0) * (X7 - X1) + (X0 - X6) * v2, v6 = (X6 - X0) * v3 + (X0 - X3) * v4,
+        v7 = v2 * v4 + v3 * (X1 - X7), v8 = softehl_vsqrt(v5 * v5 + v6 * v6 + v7 * v7);
+    V s9 = {0}, s10 = {0}, s11 = {0}, s12 = {0}, s13 = {0}, s14 = {0}, s15 = {0}, s16 = {0},
+        s17 = {0}, s18 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v36 = d11 * w[1];
-        const V v37 = w[1] * v25;
-        const V v38 = w[0] * v25;
-        const V v39 = w[0] * v1;
-        const V v40 = w[1] * v1;
-        const double v41 = 1.0 - w[1];
-        const V v42 = d10 * w[0];
-        const V v43 = v36 + v42;
-        const double v44 = v41 - w[0];
-        const V v45 = w[2] * v39;
-        const V v46 = w[2] * v40;
-        const V v47 = d9 * v44;
-        const V v48 = v47 + v43;
-        const V v49 = v44 * v1;
-        const V v50 = v44 * v25;
-        const V v51 = v37 * v46;
-        s30 += v51;
-        const V v52 = v45 * v38;
-        s28 += v52;
-        const V v53 = w[2] * v49;
-        const V v54 = v37 * v45;
-        s29 += v54;
-        const V v55 = v25 * v48;
-        const V v56 = v1 * v48;
-        const V v57 = v45 * v50;
-        s35 += v57;
-        const V v58 = w[2] * v56;
-        const V v59 = v45 * v55;
-        s26 += v59;
-        const V v60 = v53 * v55;
-        s27 += v60;
-        const V v61 = v53 * v50;
-        s32 += v61;
-        const V v62 = v53 * v38;
-        s33 += v62;
-        const V v63 = v37 * v53;
-        s34 += v63;
-        const V v64 = v37 * v58;
-        s31 += v64;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v19 = w[1] * v8, v20 = w[0] * v8;
+        const double v21 = 1.0 - w[1] - w[0];
+        const V v22 = w[2] * (w[0] * v1), v23 = d9 * v21 + (d11 * w[1] + d10 * w[0]),
+            v24 = v21 * v8;
+        s13 += v19 * (w[2] * (w[1] * v1)); s11 += v22 * v20; const V v25 = w[2] * (v21 * v1);
+        s12 += v19 * v22;
+        const V v26 = v8 * v23, v27 = v22 * v24;
+        s18 += v27; const V v28 = v22 * v26; s9 += v28; const V v29 = v25 * v26; s10 += v29;
+        const V v30 = v25 * v24; s15 += v30; const V v31 = v25 * v20; s16 += v31;
+        const V v32 = v19 * v25; s17 += v32; const V v33 = v19 * (w[2] * (v1 * v23)); s14 += v33;
     }
-    const V v65 = -s26;
-    const V v66 = -s27;
-    const V v67 = -s28;
-    const V v68 = -s29;
-    const V v69 = -s30;
-    const V v70 = -s31;
-    softehl_store4(R + 8, 12, softehl_splat(0.0), v66, v65, v70);
-    const V v71 = -s32;
-    const V v72 = -s33;
-    const V v73 = -s34;
-    softehl_store4(K + 116, 144, softehl_splat(0.0), v71, v72, v73);
-    softehl_store4(K + 140, 144, softehl_splat(0.0), v73, v68, v69);
-    const V v74 = -s35;
-    softehl_store4(K + 128, 144, softehl_splat(0.0), v74, v67, v68);
+    const V v34 = -s12; softehl_store4(R + 8, 12, softehl_splat(0.0), -s10, -s9, -s14);
+    const V v35 = -s17; softehl_store4(K + 116, 144, softehl_splat(0.0), -s15, -s16, v35);
+    softehl_store4(K + 140, 144, softehl_splat(0.0), v35, v34, -s13);
+    softehl_store4(K + 128, 144, softehl_splat(0.0), -s18, -s11, v34);
 }
+SOFTEHL_BATCH(softehl_touch_side_3_tangent, 9, 12, 1, 0, 12, (12 * 12))
 
-void softehl_touch_side_3_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_side_3_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_3_tangent_group(points, modes, coordinates + 9 * e, dofs + 12 * e, data + 1 * e, 0, parameters, rule, basis, values + 12 * e, tangent + (12 * 12) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_3_tangent_group(points, modes, coordinates + 9 * (n - SOFTEHL_LANES), dofs + 12 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 12 * (n - SOFTEHL_LANES), tangent + (12 * 12) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 9];
-    softehl_pad(X, coordinates, 9, n);
-    double d[SOFTEHL_LANES * 12];
-    softehl_pad(d, dofs, 12, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * 12];
-    double K[SOFTEHL_LANES * (12 * 12)];
-    softehl_touch_side_3_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 12 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (12 * 12) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_touch_side_3_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8;
+    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
     softehl_load1(X + 8, 9, &X8);
-    (void)X8;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
-    softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V a0;
-    softehl_load1(a + 0, 1, &a0);
-    (void)a0;
-    const V v1 = X2 + d2;
-    const V v2 = X3 + d3;
-    const V v3 = X4 + d4;
-    const V v4 = X6 + d6;
-    const V v5 = X7 + d7;
-    const V v6 = X3 - X0;
-    const V v7 = X6 - X0;
-    const V v8 = v2 - X0;
-    const V v9 = X0 - X6;
-    const V v10 = v4 - X0;
-    const V v11 = X0 - X3;
-    const V v12 = X7 - X1;
-    const V v13 = X4 - X1;
-    const V v14 = v5 - X1;
-    const V v15 = v3 - X1;
-    const V v16 = v6 * v12;
-    const V v17 = X1 - X7;
-    const V v18 = X8 + d8;
-    const V v19 = v9 * v13;
-    const V v20 = v16 + v19;
-    const V v21 = X0 + d0;
-    const V v22 = v15 - d1;
-    const V v23 = X1 + d1;
-    const V v24 = v20 * v20;
-    const V v25 = d0 - v10;
-    const V v26 = X8 - X2;
-    const V v27 = d1 - v14;
-    const V v28 = v14 - d1;
-    const V v29 = v25 * v22;
-    const V v30 = v10 - d0;
-    const V v31 = v13 * v26;
-    const V v32 = v11 * v26;
-    const V v33 = d0 - v8;
-    const V v34 = v8 - d0;
-    const V v35 = v34 * v28;
-    const V v36 = v35 + v29;
-    const V v37 = v18 - v1;
-    const V v38 = X5 + d5;
-    const V v39 = X5 - X2;
-    const V v40 = v22 * v37;
-    const V v41 = v33 * v37;
-    const V v42 = v7 * v39;
-    const V v43 = v42 + v32;
-    const V v44 = v39 * v17;
-    const V v45 = v31 + v44;
-    const V v46 = v36 * v36;
-    const V v47 = v38 - v1;
-    const V v48 = v30 * v47;
-    const V v49 = v48 + v41;
-    const V v50 = v27 * v47;
-    const V v51 = v40 + v50;
-    const V v52 = v43 * v43;
-    const V v53 = v24 + v52;
-    const V v54 = v45 * v45;
-    const V v55 = v53 + v54;
-    const V v56 = v49 * v49;
-    const V v57 = v46 + v56;
-    const V v58 = v51 * v51;
-    const V v59 = v58 + v57;
-    const V v60 = softehl_vsqrt(v55);
-    const V v61 = softehl_vsqrt(v59);
-    const V v62 = 1.0 / v61;
-    const V v63 = v60 * v62;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11;
+    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
+    softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11); V a0; softehl_load1(a + 0, 1, &a0); (void)a0;
+    const V v1 = X2 + d2, v2 = X3 + d3, v3 = X4 + d4, v4 = X6 + d6, v5 = X7 + d7, v6 = v2 - X0,
+        v7 = v4 - X0, v8 = X4 - X1, v9 = v5 - X1, v10 = X8 + d8,
+        v11 = (X3 - X0) * (X7 - X1) + (X0 - X6) * v8, v12 = X0 + d0, v13 = v3 - X1 - d1,
+        v14 = X1 + d1, v15 = X8 - X2, v16 = (v6 - d0) * (v9 - d1) + (d0 - v7) * v13, v17 = v10 - v1,
+        v18 = X5 + d5, v19 = X5 - X2, v20 = (X6 - X0) * v19 + (X0 - X3) * v15,
+        v21 = v8 * v15 + v19 * (X1 - X7), v22 = v18 - v1, v23 = (v7 - d0) * v22 + (d0 - v6) * v17,
+        v24 = v13 * v17 + (d1 - v9) * v22, v25 = softehl_vsqrt(v11 * v11 + v20 * v20 + v21 * v21),
+        v26 = softehl_vsqrt(v24 * v24 + (v16 * v16 + v23 * v23)), v27 = v25 * (1.0 / v26);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v64 = w[2] * v61;
-        const V v65 = d11 * w[1];
-        const V v66 = w[1] * v4;
-        const V v67 = w[1] * v5;
-        const V v68 = w[1] * v18;
-        const double v69 = 1.0 - w[1];
-        const V v70 = d10 * w[0];
-        const V v71 = v65 + v70;
-        const V v72 = w[0] * v2;
-        const V v73 = v66 + v72;
-        const double v74 = v69 - w[0];
-        const V v75 = w[0] * v3;
-        const V v76 = v67 + v75;
-        const V v77 = w[0] * v38;
-        const V v78 = v68 + v77;
-        const V v79 = d9 * v74;
-        const V v80 = v79 + v71;
-        const V v81 = v74 * v21;
-        const V v82 = v73 + v81;
-        const V v83 = v74 * v23;
-        const V v84 = v76 + v83;
-        const V v85 = v74 * v1;
-        const V v86 = v78 + v85;
-        const V v87 = v80 * v63;
-        softehl_store4(R + 5 * q + 0, (5 * points), v87, v82, v84, v86);
-        softehl_store1(R + 5 * q + 4, (5 * points), v64);
+        const double *restrict w = rule + 3 * q; (void)w; const V v28 = w[2] * v26;
+        const double v29 = 1.0 - w[1] - w[0];
+        const V v30 = w[1] * v4 + w[0] * v2 + v29 * v12, v31 = w[1] * v5 + w[0] * v3 + v29 * v14,
+            v32 = w[1] * v10 + w[0] * v18 + v29 * v1,
+            v33 = (d9 * v29 + (d11 * w[1] + d10 * w[0])) * v27;
+        softehl_store4(R + 5 * q + 0, (5 * points), v33, v30, v31, v32);
+        softehl_store1(R + 5 * q + 4, (5 * points), v28);
     }
 }
-
-void softehl_touch_side_3_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_3_fields_group(points, modes, coordinates + 9 * e, dofs + 12 * e, data + 1 * e, 0, parameters, rule, basis, values + (5 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_3_fields_group(points, modes, coordinates + 9 * (n - SOFTEHL_LANES), dofs + 12 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (5 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 9];
-    softehl_pad(X, coordinates, 9, n);
-    double d[SOFTEHL_LANES * 12];
-    softehl_pad(d, dofs, 12, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * (5 * points)];
-    softehl_touch_side_3_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (5 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_touch_side_3_fields, 9, 12, 1, 0, (5 * points), 0)

@@ -27,250 +27,65 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_touch_side_4_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_touch_side_4_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9, X10, X11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9, X10, X11;
+    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
     softehl_load4(X + 8, 12, &X8, &X9, &X10, &X11);
-    (void)X8; (void)X9; (void)X10; (void)X11;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15;
+    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 16, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
-    softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V a0;
+    softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15); (void)d0; (void)d1; (void)d2; (void)d3;
+    (void)d4; (void)d5; (void)d6; (void)d7; (void)d8; (void)d9; (void)d10; (void)d11; V a0;
     softehl_load1(a + 0, 1, &a0);
-    (void)a0;
     softehl_store4(R + 0, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 4, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 8, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X6 - X9;
-    const V v3 = X6 - X3;
-    const V v4 = X7 - X4;
-    const V v5 = X7 - X10;
-    const V v6 = X8 - X11;
-    const V v7 = X8 - X5;
-    const V v8 = d12 + d13;
-    const V v9 = d12 - d13;
-    const V v10 = d12 + d15;
-    const V v11 = d12 - d15;
-    const V v12 = 0.0625 * v1;
-    const V v13 = d13 + d14;
-    const V v14 = d13 - d14;
-    const V v15 = d14 + d15;
-    const V v16 = d14 - d15;
-    const V v17 = v8 + v15;
-    const V v18 = v8 - v15;
-    const V v19 = v9 - v16;
-    const V v20 = v9 + v16;
-    V s21 = softehl_splat(0.0);
-    V s22 = softehl_splat(0.0);
-    V s23 = softehl_splat(0.0);
-    V s24 = softehl_splat(0.0);
+    const V v1 = X6 - X9, v2 = X6 - X3, v3 = X7 - X4, v4 = X7 - X10, v5 = X8 - X11, v6 = X8 - X5,
+        v7 = d12 + d13, v8 = d12 - d13, v9 = d12 + d15, v10 = d12 - d15, v11 = 0.0625 * (1.0 / a0),
+        v12 = d13 + d14, v13 = d13 - d14, v14 = d14 + d15, v15 = d14 - d15, v16 = v7 + v14,
+        v17 = v7 - v14, v18 = v8 - v15, v19 = v8 + v15;
+    V s20 = {0}, s21 = {0}, s22 = {0}, s23 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v25 = 0.25 * w[1];
-        const double v26 = 2.0 * w[1];
-        const V v27 = w[1] * v18;
-        const V v28 = w[1] * v20;
-        const double v29 = 0.25 - v25;
-        const double v30 = 0.25 + v25;
-        const V v31 = w[1] * v27;
-        const V v32 = v8 * v26;
-        const V v33 = v26 * v15;
-        const double v34 = 0.25 * w[0];
-        const double v35 = 2.0 * w[0];
-        const double v36 = w[0] * w[0];
-        const double v37 = w[0] * w[1];
-        const double v38 = v25 - 0.25;
-        const double v39 = 0.25 + v34;
-        const double v40 = 0.25 - v34;
-        const double v41 = w[1] * v36;
-        const V v42 = v36 * v19;
-        const double v43 = v26 * v37;
-        const double v44 = 4.0 * v37;
-        const V v45 = v32 - v31;
-        const V v46 = v33 - v31;
-        const double v47 = v34 - 0.25;
-        const V v48 = X3 * v29;
-        const V v49 = v41 * v28;
-        const double v50 = 2.0 * v41;
-        const V v51 = X10 * v40;
-        const V v52 = X9 * v40;
-        const V v53 = X11 * v40;
-        const V v54 = X4 * v29;
-        const V v55 = X5 * v29;
-        const V v56 = d12 * v44;
-        const V v57 = d14 * v44;
-        const V v58 = v11 * v43;
-        const V v59 = v14 * v43;
-        const V v60 = v9 * v50;
-        const V v61 = v50 * v16;
-        const V v62 = v57 + v46;
-        const V v63 = v58 - v49;
-        const V v64 = v59 - v49;
-        const V v65 = d15 * v44;
-        const V v66 = v46 - v65;
-        const V v67 = v60 - v42;
-        const V v68 = v61 - v42;
-        const V v69 = v56 - v63;
-        const V v70 = v63 + v66;
-        const V v71 = v62 - v64;
-        const V v72 = v35 * v13;
-        const V v73 = d13 * v44;
-        const V v74 = v64 - v73;
-        const V v75 = v72 + v17;
-        const V v76 = v10 * v35;
-        const V v77 = v17 - v76;
-        const V v78 = v69 - v67;
-        const V v79 = v67 + v74;
-        const V v80 = v70 - v68;
-        const V v81 = v68 + v71;
-        const V v82 = v77 + v78;
-        const V v83 = v77 + v80;
-        const V v84 = v75 + v79;
-        const V v85 = v75 + v81;
-        const V v86 = v30 * v2;
-        const V v87 = v48 + v86;
-        const V v88 = v30 * v5;
-        const V v89 = v54 + v88;
-        const V v90 = v30 * v6;
-        const V v91 = v55 + v90;
-        const V v92 = v39 * v4;
-        const V v93 = v51 + v92;
-        const V v94 = v39 * v3;
-        const V v95 = v52 + v94;
-        const V v96 = v39 * v7;
-        const V v97 = v53 + v96;
-        const V v98 = w[2] * v83;
-        const V v99 = w[2] * v85;
-        const V v100 = v82 - v45;
-        const V v101 = v84 - v45;
-        const V v102 = w[2] * v100;
-        const V v103 = w[2] * v101;
-        const V v104 = X0 * v38;
-        const V v105 = v104 + v87;
-        const V v106 = X0 * v47;
-        const V v107 = v106 + v95;
-        const V v108 = X1 * v47;
-        const V v109 = v108 + v93;
-        const V v110 = X1 * v38;
-        const V v111 = v110 + v89;
-        const V v112 = X2 * v38;
-        const V v113 = v112 + v91;
-        const V v114 = X2 * v47;
-        const V v115 = v114 + v97;
-        const V v116 = v105 * v109;
-        const V v117 = v107 * v113;
-        const V v118 = v107 * v111;
-        const V v119 = v116 - v118;
-        const V v120 = v111 * v115;
-        const V v121 = v105 * v115;
-        const V v122 = v117 - v121;
-        const V v123 = v109 * v113;
-        const V v124 = v120 - v123;
-        const V v125 = v119 * v119;
-        const V v126 = v122 * v122;
-        const V v127 = v125 + v126;
-        const V v128 = v124 * v124;
-        const V v129 = v127 + v128;
-        const V v130 = softehl_vsqrt(v129);
-        const V v131 = v12 * v130;
-        const V v132 = v98 * v131;
-        s21 += v132;
-        const V v133 = v99 * v131;
-        s22 += v133;
-        const V v134 = v103 * v131;
-        s23 += v134;
-        const V v135 = v102 * v131;
-        s24 += v135;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v24 = 0.25 * w[1], v25 = 2.0 * w[1], v26 = 0.25 - v24, v27 = 0.25 + v24;
+        const V v28 = w[1] * (w[1] * v17);
+        const double v29 = 0.25 * w[0], v30 = 2.0 * w[0], v31 = w[0] * w[0], v32 = w[0] * w[1],
+            v33 = v24 - 0.25, v34 = 0.25 + v29, v35 = 0.25 - v29, v36 = w[1] * v31;
+        const V v37 = v31 * v18;
+        const double v38 = v25 * v32, v39 = 4.0 * v32;
+        const V v40 = v7 * v25 - v28, v41 = v25 * v14 - v28;
+        const double v42 = v29 - 0.25; const V v43 = v36 * (w[1] * v19);
+        const double v44 = 2.0 * v36;
+        const V v45 = v10 * v38 - v43, v46 = v13 * v38 - v43, v47 = v8 * v44 - v37,
+            v48 = v44 * v15 - v37, v49 = v30 * v12 + v16, v50 = v16 - v9 * v30,
+            v51 = X0 * v33 + (X3 * v26 + v27 * v1), v52 = X0 * v42 + (X9 * v35 + v34 * v2),
+            v53 = X1 * v42 + (X10 * v35 + v34 * v3), v54 = X1 * v33 + (X4 * v26 + v27 * v4),
+            v55 = X2 * v33 + (X5 * v26 + v27 * v5), v56 = X2 * v42 + (X11 * v35 + v34 * v6),
+            v57 = v51 * v53 - v52 * v54, v58 = v52 * v55 - v51 * v56, v59 = v54 * v56 - v53 * v55,
+            v60 = softehl_vsqrt(v57 * v57 + v58 * v58 + v59 * v59), v61 = v11 * v60,
+            v62 = w[2] * (v50 + (v45 + (v41 - d15 * v39) - v48)) * v61;
+        s20 += v62; const V v63 = w[2] * (v49 + (v48 + (d14 * v39 + v41 - v46))) * v61; s21 += v63;
+        const V v64 = w[2] * (v49 + (v47 + (v46 - d13 * v39)) - v40) * v61; s22 += v64;
+        const V v65 = w[2] * (v50 + (d12 * v39 - v45 - v47) - v40) * v61; s23 += v65;
     }
-    const V v136 = -s21;
-    const V v137 = -s22;
-    const V v138 = -s23;
-    const V v139 = -s24;
-    softehl_store4(R + 12, 16, v139, v138, v137, v136);
+    softehl_store4(R + 12, 16, -s23, -s22, -s21, -s20);
 }
+SOFTEHL_BATCH(softehl_touch_side_4_residual, 12, 16, 1, 0, 16, 0)
 
-void softehl_touch_side_4_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_side_4_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_4_residual_group(points, modes, coordinates + 12 * e, dofs + 16 * e, data + 1 * e, 0, parameters, rule, basis, values + 16 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_4_residual_group(points, modes, coordinates + 12 * (n - SOFTEHL_LANES), dofs + 16 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 16 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 12];
-    softehl_pad(X, coordinates, 12, n);
-    double d[SOFTEHL_LANES * 16];
-    softehl_pad(d, dofs, 16, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * 16];
-    softehl_touch_side_4_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 16 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_touch_side_4_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9, X10, X11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9, X10, X11;
+    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
     softehl_load4(X + 8, 12, &X8, &X9, &X10, &X11);
-    (void)X8; (void)X9; (void)X10; (void)X11;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15;
+    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 16, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
-    softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V a0;
+    softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15); (void)d0; (void)d1; (void)d2; (void)d3;
+    (void)d4; (void)d5; (void)d6; (void)d7; (void)d8; (void)d9; (void)d10; (void)d11; V a0;
     softehl_load1(a + 0, 1, &a0);
-    (void)a0;
     softehl_store4(R + 0, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 4, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 8, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -334,484 +149,91 @@ static void softehl_touch_side_4_tangent_group(
     softehl_store4(K + 240, 256, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 244, 256, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 248, 256, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X6 - X9;
-    const V v3 = X6 - X3;
-    const V v4 = X7 - X4;
-    const V v5 = X7 - X10;
-    const V v6 = X8 - X11;
-    const V v7 = X8 - X5;
-    const V v8 = d12 + d13;
-    const V v9 = d12 - d13;
-    const V v10 = d12 + d15;
-    const V v11 = d12 - d15;
-    const V v12 = 0.0625 * v1;
-    const V v13 = d13 + d14;
-    const V v14 = d13 - d14;
-    const V v15 = d14 + d15;
-    const V v16 = d14 - d15;
-    const V v17 = v8 + v15;
-    const V v18 = v8 - v15;
-    const V v19 = v9 - v16;
-    const V v20 = v9 + v16;
-    V s21 = softehl_splat(0.0);
-    V s22 = softehl_splat(0.0);
-    V s23 = softehl_splat(0.0);
-    V s24 = softehl_splat(0.0);
-    V s25 = softehl_splat(0.0);
-    V s26 = softehl_splat(0.0);
-    V s27 = softehl_splat(0.0);
-    V s28 = softehl_splat(0.0);
-    V s29 = softehl_splat(0.0);
-    V s30 = softehl_splat(0.0);
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
+    const V v1 = X6 - X9, v2 = X6 - X3, v3 = X7 - X4, v4 = X7 - X10, v5 = X8 - X11, v6 = X8 - X5,
+        v7 = d12 + d13, v8 = d12 - d13, v9 = d12 + d15, v10 = d12 - d15, v11 = 0.0625 * (1.0 / a0),
+        v12 = d13 + d14, v13 = d13 - d14, v14 = d14 + d15, v15 = d14 - d15, v16 = v7 + v14,
+        v17 = v7 - v14, v18 = v8 - v15, v19 = v8 + v15;
+    V s20 = {0}, s21 = {0}, s22 = {0}, s23 = {0}, s24 = {0}, s25 = {0}, s26 = {0}, s27 = {0},
+        s28 = {0}, s29 = {0}, s30 = {0}, s31 = {0}, s32 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v34 = 0.25 * w[1];
-        const double v35 = 2.0 * w[1];
-        const double v36 = w[1] * w[1];
-        const double v37 = 0.25 - v34;
-        const double v38 = 0.25 + v34;
-        const double v39 = 0.25 * w[0];
-        const double v40 = 2.0 * w[0];
-        const double v41 = w[0] * w[0];
-        const double v42 = w[0] * w[1];
-        const V v43 = v8 * v35;
-        const double v44 = 0.25 + v39;
-        const double v45 = 0.25 - v39;
-        const double v46 = v34 - 0.25;
-        const double v47 = w[1] * v41;
-        const V v48 = X3 * v37;
-        const double v49 = 4.0 * v42;
-        const double v50 = v35 * v42;
-        const V v51 = v41 * v19;
-        const double v52 = v39 - 0.25;
-        const double v53 = w[1] * v47;
-        const double v54 = 2.0 * v47;
-        const V v55 = X10 * v45;
-        const V v56 = X9 * v45;
-        const V v57 = X11 * v45;
-        const V v58 = X4 * v37;
-        const V v59 = X5 * v37;
-        const V v60 = d12 * v49;
-        const V v61 = d14 * v49;
-        const V v62 = v35 * v15;
-        const V v63 = v11 * v50;
-        const V v64 = v9 * v54;
-        const V v65 = v54 * v16;
-        const V v66 = v14 * v50;
-        const double v67 = w[2] * v35;
-        const double v68 = w[2] * v54;
-        const double v69 = w[2] * v50;
-        const double v70 = w[2] * v49;
-        const double v71 = w[2] * v41;
-        const V v72 = v64 - v51;
-        const V v73 = v65 - v51;
-        const V v74 = v38 * v6;
-        const V v75 = v59 + v74;
-        const V v76 = v40 * v13;
-        const double v77 = w[2] * v40;
-        const V v78 = v60 - v72;
-        const V v79 = v76 + v17;
-        const V v80 = v10 * v40;
-        const V v81 = v17 - v80;
-        const double v82 = w[2] * v36;
-        const V v83 = v36 * v18;
-        const V v84 = d13 * v49;
-        const V v85 = v72 - v84;
-        const V v86 = v81 + v78;
-        const double v87 = w[2] * v53;
-        const V v88 = v53 * v20;
-        const V v89 = v79 + v85;
-        const V v90 = v61 + v79;
-        const V v91 = d15 * v49;
-        const V v92 = v81 - v91;
-        const V v93 = v43 - v83;
-        const V v94 = v62 - v83;
-        const V v95 = v73 + v90;
-        const V v96 = v92 - v73;
-        const V v97 = v63 - v88;
-        const V v98 = v66 - v88;
-        const V v99 = v86 - v93;
-        const V v100 = v89 - v93;
-        const V v101 = v95 + v94;
-        const V v102 = v94 + v96;
-        const V v103 = X2 * v46;
-        const V v104 = v103 + v75;
-        const V v105 = v99 - v97;
-        const V v106 = v97 + v102;
-        const V v107 = v98 + v100;
-        const V v108 = v101 - v98;
-        const V v109 = X2 * v52;
-        const V v110 = v57 + v109;
-        const V v111 = v38 * v2;
-        const V v112 = v48 + v111;
-        const V v113 = v38 * v5;
-        const V v114 = v58 + v113;
-        const V v115 = v44 * v7;
-        const V v116 = v115 + v110;
-        const V v117 = v44 * v4;
-        const V v118 = v55 + v117;
-        const V v119 = v44 * v3;
-        const V v120 = v56 + v119;
-        const V v121 = X0 * v46;
-        const V v122 = v121 + v112;
-        const V v123 = X0 * v52;
-        const V v124 = v123 + v120;
-        const V v125 = X1 * v46;
-        const V v126 = v125 + v114;
-        const V v127 = X1 * v52;
-        const V v128 = v127 + v118;
-        const V v129 = v124 * v104;
-        const V v130 = v116 * v126;
-        const V v131 = v122 * v128;
-        const V v132 = v116 * v122;
-        const V v133 = v129 - v132;
-        const V v134 = v128 * v104;
-        const V v135 = v130 - v134;
-        const V v136 = v124 * v126;
-        const V v137 = v131 - v136;
-        const V v138 = v133 * v133;
-        const V v139 = v137 * v137;
-        const V v140 = v139 + v138;
-        const V v141 = v135 * v135;
-        const V v142 = v140 + v141;
-        const V v143 = softehl_vsqrt(v142);
-        const V v144 = v12 * v143;
-        const V v145 = w[2] * v144;
-        s26 += v145;
-        const V v146 = v106 * v145;
-        s21 += v146;
-        const V v147 = v108 * v145;
-        s22 += v147;
-        const V v148 = v107 * v145;
-        s23 += v148;
-        const V v149 = v105 * v145;
-        s24 += v149;
-        const V v150 = v82 * v144;
-        s30 += v150;
-        const V v151 = v87 * v144;
-        s33 += v151;
-        const V v152 = v70 * v144;
-        s25 += v152;
-        const V v153 = v77 * v144;
-        s27 += v153;
-        const V v154 = v67 * v144;
-        s28 += v154;
-        const V v155 = v71 * v144;
-        s29 += v155;
-        const V v156 = v68 * v144;
-        s31 += v156;
-        const V v157 = v69 * v144;
-        s32 += v157;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v33 = 0.25 * w[1], v34 = 2.0 * w[1], v35 = w[1] * w[1], v36 = 0.25 - v33,
+            v37 = 0.25 + v33, v38 = 0.25 * w[0], v39 = 2.0 * w[0], v40 = w[0] * w[0],
+            v41 = w[0] * w[1], v42 = 0.25 + v38, v43 = 0.25 - v38, v44 = v33 - 0.25,
+            v45 = w[1] * v40, v46 = 4.0 * v41, v47 = v34 * v41;
+        const V v48 = v40 * v18;
+        const double v49 = v38 - 0.25, v50 = w[1] * v45, v51 = 2.0 * v45;
+        const V v52 = v8 * v51 - v48, v53 = v51 * v15 - v48, v54 = v39 * v12 + v16,
+            v55 = v16 - v9 * v39, v56 = v35 * v17, v57 = v50 * v19, v58 = v7 * v34 - v56,
+            v59 = v34 * v14 - v56, v60 = v10 * v47 - v57, v61 = v13 * v47 - v57,
+            v62 = X2 * v44 + (X5 * v36 + v37 * v5), v63 = v42 * v6 + (X11 * v43 + X2 * v49),
+            v64 = X0 * v44 + (X3 * v36 + v37 * v1), v65 = X0 * v49 + (X9 * v43 + v42 * v2),
+            v66 = X1 * v44 + (X4 * v36 + v37 * v4), v67 = X1 * v49 + (X10 * v43 + v42 * v3),
+            v68 = v65 * v62 - v63 * v64, v69 = v63 * v66 - v67 * v62, v70 = v64 * v67 - v65 * v66,
+            v71 = softehl_vsqrt(v70 * v70 + v68 * v68 + v69 * v69), v72 = v11 * v71,
+            v73 = w[2] * v72;
+        s25 += v73; const V v74 = (v60 + (v59 + (v55 - d15 * v46 - v53))) * v73; s20 += v74;
+        const V v75 = (v53 + (d14 * v46 + v54) + v59 - v61) * v73; s21 += v75;
+        const V v76 = (v61 + (v54 + (v52 - d13 * v46) - v58)) * v73; s22 += v76;
+        const V v77 = (v55 + (d12 * v46 - v52) - v58 - v60) * v73; s23 += v77;
+        const V v78 = w[2] * v35 * v72; s29 += v78; const V v79 = w[2] * v50 * v72; s32 += v79;
+        const V v80 = w[2] * v46 * v72; s24 += v80; const V v81 = w[2] * v39 * v72; s26 += v81;
+        const V v82 = w[2] * v34 * v72; s27 += v82; const V v83 = w[2] * v40 * v72; s28 += v83;
+        const V v84 = w[2] * v51 * v72; s30 += v84; const V v85 = w[2] * v47 * v72; s31 += v85;
     }
-    const V v158 = -s21;
-    const V v159 = -s22;
-    const V v160 = -s23;
-    const V v161 = -s24;
-    softehl_store4(R + 12, 16, v161, v160, v159, v158);
-    const V v162 = s25 + s26;
-    const V v163 = s25 - s26;
-    const V v164 = s26 - s33;
-    const V v165 = s27 + s32;
-    const V v166 = s27 - s32;
-    const V v167 = s32 - s27;
-    const V v168 = s28 - v164;
-    const V v169 = s28 + s31;
-    const V v170 = v168 - s31;
-    const V v171 = s31 - s28;
-    const V v172 = s29 + s33;
-    const V v173 = s29 - s26;
-    const V v174 = v169 + v165;
-    const V v175 = v169 - v165;
-    const V v176 = s30 + v172;
-    const V v177 = s29 - s30;
-    const V v178 = v173 + v171;
-    const V v179 = s30 - s33;
-    const V v180 = v162 + v176;
-    const V v181 = v163 - v176;
-    const V v182 = v177 + v164;
-    const V v183 = v177 + v170;
-    const V v184 = v173 + v179;
-    const V v185 = v178 - v179;
-    const V v186 = v166 - v182;
-    const V v187 = v167 - v182;
-    const V v188 = v174 - v180;
-    softehl_store4(K + 204, 256, v188, v183, v184, v186);
-    const V v189 = v174 + v180;
-    const V v190 = v175 + v181;
-    softehl_store4(K + 220, 256, v183, v190, v187, v184);
-    const V v191 = -v189;
-    softehl_store4(K + 236, 256, v184, v187, v191, v185);
-    const V v192 = v181 - v175;
-    softehl_store4(K + 252, 256, v186, v184, v185, v192);
+    softehl_store4(R + 12, 16, -s23, -s22, -s21, -s20);
+    const V v86 = s25 - s32, v87 = s26 + s31, v88 = s27 + s30, v89 = s28 - s25, v90 = v88 + v87,
+        v91 = v88 - v87, v92 = s29 + (s28 + s32), v93 = s28 - s29, v94 = s29 - s32,
+        v95 = s24 + s25 + v92, v96 = s24 - s25 - v92, v97 = v93 + v86,
+        v98 = v93 + (s27 - v86 - s30), v99 = v89 + v94, v100 = v89 + (s30 - s27) - v94,
+        v101 = s26 - s31 - v97, v102 = s31 - s26 - v97, v103 = v90 - v95;
+    softehl_store4(K + 204, 256, v103, v98, v99, v101); const V v104 = v91 + v96;
+    softehl_store4(K + 220, 256, v98, v104, v102, v99); const V v105 = -(v90 + v95);
+    softehl_store4(K + 236, 256, v99, v102, v105, v100); const V v106 = v96 - v91;
+    softehl_store4(K + 252, 256, v101, v99, v100, v106);
 }
+SOFTEHL_BATCH(softehl_touch_side_4_tangent, 12, 16, 1, 0, 16, (16 * 16))
 
-void softehl_touch_side_4_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_side_4_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_4_tangent_group(points, modes, coordinates + 12 * e, dofs + 16 * e, data + 1 * e, 0, parameters, rule, basis, values + 16 * e, tangent + (16 * 16) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_4_tangent_group(points, modes, coordinates + 12 * (n - SOFTEHL_LANES), dofs + 16 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 16 * (n - SOFTEHL_LANES), tangent + (16 * 16) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 12];
-    softehl_pad(X, coordinates, 12, n);
-    double d[SOFTEHL_LANES * 16];
-    softehl_pad(d, dofs, 16, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * 16];
-    double K[SOFTEHL_LANES * (16 * 16)];
-    softehl_touch_side_4_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 16 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (16 * 16) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_touch_side_4_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9, X10, X11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9, X10, X11;
+    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
     softehl_load4(X + 8, 12, &X8, &X9, &X10, &X11);
-    (void)X8; (void)X9; (void)X10; (void)X11;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15;
+    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 16, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
-    softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V a0;
-    softehl_load1(a + 0, 1, &a0);
-    (void)a0;
-    const V v1 = X0 + d0;
-    const V v2 = X1 + d1;
-    const V v3 = X2 + d2;
-    const V v4 = X3 + d3;
-    const V v5 = X4 + d4;
-    const V v6 = X5 + d5;
-    const V v7 = X6 + d6;
-    const V v8 = X6 - X3;
-    const V v9 = X7 + d7;
-    const V v10 = X7 - X4;
-    const V v11 = X9 + d9;
-    const V v12 = X6 - X9;
-    const V v13 = X8 + d8;
-    const V v14 = X8 - X5;
-    const V v15 = X7 - X10;
-    const V v16 = X8 - X11;
-    const V v17 = X11 + d11;
-    const V v18 = v7 - v11;
-    const V v19 = X10 + d10;
-    const V v20 = v7 - v4;
-    const V v21 = v9 - v5;
-    const V v22 = v9 - v19;
-    const V v23 = v13 - v6;
-    const V v24 = v13 - v17;
+    softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15); V a0; softehl_load1(a + 0, 1, &a0); (void)a0;
+    const V v1 = X0 + d0, v2 = X1 + d1, v3 = X2 + d2, v4 = X3 + d3, v5 = X4 + d4, v6 = X5 + d5,
+        v7 = X6 + d6, v8 = X6 - X3, v9 = X7 + d7, v10 = X7 - X4, v11 = X9 + d9, v12 = X6 - X9,
+        v13 = X8 + d8, v14 = X8 - X5, v15 = X7 - X10, v16 = X8 - X11, v17 = X11 + d11,
+        v18 = v7 - v11, v19 = X10 + d10, v20 = v7 - v4, v21 = v9 - v5, v22 = v9 - v19,
+        v23 = v13 - v6, v24 = v13 - v17;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v25 = 1.0 - w[1];
-        const double v26 = 0.25 * w[1];
-        const double v27 = 1.0 + w[1];
-        const double v28 = 1.0 - w[0];
-        const double v29 = 1.0 + w[0];
-        const double v30 = 0.25 * w[0];
-        const double v31 = 0.25 - v26;
-        const double v32 = 0.25 + v26;
-        const double v33 = 0.25 * v25;
-        const double v34 = 0.25 * v27;
-        const double v35 = 0.25 + v30;
-        const double v36 = 0.25 - v30;
-        const double v37 = v26 - 0.25;
-        const double v38 = v28 * v33;
-        const double v39 = v29 * v33;
-        const V v40 = X3 * v31;
-        const double v41 = v29 * v34;
-        const double v42 = v28 * v34;
-        const double v43 = v30 - 0.25;
-        const V v44 = X10 * v36;
-        const V v45 = X9 * v36;
-        const V v46 = X4 * v31;
-        const V v47 = X5 * v31;
-        const V v48 = X11 * v36;
-        const V v49 = v7 * v41;
-        const V v50 = v9 * v41;
-        const V v51 = v13 * v41;
-        const V v52 = d12 * v28;
-        const V v53 = d15 * v28;
-        const V v54 = X1 * v43;
-        const V v55 = v44 + v54;
-        const V v56 = X1 * v37;
-        const V v57 = v46 + v56;
-        const V v58 = d13 * v29;
-        const V v59 = v52 + v58;
-        const V v60 = d14 * v29;
-        const V v61 = v60 + v53;
-        const V v62 = v11 * v42;
-        const V v63 = v49 + v62;
-        const V v64 = v36 * v11;
-        const V v65 = v25 * v59;
-        const V v66 = v35 * v10;
-        const V v67 = v66 + v55;
-        const V v68 = v35 * v14;
-        const V v69 = v48 + v68;
-        const V v70 = v32 * v15;
-        const V v71 = v70 + v57;
-        const V v72 = v32 * v16;
-        const V v73 = v47 + v72;
-        const V v74 = v32 * v18;
-        const V v75 = v27 * v61;
-        const V v76 = v65 + v75;
-        const V v77 = v35 * v20;
-        const V v78 = v64 + v77;
-        const V v79 = v35 * v21;
-        const V v80 = v32 * v22;
-        const V v81 = 0.25 * v76;
-        const V v82 = X2 * v43;
-        const V v83 = v82 + v69;
-        const V v84 = X2 * v37;
-        const V v85 = v84 + v73;
-        const V v86 = v35 * v23;
-        const V v87 = v35 * v8;
-        const V v88 = v45 + v87;
-        const V v89 = v32 * v24;
-        const V v90 = v32 * v12;
-        const V v91 = v40 + v90;
-        const V v92 = v36 * v19;
-        const V v93 = v92 + v79;
-        const V v94 = v71 * v83;
-        const V v95 = v36 * v17;
-        const V v96 = v95 + v86;
-        const V v97 = v1 * v43;
-        const V v98 = v97 + v78;
-        const V v99 = X0 * v43;
-        const V v100 = v99 + v88;
-        const V v101 = X0 * v37;
-        const V v102 = v101 + v91;
-        const V v103 = v3 * v37;
-        const V v104 = v103 + v89;
-        const V v105 = v3 * v43;
-        const V v106 = v105 + v96;
-        const V v107 = v2 * v43;
-        const V v108 = v107 + v93;
-        const V v109 = v67 * v85;
-        const V v110 = v94 - v109;
-        const V v111 = v100 * v85;
-        const V v112 = v67 * v102;
-        const V v113 = v102 * v83;
-        const V v114 = v111 - v113;
-        const V v115 = v71 * v100;
-        const V v116 = v112 - v115;
-        const V v117 = v110 * v110;
-        const V v118 = v31 * v6;
-        const V v119 = v118 + v104;
-        const V v120 = v17 * v42;
-        const V v121 = v51 + v120;
-        const V v122 = v19 * v42;
-        const V v123 = v50 + v122;
-        const V v124 = v116 * v116;
-        const V v125 = v117 + v124;
-        const V v126 = v3 * v38;
-        const V v127 = v121 + v126;
-        const V v128 = v114 * v114;
-        const V v129 = v128 + v125;
-        const V v130 = v2 * v38;
-        const V v131 = v123 + v130;
-        const V v132 = v1 * v38;
-        const V v133 = v63 + v132;
-        const V v134 = v98 * v119;
-        const V v135 = v6 * v39;
-        const V v136 = v135 + v127;
-        const V v137 = softehl_vsqrt(v129);
-        const V v138 = v1 * v37;
-        const V v139 = v138 + v74;
-        const V v140 = v2 * v37;
-        const V v141 = v140 + v80;
-        const V v142 = v5 * v39;
-        const V v143 = v142 + v131;
-        const V v144 = v4 * v39;
-        const V v145 = v144 + v133;
-        const V v146 = v31 * v4;
-        const V v147 = v146 + v139;
-        const V v148 = v31 * v5;
-        const V v149 = v148 + v141;
-        const V v150 = v106 * v147;
-        const V v151 = v134 - v150;
-        const V v152 = v108 * v147;
-        const V v153 = v106 * v149;
-        const V v154 = v98 * v149;
-        const V v155 = v152 - v154;
-        const V v156 = v108 * v119;
-        const V v157 = v153 - v156;
-        const V v158 = v157 * v157;
-        const V v159 = v155 * v155;
-        const V v160 = v158 + v159;
-        const V v161 = v151 * v151;
-        const V v162 = v160 + v161;
-        const V v163 = softehl_vsqrt(v162);
-        const V v164 = 1.0 / v163;
-        const V v165 = v137 * v164;
-        const V v166 = w[2] * v163;
-        const V v167 = v81 * v165;
-        softehl_store4(R + 5 * q + 0, (5 * points), v167, v145, v143, v136);
-        softehl_store1(R + 5 * q + 4, (5 * points), v166);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v25 = 1.0 - w[1], v26 = 0.25 * w[1], v27 = 1.0 + w[1], v28 = 1.0 - w[0],
+            v29 = 1.0 + w[0], v30 = 0.25 * w[0], v31 = 0.25 - v26, v32 = 0.25 + v26,
+            v33 = 0.25 * v25, v34 = 0.25 * v27, v35 = 0.25 + v30, v36 = 0.25 - v30,
+            v37 = v26 - 0.25, v38 = v28 * v33, v39 = v29 * v33, v40 = v29 * v34, v41 = v28 * v34,
+            v42 = v30 - 0.25;
+        const V v43 = v35 * v10 + (X10 * v36 + X1 * v42), v44 = v32 * v15 + (X4 * v31 + X1 * v37),
+            v45 = 0.25 * (v25 * (d12 * v28 + d13 * v29) + v27 * (d14 * v29 + d15 * v28)),
+            v46 = X2 * v42 + (X11 * v36 + v35 * v14), v47 = X2 * v37 + (X5 * v31 + v32 * v16),
+            v48 = v1 * v42 + (v36 * v11 + v35 * v20), v49 = X0 * v42 + (X9 * v36 + v35 * v8),
+            v50 = X0 * v37 + (X3 * v31 + v32 * v12), v51 = v3 * v42 + (v36 * v17 + v35 * v23),
+            v52 = v2 * v42 + (v36 * v19 + v35 * v21), v53 = v44 * v46 - v43 * v47,
+            v54 = v49 * v47 - v50 * v46, v55 = v43 * v50 - v44 * v49,
+            v56 = v31 * v6 + (v3 * v37 + v32 * v24),
+            v57 = v6 * v39 + (v13 * v40 + v17 * v41 + v3 * v38),
+            v58 = softehl_vsqrt(v54 * v54 + (v53 * v53 + v55 * v55)),
+            v59 = v5 * v39 + (v9 * v40 + v19 * v41 + v2 * v38),
+            v60 = v4 * v39 + (v7 * v40 + v11 * v41 + v1 * v38),
+            v61 = v31 * v4 + (v1 * v37 + v32 * v18), v62 = v31 * v5 + (v2 * v37 + v32 * v22),
+            v63 = v48 * v56 - v51 * v61, v64 = v52 * v61 - v48 * v62, v65 = v51 * v62 - v52 * v56,
+            v66 = softehl_vsqrt(v65 * v65 + v64 * v64 + v63 * v63), v67 = w[2] * v66,
+            v68 = v45 * (v58 * (1.0 / v66));
+        softehl_store4(R + 5 * q + 0, (5 * points), v68, v60, v59, v57);
+        softehl_store1(R + 5 * q + 4, (5 * points), v67);
     }
 }
-
-void softehl_touch_side_4_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_4_fields_group(points, modes, coordinates + 12 * e, dofs + 16 * e, data + 1 * e, 0, parameters, rule, basis, values + (5 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_4_fields_group(points, modes, coordinates + 12 * (n - SOFTEHL_LANES), dofs + 16 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (5 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 12];
-    softehl_pad(X, coordinates, 12, n);
-    double d[SOFTEHL_LANES * 16];
-    softehl_pad(d, dofs, 16, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * (5 * points)];
-    softehl_touch_side_4_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (5 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_touch_side_4_fields, 12, 16, 1, 0, (5 * points), 0)

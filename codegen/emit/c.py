@@ -25,6 +25,7 @@ def function(
 ) -> tuple[str, int]:
     """C text of one kernel and the number of its temporaries."""
     p = Printer(definition)
+    p.read(plan, [x.node for x in entries])
     p.line(1, "for (ptrdiff_t e = 0; e < n; ++e) {")
     _pointers(p, task)
     fallible = any(n.op is Op.CALL for n in reachable([x.node for x in entries]))
@@ -41,9 +42,9 @@ def function(
     if fallible:
         _mark(p, task)
     p.line(1, "}")
-    body = "\n".join(_unused(p.lines) + p.lines)
-    text = f"{abi.declaration(definition.name, task)}\n{{\n{body}\n}}\n"
-    return text, p.temporaries
+    body = "\n".join([*_unused(p.lines), p.text()])
+    name = abi.function_name(definition.name, task)
+    return f"SOFTEHL_KERNEL({name})\n{{\n{body}\n}}\n", p.temporaries
 
 
 def _in_loop(x: Entry) -> bool:
@@ -109,7 +110,7 @@ def _store_after(p: Printer, task: str, entries: Sequence[Entry]) -> None:
 
 def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
     for s in loop.sums:
-        p.line(2, f"double {p.fresh(s, 's')} = 0.0;")
+        p.line(2, f"double {p.fresh(s, 's')} = {{0}};")
     p.line(2, "for (ptrdiff_t q = 0; q < points; ++q) {")
     p.line(3, f"const double *restrict w = rule + {p.d.rule.dimension + 1} * q;")
     p.line(3, "(void)w;")
@@ -126,7 +127,7 @@ def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
             basis.gather(p, 3, "t", "t", design_width(p.d))
     p.block(3, loop.body)
     for s in loop.sums:
-        p.line(3, f"{p.ref(s)} += {p.ref(s.args[0])};")
+        p.line(3, f"{p.ref(s)} += {p.bare(s.args[0])};")
     here = [x for x in entries if x.node in loop.outputs]
     if here and task in abi.AT_POINTS:
         _store_fields(p, here)

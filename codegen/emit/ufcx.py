@@ -98,6 +98,7 @@ def function(
     if fallible:
         p.line(1, "int failed = 0;")
     values = {} if task == abi.Task.FIELDS else {_target(p, task, x): x.node for x in entries}
+    p.read(plan, [x.node for x in entries])
     for stage in plan.stages:
         p.block(1, stage.before)
         if stage.loop is not None:
@@ -110,7 +111,7 @@ def function(
     if fallible:
         _mark(p, task)
     declaration = abi.ufcx_declaration(definition.name, task)
-    body = "\n".join(p.lines)
+    body = p.text()
     return f"{declaration};\n\n{declaration}\n{{\n{body}\n}}\n", p.temporaries
 
 
@@ -139,7 +140,7 @@ def _loop(p: Printer, loop: Loop, fields: Sequence[Entry]) -> None:
     p.line(1, f"for (int q = 0; q < {len(p.d.rule.weights)}; ++q) {{")
     p.block(2, loop.body)
     for s in loop.sums:
-        p.line(2, f"{p.ref(s)} += {p.ref(s.args[0])};")
+        p.line(2, f"{p.ref(s)} += {p.bare(s.args[0])};")
     for x in fields:
         if x.node in loop.outputs:
             _store(p, 2, x)

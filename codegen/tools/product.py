@@ -16,11 +16,11 @@ from softehl.codegen.pipeline import Function, KernelSource
 def files(kernels: Iterable[KernelSource]) -> dict[str, str]:
     """Every file of `generated/`: C, header, signature, manifest."""
     kernels = list(kernels)
-    declarations = [abi.declaration(k.definition.name, t) for k in kernels for t in k.functions]
+    names = [abi.function_name(k.definition.name, t) for k in kernels for t in k.functions]
     out = {f"{k.definition.name}.c": k.text for k in kernels}
     out |= {f"{k.definition.name}_design.c": k.design for k in kernels if k.design}
     out |= {name: text for k in kernels for name, text in k.shared.items()}
-    out[source.HEADER] = source.header(declarations)
+    out[source.HEADER] = source.header(names)
     out["signature.c"] = SIGNATURE_C
     manifest = {k.definition.name: _manifest(k) for k in kernels}
     out["manifest.json"] = json.dumps({"kernels": manifest}, indent=1) + "\n"

@@ -49,6 +49,6 @@ def test_a_kernel_is_called_from_cpp(tmp_path: Path) -> None:
 
 
 def test_cffi_reads_the_prototypes() -> None:
-    text = source.header([abi.declaration("spring", "energy")])
+    text = source.header([abi.function_name("spring", "energy")])
     prototypes = text[text.index("void softehl_spring") : text.rindex("#if defined(__cplusplus)")]
     cffi.FFI().cdef(prototypes)
