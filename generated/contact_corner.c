@@ -24,47 +24,50 @@ SOFTEHL_KERNEL(softehl_contact_corner_energy)
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
         const double *restrict a = data + 2 * e; (void)X; (void)d; (void)a;
-        const double v1 = parameters[1] + parameters[2] - X[1] - d[1],
-            v2 = parameters[0] + parameters[2] - X[0] - d[0];
-        const int v3 = 0.0 < v1, v4 = 0.0 < v2;
-        double v5;
-        if (v4) {
-            double v6;
-            if (v3) {
-                const double v7 = v2 * v2 + v1 * v1; const int v8 = 0.0 < v7; double v9;
-                if (v8) {
-                    const double v10 = sqrt(v7); v9 = v10;
+        const double v1 = parameters[1] + parameters[2], v2 = v1 - X[1], v3 = v2 - d[1],
+            v4 = parameters[0] + parameters[2], v5 = v4 - X[0], v6 = v5 - d[0];
+        const int v7 = 0.0 < v3, v8 = 0.0 < v6;
+        double v9;
+        if (v8) {
+            double v10;
+            if (v7) {
+                const double v11 = v3 * v3, v12 = v6 * v6, v13 = v12 + v11;
+                const int v14 = 0.0 < v13; double v15;
+                if (v14) {
+                    const double v16 = sqrt(v13); v15 = v16;
                 } else {
-                    v9 = 0.0;
+                    v15 = 0.0;
                 }
-                v6 = v9;
+                v10 = v15;
             } else {
-                v6 = v2;
+                v10 = v6;
             }
-            v5 = v6;
+            v9 = v10;
         } else {
-            double v11;
-            if (v3) {
-                v11 = v1;
+            double v17;
+            if (v7) {
+                v17 = v3;
             } else {
-                const int v12 = v2 < v1; double v13;
-                if (v12) {
-                    v13 = v1;
+                const int v18 = v6 < v3; double v19;
+                if (v18) {
+                    v19 = v3;
                 } else {
-                    v13 = v2;
+                    v19 = v6;
                 }
-                v11 = v13;
+                v17 = v19;
             }
-            v5 = v11;
+            v9 = v17;
         }
-        const double v14 = d[2] + a[1] * (v5 - parameters[2]); const int v15 = 0.0 < v14;
-        double v16;
-        if (v15) {
-            v16 = 0.0;
+        const double v20 = v9 - parameters[2], v21 = a[1] * v20, v22 = d[2] + v21;
+        const int v23 = 0.0 < v22; double v24;
+        if (v23) {
+            v24 = 0.0;
         } else {
-            v16 = v14;
+            v24 = v22;
         }
-        const double v17 = (v16 * v16 - d[2] * d[2]) * (0.5 * a[0] * (1.0 / a[1])); values[e] = v17;
+        const double v25 = v24 * v24, v26 = d[2] * d[2], v27 = v25 - v26, v28 = 1.0 / a[1],
+            v29 = 0.5 * a[0], v30 = v29 * v28, v31 = v27 * v30;
+        values[e] = v31;
     }
 }
 

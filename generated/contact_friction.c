@@ -30,32 +30,35 @@ SOFTEHL_KERNEL(softehl_contact_friction_residual)
         const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 4 * e;
         const double *restrict a = data + 7 * e; double *restrict R = values + 4 * e;
         (void)X; (void)d; (void)a;
-        const double v1 = a[1] * (X[1] + d[1]) + a[0] * (X[0] + d[0]) - (a[2] + parameters[0]),
-            v2 = -(d[2] + a[4] * v1);
-        const int v3 = 0.0 < v2; double v4;
-        if (v3) {
-            v4 = v2;
+        const double v1 = X[0] + d[0], v2 = a[0] * v1, v3 = X[1] + d[1], v4 = a[1] * v3,
+            v5 = v4 + v2, v6 = a[2] + parameters[0], v7 = v5 - v6, v8 = a[4] * v7, v9 = d[2] + v8,
+            v10 = -v9;
+        const int v11 = 0.0 < v10; double v12;
+        if (v11) {
+            v12 = v10;
         } else {
-            v4 = 0.0;
+            v12 = 0.0;
         }
-        const double v5 = parameters[1] * v4,
-            v6 = d[3] + a[4] * (a[1] * (d[0] - a[5]) - a[0] * (d[1] - a[6]));
-        const int v7 = v5 < v6; double v8;
-        if (v7) {
-            v8 = v5;
+        const double v13 = parameters[1] * v12, v14 = d[1] - a[6], v15 = a[0] * v14,
+            v16 = d[0] - a[5], v17 = a[1] * v16, v18 = v17 - v15, v19 = a[4] * v18,
+            v20 = d[3] + v19;
+        const int v21 = v13 < v20; double v22;
+        if (v21) {
+            v22 = v13;
         } else {
-            v8 = v6;
+            v22 = v20;
         }
-        const double v9 = -v5; const int v10 = v9 < v8; double v11;
-        if (v10) {
-            v11 = v8;
+        const double v23 = -v13; const int v24 = v23 < v22; double v25;
+        if (v24) {
+            v25 = v22;
         } else {
-            v11 = v9;
+            v25 = v23;
         }
-        const double v12 = a[3] * (a[1] * v11 - a[0] * v4),
-            v13 = -(a[3] * (a[1] * v4 + a[0] * v11)), v14 = a[3] * (1.0 / a[4]),
-            v15 = -(v14 * (d[2] + v4)), v16 = v14 * (v11 - d[3]);
-        R[0] = v12; R[1] = v13; R[2] = v15; R[3] = v16;
+        const double v26 = a[1] * v25, v27 = a[0] * v12, v28 = v26 - v27, v29 = a[3] * v28,
+            v30 = a[0] * v25, v31 = a[1] * v12, v32 = v31 + v30, v33 = a[3] * v32, v34 = -v33,
+            v35 = d[2] + v12, v36 = 1.0 / a[4], v37 = a[3] * v36, v38 = v37 * v35, v39 = -v38,
+            v40 = v25 - d[3], v41 = v37 * v40;
+        R[0] = v29; R[1] = v34; R[2] = v39; R[3] = v41;
     }
 }
 

@@ -111,83 +111,94 @@ static void softehl_film_conserving_carreau_level_lanes(
             v42 = 1.0 + v41, v43 = softehl_vlog(v42), v44 = softehl_vexp(p[3] * v43),
             v45 = p[2] * v44, v46 = p[0] + v45, v47 = 1.0 / v46, v48 = 0.23395696728634552 * s[4],
             v49 = v48 * v47 + (v40 * v39 + (v32 * v31 + (v24 * v23 + (v16 * v15 + v8 * v7)))),
-            v50 = 1.0 / (v14 * v14), v51 = 1.0 + v9 * v50, v52 = softehl_vlog(v51),
-            v53 = softehl_vexp(p[1] * v52), v54 = p[2] * v53, v55 = p[0] + v54, v56 = s[1] * v55,
-            v57 = 1.0 / (v22 * v22), v58 = 1.0 + v17 * v57, v59 = softehl_vlog(v58),
-            v60 = softehl_vexp(p[1] * v59), v61 = p[2] * v60, v62 = p[0] + v61, v63 = s[2] * v62,
-            v64 = 1.0 / (v38 * v38), v65 = 1.0 + v33 * v64, v66 = softehl_vlog(v65),
-            v67 = softehl_vexp(p[1] * v66), v68 = p[2] * v67, v69 = p[0] + v68, v70 = s[3] * v69,
-            v71 = 1.0 / (v46 * v46), v72 = 1.0 + v41 * v71, v73 = softehl_vlog(v72),
-            v74 = softehl_vexp(p[1] * v73), v75 = p[2] * v74, v76 = p[0] + v75, v77 = s[4] * v76,
-            v78 = 1.0 / (v30 * v30), v79 = 1.0 + v25 * v78, v80 = softehl_vlog(v79),
-            v81 = softehl_vexp(p[1] * v80), v82 = p[2] * v81, v83 = p[0] + v82, v84 = s[5] * v83,
-            v85 = 1.0 / (v6 * v6), v86 = 1.0 + v1 * v85, v87 = softehl_vlog(v86),
-            v88 = softehl_vexp(p[1] * v87), v89 = p[2] * v88, v90 = p[0] + v89, v91 = s[6] * v90,
-            v92 = 2.0 * s[1], v93 = 1.0 / v10, v94 = v15 * v15, v95 = v16 * v94, v96 = v13 * v95,
-            v97 = 2.0 * s[2], v98 = 1.0 / v18, v99 = v23 * v23, v100 = v24 * v99, v101 = v21 * v100,
-            v102 = 2.0 * s[3], v103 = 1.0 / v34, v104 = v39 * v39, v105 = v40 * v104,
-            v106 = v37 * v105, v107 = 2.0 * s[4], v108 = 1.0 / v42, v109 = v47 * v47,
-            v110 = v48 * v109, v111 = v45 * v110, v112 = 2.0 * s[5], v113 = 1.0 / v26,
-            v114 = v31 * v31, v115 = v32 * v114, v116 = v29 * v115, v117 = 2.0 * s[6],
-            v118 = 1.0 / v2, v119 = v7 * v7, v120 = v8 * v119, v121 = v5 * v120, v122 = s[1] * v15,
-            v123 = v54 * v122, v124 = v123 * (p[1] * (1.0 / v51)),
-            v125 = v56 * v94 + v124 * (v50 * (v50 * (v14 * (2.0 * v9)))), v126 = v13 * v125,
-            v127 = s[2] * v23, v128 = v61 * v127, v129 = v128 * (p[1] * (1.0 / v58)),
-            v130 = v63 * v99 + v129 * (v57 * (v57 * (v22 * (2.0 * v17)))), v131 = v21 * v130,
-            v132 = s[3] * v39, v133 = v68 * v132, v134 = v133 * (p[1] * (1.0 / v65)),
-            v135 = v70 * v104 + v134 * (v64 * (v64 * (v38 * (2.0 * v33)))), v136 = v37 * v135,
-            v137 = s[4] * v47, v138 = v75 * v137, v139 = v138 * (p[1] * (1.0 / v72)),
-            v140 = v77 * v109 + v139 * (v71 * (v71 * (v46 * (2.0 * v41)))), v141 = v45 * v140,
-            v142 = s[5] * v31, v143 = v82 * v142, v144 = v143 * (p[1] * (1.0 / v79)),
-            v145 = v84 * v114 + v144 * (v78 * (v78 * (v30 * (2.0 * v25)))), v146 = v29 * v145,
-            v147 = s[6] * v7, v148 = v89 * v147, v149 = v148 * (p[1] * (1.0 / v86)),
-            v150 = v91 * v119 + v149 * (v85 * (v85 * (v6 * (2.0 * v1)))), v151 = v5 * v150,
-            v152 = v44 * v110 + v36 * v105 + v28 * v115 + v20 * v100 + v4 * v120 + v12 * v95,
-            v153 = v43 * v111 + v35 * v106 + v27 * v116 + v19 * v101 + v3 * v121 + v11 * v96;
-        g[0] = v49 - p[4]; g[1] = v15 * v56 - (s[0] + p[5]); g[2] = v23 * v63 - (s[0] + p[6]);
-        g[3] = v39 * v70 - (s[0] + p[7]); g[4] = p[7] - s[0] + v47 * v77;
-        g[5] = p[6] - s[0] + v31 * v84; g[6] = p[5] - s[0] + v7 * v91; A[0] = softehl_splat(0.0);
-        A[1] = 0.08566224618958518 * v15 - v96 * (v93 * (p[3] * v92));
-        A[2] = 0.1803807865240693 * v23 - v101 * (v98 * (p[3] * v97));
-        A[3] = 0.23395696728634552 * v39 - v106 * (v103 * (p[3] * v102));
-        A[4] = 0.23395696728634552 * v47 - v111 * (v108 * (p[3] * v107));
-        A[5] = 0.1803807865240693 * v31 - v116 * (v113 * (p[3] * v112));
-        A[6] = 0.08566224618958518 * v7 - v121 * (v118 * (p[3] * v117));
-        A[7] = softehl_splat((-1.0)); A[8] = v15 * v55 + v92 * (v50 * v124 - p[3] * v93 * v126);
-        A[9] = softehl_splat(0.0); A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0);
-        A[12] = softehl_splat(0.0); A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0));
-        A[15] = softehl_splat(0.0); A[16] = v23 * v62 + v97 * (v57 * v129 - p[3] * v98 * v131);
-        A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0); A[19] = softehl_splat(0.0);
-        A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0)); A[22] = softehl_splat(0.0);
-        A[23] = softehl_splat(0.0); A[24] = v39 * v69 + v102 * (v64 * v134 - p[3] * v103 * v136);
+            v50 = v49 - p[4], v51 = 1.0 / (v14 * v14), v52 = 1.0 + v9 * v51,
+            v53 = softehl_vlog(v52), v54 = softehl_vexp(p[1] * v53), v55 = p[2] * v54,
+            v56 = p[0] + v55, v57 = s[1] * v56, v58 = v15 * v57 - (s[0] + p[5]),
+            v59 = 1.0 / (v22 * v22), v60 = 1.0 + v17 * v59, v61 = softehl_vlog(v60),
+            v62 = softehl_vexp(p[1] * v61), v63 = p[2] * v62, v64 = p[0] + v63, v65 = s[2] * v64,
+            v66 = v23 * v65 - (s[0] + p[6]), v67 = 1.0 / (v38 * v38), v68 = 1.0 + v33 * v67,
+            v69 = softehl_vlog(v68), v70 = softehl_vexp(p[1] * v69), v71 = p[2] * v70,
+            v72 = p[0] + v71, v73 = s[3] * v72, v74 = v39 * v73 - (s[0] + p[7]),
+            v75 = 1.0 / (v46 * v46), v76 = 1.0 + v41 * v75, v77 = softehl_vlog(v76),
+            v78 = softehl_vexp(p[1] * v77), v79 = p[2] * v78, v80 = p[0] + v79, v81 = s[4] * v80,
+            v82 = p[7] - s[0] + v47 * v81, v83 = 1.0 / (v30 * v30), v84 = 1.0 + v25 * v83,
+            v85 = softehl_vlog(v84), v86 = softehl_vexp(p[1] * v85), v87 = p[2] * v86,
+            v88 = p[0] + v87, v89 = s[5] * v88, v90 = p[6] - s[0] + v31 * v89,
+            v91 = 1.0 / (v6 * v6), v92 = 1.0 + v1 * v91, v93 = softehl_vlog(v92),
+            v94 = softehl_vexp(p[1] * v93), v95 = p[2] * v94, v96 = p[0] + v95, v97 = s[6] * v96,
+            v98 = p[5] - s[0] + v7 * v97, v99 = 2.0 * s[1], v100 = 1.0 / v10, v101 = v15 * v15,
+            v102 = v16 * v101, v103 = v13 * v102,
+            v104 = 0.08566224618958518 * v15 - v103 * (v100 * (p[3] * v99)), v105 = 2.0 * s[2],
+            v106 = 1.0 / v18, v107 = v23 * v23, v108 = v24 * v107, v109 = v21 * v108,
+            v110 = 0.1803807865240693 * v23 - v109 * (v106 * (p[3] * v105)), v111 = 2.0 * s[3],
+            v112 = 1.0 / v34, v113 = v39 * v39, v114 = v40 * v113, v115 = v37 * v114,
+            v116 = 0.23395696728634552 * v39 - v115 * (v112 * (p[3] * v111)), v117 = 2.0 * s[4],
+            v118 = 1.0 / v42, v119 = v47 * v47, v120 = v48 * v119, v121 = v45 * v120,
+            v122 = 0.23395696728634552 * v47 - v121 * (v118 * (p[3] * v117)), v123 = 2.0 * s[5],
+            v124 = 1.0 / v26, v125 = v31 * v31, v126 = v32 * v125, v127 = v29 * v126,
+            v128 = 0.1803807865240693 * v31 - v127 * (v124 * (p[3] * v123)), v129 = 2.0 * s[6],
+            v130 = 1.0 / v2, v131 = v7 * v7, v132 = v8 * v131, v133 = v5 * v132,
+            v134 = 0.08566224618958518 * v7 - v133 * (v130 * (p[3] * v129)), v135 = s[1] * v15,
+            v136 = v55 * v135, v137 = v136 * (p[1] * (1.0 / v52)),
+            v138 = v57 * v101 + v137 * (v51 * (v51 * (v14 * (2.0 * v9)))), v139 = v13 * v138,
+            v140 = v15 * v56 + v99 * (v51 * v137 - p[3] * v100 * v139), v141 = s[2] * v23,
+            v142 = v63 * v141, v143 = v142 * (p[1] * (1.0 / v60)),
+            v144 = v65 * v107 + v143 * (v59 * (v59 * (v22 * (2.0 * v17)))), v145 = v21 * v144,
+            v146 = v23 * v64 + v105 * (v59 * v143 - p[3] * v106 * v145), v147 = s[3] * v39,
+            v148 = v71 * v147, v149 = v148 * (p[1] * (1.0 / v68)),
+            v150 = v73 * v113 + v149 * (v67 * (v67 * (v38 * (2.0 * v33)))), v151 = v37 * v150,
+            v152 = v39 * v72 + v111 * (v67 * v149 - p[3] * v112 * v151), v153 = s[4] * v47,
+            v154 = v79 * v153, v155 = v154 * (p[1] * (1.0 / v76)),
+            v156 = v81 * v119 + v155 * (v75 * (v75 * (v46 * (2.0 * v41)))), v157 = v45 * v156,
+            v158 = v47 * v80 + v117 * (v75 * v155 - p[3] * v118 * v157), v159 = s[5] * v31,
+            v160 = v87 * v159, v161 = v160 * (p[1] * (1.0 / v84)),
+            v162 = v89 * v125 + v161 * (v83 * (v83 * (v30 * (2.0 * v25)))), v163 = v29 * v162,
+            v164 = v31 * v88 + v123 * (v83 * v161 - p[3] * v124 * v163), v165 = s[6] * v7,
+            v166 = v95 * v165, v167 = v166 * (p[1] * (1.0 / v92)),
+            v168 = v97 * v131 + v167 * (v91 * (v91 * (v6 * (2.0 * v1)))), v169 = v5 * v168,
+            v170 = v7 * v96 + v129 * (v91 * v167 - p[3] * v130 * v169),
+            v171 = -(v120 + v114 + v126 + v108 + v132 + v102),
+            v172 = v44 * v120 + v36 * v114 + v28 * v126 + v20 * v108 + v4 * v132 + v12 * v102,
+            v173 = -v172,
+            v174 = v43 * v121 + v35 * v115 + v27 * v127 + v19 * v109 + v3 * v133 + v11 * v103,
+            v175 = -v174, v176 = v135 - v138, v177 = v53 * v136, v178 = v54 * v135 - v12 * v138,
+            v179 = -(v11 * v139), v180 = v141 - v144, v181 = v61 * v142,
+            v182 = v62 * v141 - v20 * v144, v183 = -(v19 * v145), v184 = v147 - v150,
+            v185 = v69 * v148, v186 = v70 * v147 - v36 * v150, v187 = -(v35 * v151),
+            v188 = v153 - v156, v189 = v77 * v154, v190 = v78 * v153 - v44 * v156,
+            v191 = -(v43 * v157), v192 = v159 - v162, v193 = v85 * v160,
+            v194 = v86 * v159 - v28 * v162, v195 = -(v27 * v163), v196 = v165 - v168,
+            v197 = v93 * v166, v198 = v94 * v165 - v4 * v168, v199 = -(v3 * v169);
+        g[0] = v50; g[1] = v58; g[2] = v66; g[3] = v74; g[4] = v82; g[5] = v90; g[6] = v98;
+        A[0] = softehl_splat(0.0); A[1] = v104; A[2] = v110; A[3] = v116; A[4] = v122; A[5] = v128;
+        A[6] = v134; A[7] = softehl_splat((-1.0)); A[8] = v140; A[9] = softehl_splat(0.0);
+        A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0); A[12] = softehl_splat(0.0);
+        A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0)); A[15] = softehl_splat(0.0);
+        A[16] = v146; A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0);
+        A[19] = softehl_splat(0.0); A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0));
+        A[22] = softehl_splat(0.0); A[23] = softehl_splat(0.0); A[24] = v152;
         A[25] = softehl_splat(0.0); A[26] = softehl_splat(0.0); A[27] = softehl_splat(0.0);
         A[28] = softehl_splat((-1.0)); A[29] = softehl_splat(0.0); A[30] = softehl_splat(0.0);
-        A[31] = softehl_splat(0.0); A[32] = v47 * v76 + v107 * (v71 * v139 - p[3] * v108 * v141);
-        A[33] = softehl_splat(0.0); A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0));
-        A[36] = softehl_splat(0.0); A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0);
-        A[39] = softehl_splat(0.0); A[40] = v31 * v83 + v112 * (v78 * v144 - p[3] * v113 * v146);
-        A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0)); A[43] = softehl_splat(0.0);
-        A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0); A[46] = softehl_splat(0.0);
-        A[47] = softehl_splat(0.0); A[48] = v7 * v90 + v117 * (v85 * v149 - p[3] * v118 * v151);
-        B[0] = -(v110 + v105 + v115 + v100 + v120 + v95); B[1] = softehl_splat(0.0); B[2] = -v152;
-        B[3] = -v153; B[4] = softehl_splat((-1.0)); B[5] = softehl_splat(0.0);
-        B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0); B[8] = v122 - v125; B[9] = v52 * v123;
-        B[10] = v53 * v122 - v12 * v125; B[11] = -(v11 * v126); B[12] = softehl_splat(0.0);
+        A[31] = softehl_splat(0.0); A[32] = v158; A[33] = softehl_splat(0.0);
+        A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0)); A[36] = softehl_splat(0.0);
+        A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0); A[39] = softehl_splat(0.0);
+        A[40] = v164; A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0));
+        A[43] = softehl_splat(0.0); A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0);
+        A[46] = softehl_splat(0.0); A[47] = softehl_splat(0.0); A[48] = v170; B[0] = v171;
+        B[1] = softehl_splat(0.0); B[2] = v173; B[3] = v175; B[4] = softehl_splat((-1.0));
+        B[5] = softehl_splat(0.0); B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0);
+        B[8] = v176; B[9] = v177; B[10] = v178; B[11] = v179; B[12] = softehl_splat(0.0);
         B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0); B[15] = softehl_splat(0.0);
-        B[16] = v127 - v130; B[17] = v59 * v128; B[18] = v60 * v127 - v20 * v130;
-        B[19] = -(v19 * v131); B[20] = softehl_splat(0.0); B[21] = softehl_splat(0.0);
-        B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0); B[24] = v132 - v135;
-        B[25] = v66 * v133; B[26] = v67 * v132 - v36 * v135; B[27] = -(v35 * v136);
-        B[28] = softehl_splat(0.0); B[29] = softehl_splat(0.0); B[30] = softehl_splat(0.0);
-        B[31] = softehl_splat((-1.0)); B[32] = v137 - v140; B[33] = v73 * v138;
-        B[34] = v74 * v137 - v44 * v140; B[35] = -(v43 * v141); B[36] = softehl_splat(0.0);
+        B[16] = v180; B[17] = v181; B[18] = v182; B[19] = v183; B[20] = softehl_splat(0.0);
+        B[21] = softehl_splat(0.0); B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0);
+        B[24] = v184; B[25] = v185; B[26] = v186; B[27] = v187; B[28] = softehl_splat(0.0);
+        B[29] = softehl_splat(0.0); B[30] = softehl_splat(0.0); B[31] = softehl_splat((-1.0));
+        B[32] = v188; B[33] = v189; B[34] = v190; B[35] = v191; B[36] = softehl_splat(0.0);
         B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0); B[39] = softehl_splat(1.0);
-        B[40] = v142 - v145; B[41] = v80 * v143; B[42] = v81 * v142 - v28 * v145;
-        B[43] = -(v27 * v146); B[44] = softehl_splat(0.0); B[45] = softehl_splat(0.0);
-        B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0); B[48] = v147 - v150;
-        B[49] = v87 * v148; B[50] = v88 * v147 - v4 * v150; B[51] = -(v3 * v151);
-        B[52] = softehl_splat(0.0); B[53] = softehl_splat(1.0); B[54] = softehl_splat(0.0);
-        B[55] = softehl_splat(0.0);
+        B[40] = v192; B[41] = v193; B[42] = v194; B[43] = v195; B[44] = softehl_splat(0.0);
+        B[45] = softehl_splat(0.0); B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0);
+        B[48] = v196; B[49] = v197; B[50] = v198; B[51] = v199; B[52] = softehl_splat(0.0);
+        B[53] = softehl_splat(1.0); B[54] = softehl_splat(0.0); B[55] = softehl_splat(0.0);
         V felt[7];
         for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
         for (int i = 0; i < 7; ++i) {
@@ -243,83 +254,94 @@ static void softehl_film_conserving_carreau_level_cell_lanes(
             v42 = 1.0 + v41, v43 = softehl_vlog(v42), v44 = softehl_vexp(p[4] * v43),
             v45 = p[3] * v44, v46 = p[0] + v45, v47 = 1.0 / v46, v48 = 0.23395696728634552 * s[4],
             v49 = v48 * v47 + (v40 * v39 + (v32 * v31 + (v24 * v23 + (v16 * v15 + v8 * v7)))),
-            v50 = 1.0 / (v14 * v14), v51 = 1.0 + v9 * v50, v52 = softehl_vlog(v51),
-            v53 = softehl_vexp(p[2] * v52), v54 = p[3] * v53, v55 = p[0] + v54, v56 = s[1] * v55,
-            v57 = 1.0 / (v22 * v22), v58 = 1.0 + v17 * v57, v59 = softehl_vlog(v58),
-            v60 = softehl_vexp(p[2] * v59), v61 = p[3] * v60, v62 = p[0] + v61, v63 = s[2] * v62,
-            v64 = 1.0 / (v38 * v38), v65 = 1.0 + v33 * v64, v66 = softehl_vlog(v65),
-            v67 = softehl_vexp(p[2] * v66), v68 = p[3] * v67, v69 = p[0] + v68, v70 = s[3] * v69,
-            v71 = 1.0 / (v46 * v46), v72 = 1.0 + v41 * v71, v73 = softehl_vlog(v72),
-            v74 = softehl_vexp(p[2] * v73), v75 = p[3] * v74, v76 = p[0] + v75, v77 = s[4] * v76,
-            v78 = 1.0 / (v30 * v30), v79 = 1.0 + v25 * v78, v80 = softehl_vlog(v79),
-            v81 = softehl_vexp(p[2] * v80), v82 = p[3] * v81, v83 = p[0] + v82, v84 = s[5] * v83,
-            v85 = 1.0 / (v6 * v6), v86 = 1.0 + v1 * v85, v87 = softehl_vlog(v86),
-            v88 = softehl_vexp(p[2] * v87), v89 = p[3] * v88, v90 = p[0] + v89, v91 = s[6] * v90,
-            v92 = 2.0 * s[1], v93 = 1.0 / v10, v94 = v15 * v15, v95 = v16 * v94, v96 = v13 * v95,
-            v97 = 2.0 * s[2], v98 = 1.0 / v18, v99 = v23 * v23, v100 = v24 * v99, v101 = v21 * v100,
-            v102 = 2.0 * s[3], v103 = 1.0 / v34, v104 = v39 * v39, v105 = v40 * v104,
-            v106 = v37 * v105, v107 = 2.0 * s[4], v108 = 1.0 / v42, v109 = v47 * v47,
-            v110 = v48 * v109, v111 = v45 * v110, v112 = 2.0 * s[5], v113 = 1.0 / v26,
-            v114 = v31 * v31, v115 = v32 * v114, v116 = v29 * v115, v117 = 2.0 * s[6],
-            v118 = 1.0 / v2, v119 = v7 * v7, v120 = v8 * v119, v121 = v5 * v120, v122 = s[1] * v15,
-            v123 = v54 * v122, v124 = v123 * (p[2] * (1.0 / v51)),
-            v125 = v56 * v94 + v124 * (v50 * (v50 * (2.0 * v9 * v14))), v126 = v13 * v125,
-            v127 = s[2] * v23, v128 = v61 * v127, v129 = v128 * (p[2] * (1.0 / v58)),
-            v130 = v63 * v99 + v129 * (v57 * (v57 * (2.0 * v17 * v22))), v131 = v21 * v130,
-            v132 = s[3] * v39, v133 = v68 * v132, v134 = v133 * (p[2] * (1.0 / v65)),
-            v135 = v70 * v104 + v134 * (v64 * (v64 * (2.0 * v33 * v38))), v136 = v37 * v135,
-            v137 = s[4] * v47, v138 = v75 * v137, v139 = v138 * (p[2] * (1.0 / v72)),
-            v140 = v77 * v109 + v139 * (v71 * (v71 * (2.0 * v41 * v46))), v141 = v45 * v140,
-            v142 = s[5] * v31, v143 = v82 * v142, v144 = v143 * (p[2] * (1.0 / v79)),
-            v145 = v84 * v114 + v144 * (v78 * (v78 * (2.0 * v25 * v30))), v146 = v29 * v145,
-            v147 = s[6] * v7, v148 = v89 * v147, v149 = v148 * (p[2] * (1.0 / v86)),
-            v150 = v91 * v119 + v149 * (v85 * (v85 * (2.0 * v1 * v6))), v151 = v5 * v150,
-            v152 = v44 * v110 + v36 * v105 + v28 * v115 + v20 * v100 + v4 * v120 + v12 * v95,
-            v153 = v43 * v111 + v35 * v106 + v27 * v116 + v19 * v101 + v3 * v121 + v11 * v96;
-        g[0] = v49 - p[1]; g[1] = v15 * v56 - (s[0] + p[5]); g[2] = v23 * v63 - (s[0] + p[6]);
-        g[3] = v39 * v70 - (s[0] + p[7]); g[4] = p[7] - s[0] + v47 * v77;
-        g[5] = p[6] - s[0] + v31 * v84; g[6] = p[5] - s[0] + v7 * v91; A[0] = softehl_splat(0.0);
-        A[1] = 0.08566224618958518 * v15 - v96 * (v93 * (p[4] * v92));
-        A[2] = 0.1803807865240693 * v23 - v101 * (v98 * (p[4] * v97));
-        A[3] = 0.23395696728634552 * v39 - v106 * (v103 * (p[4] * v102));
-        A[4] = 0.23395696728634552 * v47 - v111 * (v108 * (p[4] * v107));
-        A[5] = 0.1803807865240693 * v31 - v116 * (v113 * (p[4] * v112));
-        A[6] = 0.08566224618958518 * v7 - v121 * (v118 * (p[4] * v117));
-        A[7] = softehl_splat((-1.0)); A[8] = v15 * v55 + v92 * (v50 * v124 - p[4] * v93 * v126);
-        A[9] = softehl_splat(0.0); A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0);
-        A[12] = softehl_splat(0.0); A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0));
-        A[15] = softehl_splat(0.0); A[16] = v23 * v62 + v97 * (v57 * v129 - p[4] * v98 * v131);
-        A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0); A[19] = softehl_splat(0.0);
-        A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0)); A[22] = softehl_splat(0.0);
-        A[23] = softehl_splat(0.0); A[24] = v39 * v69 + v102 * (v64 * v134 - p[4] * v103 * v136);
+            v50 = v49 - p[1], v51 = 1.0 / (v14 * v14), v52 = 1.0 + v9 * v51,
+            v53 = softehl_vlog(v52), v54 = softehl_vexp(p[2] * v53), v55 = p[3] * v54,
+            v56 = p[0] + v55, v57 = s[1] * v56, v58 = v15 * v57 - (s[0] + p[5]),
+            v59 = 1.0 / (v22 * v22), v60 = 1.0 + v17 * v59, v61 = softehl_vlog(v60),
+            v62 = softehl_vexp(p[2] * v61), v63 = p[3] * v62, v64 = p[0] + v63, v65 = s[2] * v64,
+            v66 = v23 * v65 - (s[0] + p[6]), v67 = 1.0 / (v38 * v38), v68 = 1.0 + v33 * v67,
+            v69 = softehl_vlog(v68), v70 = softehl_vexp(p[2] * v69), v71 = p[3] * v70,
+            v72 = p[0] + v71, v73 = s[3] * v72, v74 = v39 * v73 - (s[0] + p[7]),
+            v75 = 1.0 / (v46 * v46), v76 = 1.0 + v41 * v75, v77 = softehl_vlog(v76),
+            v78 = softehl_vexp(p[2] * v77), v79 = p[3] * v78, v80 = p[0] + v79, v81 = s[4] * v80,
+            v82 = p[7] - s[0] + v47 * v81, v83 = 1.0 / (v30 * v30), v84 = 1.0 + v25 * v83,
+            v85 = softehl_vlog(v84), v86 = softehl_vexp(p[2] * v85), v87 = p[3] * v86,
+            v88 = p[0] + v87, v89 = s[5] * v88, v90 = p[6] - s[0] + v31 * v89,
+            v91 = 1.0 / (v6 * v6), v92 = 1.0 + v1 * v91, v93 = softehl_vlog(v92),
+            v94 = softehl_vexp(p[2] * v93), v95 = p[3] * v94, v96 = p[0] + v95, v97 = s[6] * v96,
+            v98 = p[5] - s[0] + v7 * v97, v99 = 2.0 * s[1], v100 = 1.0 / v10, v101 = v15 * v15,
+            v102 = v16 * v101, v103 = v13 * v102,
+            v104 = 0.08566224618958518 * v15 - v103 * (v100 * (p[4] * v99)), v105 = 2.0 * s[2],
+            v106 = 1.0 / v18, v107 = v23 * v23, v108 = v24 * v107, v109 = v21 * v108,
+            v110 = 0.1803807865240693 * v23 - v109 * (v106 * (p[4] * v105)), v111 = 2.0 * s[3],
+            v112 = 1.0 / v34, v113 = v39 * v39, v114 = v40 * v113, v115 = v37 * v114,
+            v116 = 0.23395696728634552 * v39 - v115 * (v112 * (p[4] * v111)), v117 = 2.0 * s[4],
+            v118 = 1.0 / v42, v119 = v47 * v47, v120 = v48 * v119, v121 = v45 * v120,
+            v122 = 0.23395696728634552 * v47 - v121 * (v118 * (p[4] * v117)), v123 = 2.0 * s[5],
+            v124 = 1.0 / v26, v125 = v31 * v31, v126 = v32 * v125, v127 = v29 * v126,
+            v128 = 0.1803807865240693 * v31 - v127 * (v124 * (p[4] * v123)), v129 = 2.0 * s[6],
+            v130 = 1.0 / v2, v131 = v7 * v7, v132 = v8 * v131, v133 = v5 * v132,
+            v134 = 0.08566224618958518 * v7 - v133 * (v130 * (p[4] * v129)), v135 = s[1] * v15,
+            v136 = v55 * v135, v137 = v136 * (p[2] * (1.0 / v52)),
+            v138 = v57 * v101 + v137 * (v51 * (v51 * (2.0 * v9 * v14))), v139 = v13 * v138,
+            v140 = v15 * v56 + v99 * (v51 * v137 - p[4] * v100 * v139), v141 = s[2] * v23,
+            v142 = v63 * v141, v143 = v142 * (p[2] * (1.0 / v60)),
+            v144 = v65 * v107 + v143 * (v59 * (v59 * (2.0 * v17 * v22))), v145 = v21 * v144,
+            v146 = v23 * v64 + v105 * (v59 * v143 - p[4] * v106 * v145), v147 = s[3] * v39,
+            v148 = v71 * v147, v149 = v148 * (p[2] * (1.0 / v68)),
+            v150 = v73 * v113 + v149 * (v67 * (v67 * (2.0 * v33 * v38))), v151 = v37 * v150,
+            v152 = v39 * v72 + v111 * (v67 * v149 - p[4] * v112 * v151), v153 = s[4] * v47,
+            v154 = v79 * v153, v155 = v154 * (p[2] * (1.0 / v76)),
+            v156 = v81 * v119 + v155 * (v75 * (v75 * (2.0 * v41 * v46))), v157 = v45 * v156,
+            v158 = v47 * v80 + v117 * (v75 * v155 - p[4] * v118 * v157), v159 = s[5] * v31,
+            v160 = v87 * v159, v161 = v160 * (p[2] * (1.0 / v84)),
+            v162 = v89 * v125 + v161 * (v83 * (v83 * (2.0 * v25 * v30))), v163 = v29 * v162,
+            v164 = v31 * v88 + v123 * (v83 * v161 - p[4] * v124 * v163), v165 = s[6] * v7,
+            v166 = v95 * v165, v167 = v166 * (p[2] * (1.0 / v92)),
+            v168 = v97 * v131 + v167 * (v91 * (v91 * (2.0 * v1 * v6))), v169 = v5 * v168,
+            v170 = v7 * v96 + v129 * (v91 * v167 - p[4] * v130 * v169),
+            v171 = -(v120 + v114 + v126 + v108 + v132 + v102),
+            v172 = v44 * v120 + v36 * v114 + v28 * v126 + v20 * v108 + v4 * v132 + v12 * v102,
+            v173 = -v172,
+            v174 = v43 * v121 + v35 * v115 + v27 * v127 + v19 * v109 + v3 * v133 + v11 * v103,
+            v175 = -v174, v176 = v135 - v138, v177 = v53 * v136, v178 = v54 * v135 - v12 * v138,
+            v179 = -(v11 * v139), v180 = v141 - v144, v181 = v61 * v142,
+            v182 = v62 * v141 - v20 * v144, v183 = -(v19 * v145), v184 = v147 - v150,
+            v185 = v69 * v148, v186 = v70 * v147 - v36 * v150, v187 = -(v35 * v151),
+            v188 = v153 - v156, v189 = v77 * v154, v190 = v78 * v153 - v44 * v156,
+            v191 = -(v43 * v157), v192 = v159 - v162, v193 = v85 * v160,
+            v194 = v86 * v159 - v28 * v162, v195 = -(v27 * v163), v196 = v165 - v168,
+            v197 = v93 * v166, v198 = v94 * v165 - v4 * v168, v199 = -(v3 * v169);
+        g[0] = v50; g[1] = v58; g[2] = v66; g[3] = v74; g[4] = v82; g[5] = v90; g[6] = v98;
+        A[0] = softehl_splat(0.0); A[1] = v104; A[2] = v110; A[3] = v116; A[4] = v122; A[5] = v128;
+        A[6] = v134; A[7] = softehl_splat((-1.0)); A[8] = v140; A[9] = softehl_splat(0.0);
+        A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0); A[12] = softehl_splat(0.0);
+        A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0)); A[15] = softehl_splat(0.0);
+        A[16] = v146; A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0);
+        A[19] = softehl_splat(0.0); A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0));
+        A[22] = softehl_splat(0.0); A[23] = softehl_splat(0.0); A[24] = v152;
         A[25] = softehl_splat(0.0); A[26] = softehl_splat(0.0); A[27] = softehl_splat(0.0);
         A[28] = softehl_splat((-1.0)); A[29] = softehl_splat(0.0); A[30] = softehl_splat(0.0);
-        A[31] = softehl_splat(0.0); A[32] = v47 * v76 + v107 * (v71 * v139 - p[4] * v108 * v141);
-        A[33] = softehl_splat(0.0); A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0));
-        A[36] = softehl_splat(0.0); A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0);
-        A[39] = softehl_splat(0.0); A[40] = v31 * v83 + v112 * (v78 * v144 - p[4] * v113 * v146);
-        A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0)); A[43] = softehl_splat(0.0);
-        A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0); A[46] = softehl_splat(0.0);
-        A[47] = softehl_splat(0.0); A[48] = v7 * v90 + v117 * (v85 * v149 - p[4] * v118 * v151);
-        B[0] = -(v110 + v105 + v115 + v100 + v120 + v95); B[1] = softehl_splat((-1.0));
-        B[2] = softehl_splat(0.0); B[3] = -v152; B[4] = -v153; B[5] = softehl_splat(0.0);
-        B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0); B[8] = v122 - v125;
-        B[9] = softehl_splat(0.0); B[10] = v52 * v123; B[11] = v53 * v122 - v12 * v125;
-        B[12] = -(v11 * v126); B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0);
-        B[15] = softehl_splat(0.0); B[16] = v127 - v130; B[17] = softehl_splat(0.0);
-        B[18] = v59 * v128; B[19] = v60 * v127 - v20 * v130; B[20] = -(v19 * v131);
+        A[31] = softehl_splat(0.0); A[32] = v158; A[33] = softehl_splat(0.0);
+        A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0)); A[36] = softehl_splat(0.0);
+        A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0); A[39] = softehl_splat(0.0);
+        A[40] = v164; A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0));
+        A[43] = softehl_splat(0.0); A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0);
+        A[46] = softehl_splat(0.0); A[47] = softehl_splat(0.0); A[48] = v170; B[0] = v171;
+        B[1] = softehl_splat((-1.0)); B[2] = softehl_splat(0.0); B[3] = v173; B[4] = v175;
+        B[5] = softehl_splat(0.0); B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0);
+        B[8] = v176; B[9] = softehl_splat(0.0); B[10] = v177; B[11] = v178; B[12] = v179;
+        B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0); B[15] = softehl_splat(0.0);
+        B[16] = v180; B[17] = softehl_splat(0.0); B[18] = v181; B[19] = v182; B[20] = v183;
         B[21] = softehl_splat(0.0); B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0);
-        B[24] = v132 - v135; B[25] = softehl_splat(0.0); B[26] = v66 * v133;
-        B[27] = v67 * v132 - v36 * v135; B[28] = -(v35 * v136); B[29] = softehl_splat(0.0);
-        B[30] = softehl_splat(0.0); B[31] = softehl_splat((-1.0)); B[32] = v137 - v140;
-        B[33] = softehl_splat(0.0); B[34] = v73 * v138; B[35] = v74 * v137 - v44 * v140;
-        B[36] = -(v43 * v141); B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0);
-        B[39] = softehl_splat(1.0); B[40] = v142 - v145; B[41] = softehl_splat(0.0);
-        B[42] = v80 * v143; B[43] = v81 * v142 - v28 * v145; B[44] = -(v27 * v146);
+        B[24] = v184; B[25] = softehl_splat(0.0); B[26] = v185; B[27] = v186; B[28] = v187;
+        B[29] = softehl_splat(0.0); B[30] = softehl_splat(0.0); B[31] = softehl_splat((-1.0));
+        B[32] = v188; B[33] = softehl_splat(0.0); B[34] = v189; B[35] = v190; B[36] = v191;
+        B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0); B[39] = softehl_splat(1.0);
+        B[40] = v192; B[41] = softehl_splat(0.0); B[42] = v193; B[43] = v194; B[44] = v195;
         B[45] = softehl_splat(0.0); B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0);
-        B[48] = v147 - v150; B[49] = softehl_splat(0.0); B[50] = v87 * v148;
-        B[51] = v88 * v147 - v4 * v150; B[52] = -(v3 * v151); B[53] = softehl_splat(1.0);
-        B[54] = softehl_splat(0.0); B[55] = softehl_splat(0.0);
+        B[48] = v196; B[49] = softehl_splat(0.0); B[50] = v197; B[51] = v198; B[52] = v199;
+        B[53] = softehl_splat(1.0); B[54] = softehl_splat(0.0); B[55] = softehl_splat(0.0);
         V felt[7];
         for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
         for (int i = 0; i < 7; ++i) {

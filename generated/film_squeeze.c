@@ -27,8 +27,9 @@ SOFTEHL_KERNEL(softehl_film_squeeze_residual)
         const double *restrict a = data + (0 + 1 * points) * e;
         double *restrict R = values + (4 + modes) * e; (void)X; (void)d; (void)a;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = d[1] + (X[1] - parameters[0]), v2 = d[3] + (X[3] - parameters[0]),
-            v3 = parameters[1] * (0.5 * (X[2] + d[2] - X[0] - d[0]));
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
+            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7,
+            v9 = parameters[1] * v8;
         for (ptrdiff_t q = 0; q < points; ++q) {
             const double *restrict w = rule + 2 * q; (void)w;
             const double *restrict b = a + 0 + 1 * q; (void)b;
@@ -39,12 +40,12 @@ SOFTEHL_KERNEL(softehl_film_squeeze_residual)
                 p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v4 = 0.5 * w[0],
-                v5 = w[1] * (b[0] + ((0.5 - v4) * v1 + (0.5 + v4) * v2) * ((1.0 - p2) * v3)),
-                v6 = -v5;
+            const double v10 = 0.5 * w[0], v11 = 0.5 + v10, v12 = v11 * v4, v13 = 0.5 - v10,
+                v14 = v13 * v3, v15 = v14 + v12, v16 = 1.0 - p2, v17 = v16 * v9, v18 = v15 * v17,
+                v19 = b[0] + v18, v20 = w[1] * v19, v21 = -v20;
             for (ptrdiff_t i = 0; i < modes; ++i) {
                 const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v6;
+                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v21;
             }
         }
         R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0;
@@ -62,9 +63,9 @@ SOFTEHL_KERNEL(softehl_film_squeeze_tangent)
         double *restrict K = tangent + (4 + modes) * (4 + modes) * e; (void)X; (void)d; (void)a;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
         for (ptrdiff_t i = 0; i < (4 + modes) * (4 + modes); ++i) K[i] = 0.0;
-        const double v1 = d[1] + (X[1] - parameters[0]), v2 = d[3] + (X[3] - parameters[0]),
-            v3 = 0.5 * (X[2] + d[2] - X[0] - d[0]), v4 = parameters[1] * v3,
-            v5 = 0.5 * parameters[1];
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
+            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7,
+            v9 = parameters[1] * v8, v10 = 0.5 * parameters[1];
         for (ptrdiff_t q = 0; q < points; ++q) {
             const double *restrict w = rule + 2 * q; (void)w;
             const double *restrict b = a + 0 + 1 * q; (void)b;
@@ -75,16 +76,18 @@ SOFTEHL_KERNEL(softehl_film_squeeze_tangent)
                 p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v6 = 0.5 * w[0], v7 = 0.5 + v6, v8 = 0.5 - v6, v9 = v8 * v1 + v7 * v2,
-                v10 = v9 * v3, v11 = 1.0 - p2, v12 = -(w[1] * (b[0] + parameters[1] * v11 * v10)),
-                v13 = v9 * (w[1] * (v11 * v5)), v14 = v11 * v4, v15 = -(v14 * (v8 * w[1])),
-                v16 = -v13, v17 = -(v14 * (v7 * w[1])), v18 = parameters[1] * w[1] * v10;
+            const double v11 = 0.5 * w[0], v12 = 0.5 + v11, v13 = v12 * v4, v14 = 0.5 - v11,
+                v15 = v14 * v3, v16 = v15 + v13, v17 = v16 * v8, v18 = 1.0 - p2,
+                v19 = parameters[1] * v18, v20 = v19 * v17, v21 = b[0] + v20, v22 = w[1] * v21,
+                v23 = -v22, v24 = v18 * v10, v25 = w[1] * v24, v26 = v16 * v25, v27 = v14 * w[1],
+                v28 = v18 * v9, v29 = v28 * v27, v30 = -v29, v31 = -v26, v32 = v12 * w[1],
+                v33 = v28 * v32, v34 = -v33, v35 = parameters[1] * w[1], v36 = v35 * v17;
             for (ptrdiff_t i = 0; i < modes; ++i) {
                 const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v12;
-                K[(4 + i) * (4 + modes) + 0] += N * v13; K[(4 + i) * (4 + modes) + 1] += N * v15;
-                K[(4 + i) * (4 + modes) + 2] += N * v16; K[(4 + i) * (4 + modes) + 3] += N * v17;
-                const double r0 = 0.0, r1 = 0.0, r2 = N * v18, r3 = 0.0;
+                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v23;
+                K[(4 + i) * (4 + modes) + 0] += N * v26; K[(4 + i) * (4 + modes) + 1] += N * v30;
+                K[(4 + i) * (4 + modes) + 2] += N * v31; K[(4 + i) * (4 + modes) + 3] += N * v34;
+                const double r0 = 0.0, r1 = 0.0, r2 = N * v36, r3 = 0.0;
                 for (ptrdiff_t j = 0; j < modes; ++j)
                     K[(4 + i) * (4 + modes) + 4 + j] += r0 * B[4 * j] + r1 * B[4 * j + 1] + r2 * B[4 * j + 2] + r3 * B[4 * j + 3];
             }
@@ -106,8 +109,8 @@ SOFTEHL_KERNEL(softehl_film_squeeze_fields)
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
         const double *restrict a = data + (0 + 1 * points) * e; (void)X; (void)d; (void)a;
-        const double v1 = d[1] + (X[1] - parameters[0]), v2 = d[3] + (X[3] - parameters[0]),
-            v3 = 0.5 * (X[2] + d[2] - X[0] - d[0]);
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
+            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7;
         for (ptrdiff_t q = 0; q < points; ++q) {
             const double *restrict w = rule + 2 * q; (void)w;
             const double *restrict b = a + 0 + 1 * q; (void)b;
@@ -118,10 +121,11 @@ SOFTEHL_KERNEL(softehl_film_squeeze_fields)
                 p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v4 = 0.5 * w[0], v5 = (0.5 - v4) * v1 + (0.5 + v4) * v2,
-                v6 = v5 * ((1.0 - p2) * v3), v7 = w[1] * v3;
-            double *restrict out = values + 4 * (points * e + q); out[0] = v6; out[1] = v7;
-            out[2] = p2; out[3] = v5;
+            const double v9 = 0.5 * w[0], v10 = 0.5 + v9, v11 = v10 * v4, v12 = 0.5 - v9,
+                v13 = v12 * v3, v14 = v13 + v11, v15 = 1.0 - p2, v16 = v15 * v8, v17 = v14 * v16,
+                v18 = w[1] * v8;
+            double *restrict out = values + 4 * (points * e + q); out[0] = v17; out[1] = v18;
+            out[2] = p2; out[3] = v14;
         }
     }
 }

@@ -26,20 +26,24 @@ SOFTEHL_KERNEL(softehl_film_upwind_residual)
         const double *restrict d = dofs + (4 + modes) * e;
         double *restrict R = values + (4 + modes) * e; (void)X; (void)d;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = d[1] + (X[1] - parameters[0]), v2 = d[3] + (X[3] - parameters[0]),
-            v3 = v2 - v1, v4 = 0.5 * (X[2] + d[2] - X[0] - d[0]), v5 = 0.5 * (v1 + v2),
-            v6 = 0.5 * v3, v7 = 5.0 * v3 * (1.0 / v5);
-        const int v8 = parameters[1] * v7 <= 0.0; const double v9 = parameters[0] + v5; double v10;
-        if (v8) {
-            v10 = 1.0;
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = 6.0 * parameters[1],
+            v4 = parameters[2] * v3, v5 = d[1] + v1, v6 = d[3] + v2, v7 = v6 - v5, v8 = 5.0 * v7,
+            v9 = parameters[4] * parameters[5], v10 = X[2] + d[2], v11 = v10 - X[0],
+            v12 = v11 - d[0], v13 = 0.5 * v12, v14 = v4 * v13, v15 = v13 * v14, v16 = v9 * v13,
+            v17 = v5 + v6, v18 = 0.5 * v17, v19 = 0.5 * v7, v20 = 1.0 / v18, v21 = v8 * v20,
+            v22 = parameters[1] * v21;
+        const int v23 = v22 <= 0.0; const double v24 = parameters[0] + v18; double v25;
+        if (v23) {
+            v25 = 1.0;
         } else {
-            const double v11 = 1.0 / (1.0 + v7 * v7); v10 = v11;
+            const double v26 = v21 * v21, v27 = 1.0 + v26, v28 = 1.0 / v27;
+            v25 = v28;
         }
-        const double v12 = v4 * (parameters[2] * (6.0 * parameters[1]) * v4) * (1.0 / (v5 * (v5 * (v5 * (3.141592653589793 * parameters[3]))))),
-            v13 = v12 * v12,
-            v14 = v13 * (v10 * (3.141592653589793 * (parameters[4] * parameters[5] * v4))),
-            v15 = 1.0 / (9.0 + v13) * v14;
-        double s16 = {0};
+        const double v29 = 3.141592653589793 * parameters[3], v30 = 3.141592653589793 * v16,
+            v31 = v18 * v29, v32 = v18 * v31, v33 = v18 * v32, v34 = 1.0 / v33, v35 = v15 * v34,
+            v36 = v35 * v35, v37 = 9.0 + v36, v38 = 1.0 / v37, v39 = v25 * v30, v40 = v36 * v39,
+            v41 = v38 * v40;
+        double s42 = {0};
         for (ptrdiff_t q = 0; q < points; ++q) {
             const double *restrict w = rule + 2 * q; (void)w;
             const double *restrict B = basis + 2 * modes * q; double p0 = 0.0, p1 = 0.0;
@@ -47,10 +51,12 @@ SOFTEHL_KERNEL(softehl_film_upwind_residual)
                 p0 += B[2 * i] * d[4 + i]; p1 += B[2 * i + 1] * d[4 + i];
             }
             (void)p0, (void)p1;
-            const double v17 = (((-0.16666666666666666) + w[0] * (0.5 * w[0])) * v6 + w[0] * v9) * (w[1] * (p1 * v15));
-            s16 += v17;
+            const double v43 = w[0] * v24, v44 = 0.5 * w[0], v45 = w[0] * v44,
+                v46 = (-0.16666666666666666) + v45, v47 = v46 * v19, v48 = v47 + v43,
+                v49 = p1 * v41, v50 = w[1] * v49, v51 = v48 * v50;
+            s42 += v51;
         }
-        const double v18 = -s16; R[0] = 0.0; R[1] = v18; R[2] = 0.0; R[3] = s16;
+        const double v52 = -s42; R[0] = 0.0; R[1] = v52; R[2] = 0.0; R[3] = s42;
     }
 }
 

@@ -22,15 +22,18 @@ SOFTEHL_KERNEL(softehl_film_void_residual)
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict d = dofs + 2 * e; double *restrict R = values + 2 * e; (void)d;
-        const double v1 = (d[0] - parameters[0]) * (1.0 / parameters[1]),
-            v2 = d[1] * (1.0 / parameters[2]), v3 = sqrt(1e-30 + v2 * v2 + v1 * v1), v4 = v1 + v2;
-        const int v5 = 0.0 < v4; double v6;
-        if (v5) {
-            const double v7 = v1 * (2.0 * v2) * (1.0 / (v4 + v3)); v6 = v7;
+        const double v1 = 1.0 / parameters[1], v2 = d[0] - parameters[0], v3 = v2 * v1,
+            v4 = v3 * v3, v5 = 1.0 / parameters[2], v6 = d[1] * v5, v7 = v6 * v6, v8 = 1e-30 + v7,
+            v9 = v8 + v4, v10 = sqrt(v9), v11 = v3 + v6;
+        const int v12 = 0.0 < v11; double v13;
+        if (v12) {
+            const double v14 = v11 + v10, v15 = 1.0 / v14, v16 = 2.0 * v6, v17 = v3 * v16,
+                v18 = v17 * v15;
+            v13 = v18;
         } else {
-            const double v8 = v4 - v3; v6 = v8;
+            const double v19 = v11 - v10; v13 = v19;
         }
-        R[0] = 0.0; R[1] = v6;
+        R[0] = 0.0; R[1] = v13;
     }
 }
 
@@ -46,22 +49,23 @@ SOFTEHL_KERNEL(softehl_film_void_tangent)
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict d = dofs + 2 * e; double *restrict R = values + 2 * e;
         double *restrict K = tangent + 2 * 2 * e; (void)d;
-        const double v1 = 1.0 / parameters[1], v2 = (d[0] - parameters[0]) * v1,
-            v3 = 1.0 / parameters[2], v4 = d[1] * v3, v5 = 1e-30 + v4 * v4 + v2 * v2, v6 = sqrt(v5),
-            v7 = v2 + v4, v8 = 2.0 * v2;
-        const int v9 = 0.0 < v7;
-        const double v10 = sqrt(1.0 / v5), v11 = 0.5 * v10, v12 = v1 * v8 * v11,
-            v13 = v4 * (2.0 * v3) * v11;
-        double v14, v15, v16;
-        if (v9) {
-            const double v17 = 1.0 / (v7 + v6), v18 = v4 * v8, v19 = v18 * v17,
-                v20 = v18 * (v17 * v17), v21 = v17 * (v4 * (2.0 * v1)) - (v1 + v12) * v20,
-                v22 = v17 * (v3 * v8) - (v3 + v13) * v20;
-            v14 = v19; v15 = v21; v16 = v22;
+        const double v1 = 1.0 / parameters[1], v2 = d[0] - parameters[0], v3 = v2 * v1,
+            v4 = v3 * v3, v5 = 1.0 / parameters[2], v6 = d[1] * v5, v7 = v6 * v6, v8 = 1e-30 + v7,
+            v9 = v8 + v4, v10 = sqrt(v9), v11 = v3 + v6, v12 = 2.0 * v3;
+        const int v13 = 0.0 < v11;
+        const double v14 = v1 * v12, v15 = 1.0 / v9, v16 = sqrt(v15), v17 = 0.5 * v16,
+            v18 = v14 * v17, v19 = 2.0 * v5, v20 = v6 * v19, v21 = v20 * v17;
+        double v22, v23, v24;
+        if (v13) {
+            const double v25 = v11 + v10, v26 = 1.0 / v25, v27 = v6 * v12, v28 = v27 * v26,
+                v29 = v26 * v26, v30 = v27 * v29, v31 = v1 + v18, v32 = v31 * v30, v33 = 2.0 * v1,
+                v34 = v6 * v33, v35 = v26 * v34, v36 = v35 - v32, v37 = v5 + v21, v38 = v37 * v30,
+                v39 = v5 * v12, v40 = v26 * v39, v41 = v40 - v38;
+            v22 = v28; v23 = v36; v24 = v41;
         } else {
-            const double v23 = v7 - v6, v24 = v1 - v12, v25 = v3 - v13;
-            v14 = v23; v15 = v24; v16 = v25;
+            const double v42 = v11 - v10, v43 = v1 - v18, v44 = v5 - v21;
+            v22 = v42; v23 = v43; v24 = v44;
         }
-        R[0] = 0.0; R[1] = v14; K[0] = 0.0; K[1] = 0.0; K[2] = v15; K[3] = v16;
+        R[0] = 0.0; R[1] = v22; K[0] = 0.0; K[1] = 0.0; K[2] = v23; K[3] = v24;
     }
 }

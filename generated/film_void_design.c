@@ -20,24 +20,26 @@ SOFTEHL_KERNEL(softehl_film_void_pseudo_load)
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict d = dofs + 2 * e; const double *restrict t = direction + 3 * e;
         double *restrict R = values + 2 * e; (void)d; (void)t;
-        const double v1 = 1.0 / parameters[1], v2 = (d[0] - parameters[0]) * v1,
-            v3 = 1.0 / parameters[2], v4 = d[1] * v3, v5 = v2 + v4;
-        const int v6 = 0.0 < v5;
-        const double v7 = 2.0 * v2, v8 = 2.0 * v4, v9 = 1e-30 + v4 * v4 + v2 * v2,
-            v10 = sqrt(1.0 / v9), v11 = t[2] * (v3 * v4), v12 = v1 * (t[0] + v2 * t[1]),
-            v13 = v11 + v12, v14 = 0.5 * v10 * (v8 * v11 + v7 * v12);
-        double v15;
-        if (v6) {
-            const double v16 = sqrt(v9), v17 = 1.0 / (v5 + v16),
-                v18 = v17 * (v7 * ((v13 + v14) * (v4 * v17) - v11) - v8 * v12);
-            v15 = v18;
+        const double v1 = d[0] - parameters[0], v2 = 1.0 / parameters[1], v3 = v1 * v2,
+            v4 = 1.0 / parameters[2], v5 = d[1] * v4, v6 = v3 + v5;
+        const int v7 = 0.0 < v6;
+        const double v8 = 2.0 * v3, v9 = v5 * v5, v10 = 2.0 * v5, v11 = 1e-30 + v9, v12 = v3 * v3,
+            v13 = v11 + v12, v14 = 1.0 / v13, v15 = sqrt(v14), v16 = 0.5 * v15, v17 = v4 * v5,
+            v18 = t[2] * v17, v19 = v10 * v18, v20 = v3 * t[1], v21 = t[0] + v20, v22 = v2 * v21,
+            v23 = v18 + v22, v24 = v8 * v22, v25 = v19 + v24, v26 = v16 * v25;
+        double v27;
+        if (v7) {
+            const double v28 = sqrt(v13), v29 = v6 + v28, v30 = 1.0 / v29, v31 = v10 * v22,
+                v32 = v23 + v26, v33 = v5 * v30, v34 = v32 * v33, v35 = v34 - v18, v36 = v8 * v35,
+                v37 = v36 - v31, v38 = v30 * v37;
+            v27 = v38;
         } else {
-            const double v19 = v14 - v13; v15 = v19;
+            const double v39 = v26 - v23; v27 = v39;
         }
-        double s20 = {0};
+        double s40 = {0};
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q; (void)w; s20 += w[0];
+            const double *restrict w = rule + 1 * q; (void)w; s40 += w[0];
         }
-        const double v21 = s20 * v15; R[0] = 0.0; R[1] = v21;
+        const double v41 = s40 * v27; R[0] = 0.0; R[1] = v41;
     }
 }

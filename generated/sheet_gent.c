@@ -21,10 +21,11 @@ SOFTEHL_KERNEL(softehl_sheet_gent_energy)
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = exp(d[0]), v3 = exp(-(d[0] + d[1])),
-            v4 = log(1.0 - 1.0 / parameters[1] * (v2 * v2 + v1 * v1 + v3 * v3 - 3.0)),
-            v5 = -(parameters[1] * (0.5 * parameters[0]) * v4);
-        values[e] = v5;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = log(v14),
+            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v17 * v15, v19 = -v18;
+        values[e] = v19;
     }
 }
 
@@ -40,12 +41,14 @@ SOFTEHL_KERNEL(softehl_sheet_gent_residual)
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = exp(d[0]), v3 = exp(-(d[0] + d[1])),
-            v4 = 1.0 / parameters[1],
-            v5 = v4 * (parameters[1] * (0.5 * parameters[0])) * (1.0 / (1.0 - v4 * (v2 * v2 + v1 * v1 + v3 * v3 - 3.0))),
-            v6 = v3 * (2.0 * v3) * v5, v7 = v2 * (2.0 * v2) * v5 - v6,
-            v8 = v1 * (2.0 * v1) * v5 - v6;
-        R[0] = v7; R[1] = v8;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
+            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v12 * v17, v19 = v18 * v15,
+            v20 = 2.0 * v3, v21 = v3 * v20, v22 = v21 * v19, v23 = 2.0 * v8, v24 = v8 * v23,
+            v25 = v24 * v19, v26 = v22 - v25, v27 = 2.0 * v1, v28 = v1 * v27, v29 = v28 * v19,
+            v30 = v29 - v25;
+        R[0] = v26; R[1] = v30;
     }
 }
 
@@ -61,17 +64,20 @@ SOFTEHL_KERNEL(softehl_sheet_gent_tangent)
         const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         double *restrict R = values + 2 * e; double *restrict K = tangent + 2 * 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = exp(d[0]), v3 = exp(-(d[0] + d[1])),
-            v4 = 1.0 / parameters[1], v5 = 1.0 / (1.0 - v4 * (v2 * v2 + v1 * v1 + v3 * v3 - 3.0)),
-            v6 = parameters[1] * (0.5 * parameters[0]), v7 = v4 * v6 * v5, v8 = 2.0 * v2,
-            v9 = v8 * v7, v10 = v2 * v9, v11 = 2.0 * v3, v12 = v11 * v7, v13 = v3 * v12,
-            v14 = v10 - v13, v15 = 2.0 * v1, v16 = v15 * v7, v17 = v1 * v16, v18 = v17 - v13,
-            v19 = v5 * v5, v20 = v2 * v8, v21 = v3 * v11, v22 = v6 * (v4 * v4),
-            v23 = (v20 - v21) * v22 * v19,
-            v24 = v2 * (v9 + v8 * v23) + (v13 + v10) - v3 * (v11 * v23 - v12),
-            v25 = (v1 * v15 - v21) * v22 * v19, v26 = v13 - v3 * (v11 * v25 - v12),
-            v27 = v20 * v25 + v26, v28 = v26 + (v17 + v1 * (v16 + v15 * v25));
-        R[0] = v14; R[1] = v18; K[0] = v24; K[1] = v27; K[2] = v27; K[3] = v28;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
+            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v12 * v17, v19 = v18 * v15,
+            v20 = 2.0 * v3, v21 = v20 * v19, v22 = v3 * v21, v23 = 2.0 * v8, v24 = v23 * v19,
+            v25 = v8 * v24, v26 = v22 - v25, v27 = 2.0 * v1, v28 = v27 * v19, v29 = v1 * v28,
+            v30 = v29 - v25, v31 = v25 + v22, v32 = v15 * v15, v33 = v3 * v20, v34 = v8 * v23,
+            v35 = v33 - v34, v36 = v12 * v12, v37 = v17 * v36, v38 = v35 * v37, v39 = v38 * v32,
+            v40 = v20 * v39, v41 = v21 + v40, v42 = v3 * v41, v43 = v42 + v31, v44 = v23 * v39,
+            v45 = v44 - v24, v46 = v8 * v45, v47 = v43 - v46, v48 = v1 * v27, v49 = v48 - v34,
+            v50 = v49 * v37, v51 = v50 * v32, v52 = v23 * v51, v53 = v52 - v24, v54 = v8 * v53,
+            v55 = v25 - v54, v56 = v33 * v51, v57 = v56 + v55, v58 = v27 * v51, v59 = v28 + v58,
+            v60 = v1 * v59, v61 = v29 + v60, v62 = v55 + v61;
+        R[0] = v26; R[1] = v30; K[0] = v47; K[1] = v57; K[2] = v57; K[3] = v62;
     }
 }
 
@@ -87,12 +93,13 @@ SOFTEHL_KERNEL(softehl_sheet_gent_d_mu)
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = exp(d[0]), v3 = exp(-(d[0] + d[1])),
-            v4 = 1.0 / parameters[1],
-            v5 = 1.0 / (1.0 - v4 * (v2 * v2 + v1 * v1 + v3 * v3 - 3.0)) * (0.5 * parameters[1] * v4),
-            v6 = v3 * (2.0 * v3) * v5, v7 = v2 * (2.0 * v2) * v5 - v6,
-            v8 = v1 * (2.0 * v1) * v5 - v6;
-        R[0] = v7; R[1] = v8;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
+            v16 = 0.5 * parameters[1], v17 = v16 * v12, v18 = v15 * v17, v19 = 2.0 * v3,
+            v20 = v3 * v19, v21 = v20 * v18, v22 = 2.0 * v8, v23 = v8 * v22, v24 = v23 * v18,
+            v25 = v21 - v24, v26 = 2.0 * v1, v27 = v1 * v26, v28 = v27 * v18, v29 = v28 - v24;
+        R[0] = v25; R[1] = v29;
     }
 }
 
@@ -108,12 +115,14 @@ SOFTEHL_KERNEL(softehl_sheet_gent_d_J_m)
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = exp(d[0]), v3 = exp(-(d[0] + d[1])),
-            v4 = v2 * v2 + v1 * v1 + v3 * v3 - 3.0, v5 = 0.5 * parameters[0],
-            v6 = parameters[1] * v5, v7 = 1.0 / parameters[1], v8 = 1.0 / (1.0 - v7 * v4),
-            v9 = v7 * v7, v10 = v8 * (v7 * (v5 - v9 * (v8 * (v6 * v4))) - v6 * v9),
-            v11 = v3 * (2.0 * v3) * v10, v12 = v2 * (2.0 * v2) * v10 - v11,
-            v13 = v1 * (2.0 * v1) * v10 - v11;
-        R[0] = v12; R[1] = v13;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 0.5 * parameters[0], v13 = parameters[1] * v12, v14 = v13 * v11,
+            v15 = 1.0 / parameters[1], v16 = v15 * v11, v17 = 1.0 - v16, v18 = 1.0 / v17,
+            v19 = v18 * v14, v20 = v15 * v15, v21 = v20 * v19, v22 = v12 - v21, v23 = v15 * v22,
+            v24 = v13 * v20, v25 = v23 - v24, v26 = v18 * v25, v27 = 2.0 * v3, v28 = v3 * v27,
+            v29 = v28 * v26, v30 = 2.0 * v8, v31 = v8 * v30, v32 = v31 * v26, v33 = v29 - v32,
+            v34 = 2.0 * v1, v35 = v1 * v34, v36 = v35 * v26, v37 = v36 - v32;
+        R[0] = v33; R[1] = v37;
     }
 }

@@ -392,9 +392,14 @@ static inline void softehl_pad(double *to, const double *from, ptrdiff_t width, 
         const double *restrict direction, const double *restrict rule,              \
         const double *restrict basis, double *restrict values, double *restrict tangent)
 
-/* What computes as many elements as there are lanes. */
+/* What computes as many elements as there are lanes: never printed into the loop over groups. */
+#ifdef __GNUC__
+#define SOFTEHL_APART static __attribute__((noinline))
+#else
+#define SOFTEHL_APART static
+#endif
 #define SOFTEHL_GROUP(NAME)                                                         \
-    static void NAME##_group(ptrdiff_t points, ptrdiff_t modes,                     \
+    SOFTEHL_APART void NAME##_group(ptrdiff_t points, ptrdiff_t modes,              \
         const double *restrict X, const double *restrict d, const double *restrict a, \
         const double *restrict t, const double *restrict parameters,                \
         const double *restrict rule, const double *restrict basis,                  \

@@ -68,8 +68,9 @@ static int softehl_solid_taylor_mean_ogden_isochoric_of_eigenvalues(
         v5 = log(s[2]), v6 = exp(p[5] * v5), v7 = exp(p[3] * v1), v8 = exp(p[3] * v3),
         v9 = exp(p[3] * v5),
         v10 = p[0] * p[4] * (v9 + (v8 + v7) - 3.0) + p[1] * p[6] * (v6 + (v4 + v2) - 3.0),
-        v11 = exp(p[7] * v1), v12 = exp(p[7] * v3), v13 = exp(p[7] * v5);
-    w[0] = (p[2] * p[8] * (v13 + (v12 + v11) - 3.0) + v10);
+        v11 = exp(p[7] * v1), v12 = exp(p[7] * v3), v13 = exp(p[7] * v5),
+        v14 = p[2] * p[8] * (v13 + (v12 + v11) - 3.0) + v10;
+    w[0] = v14;
     return failed;
 }
 
@@ -179,11 +180,11 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_2_of_eigenvalues(
         v17 = exp(p[5] * v16), v18 = exp(p[7] * v16), v19 = exp(p[3] * v16), v20 = 1.0 / s[2],
         v21 = v20 * (v5 * (p[7] * v18) + v3 * (p[5] * v17) + v7 * (p[3] * v19)), v22 = p[5] * p[5],
         v23 = p[7] * p[7], v24 = p[3] * p[3],
-        v25 = v14 * (v14 * (v12 * v5 * v23 + v11 * v3 * v22 + v13 * v7 * v24) - v15),
-        v26 = v20 * (v20 * (v18 * v5 * v23 + v17 * v3 * v22 + v19 * v7 * v24) - v21);
-    w[0] = v9; w[1] = v15; w[2] = v21;
-    w[3] = (v8 * (v8 * (v4 * v5 * v23 + v2 * v3 * v22 + v6 * v7 * v24) - v9)); w[4] = 0.0;
-    w[5] = 0.0; w[6] = 0.0; w[7] = v25; w[8] = 0.0; w[9] = 0.0; w[10] = 0.0; w[11] = v26;
+        v25 = v8 * (v8 * (v4 * v5 * v23 + v2 * v3 * v22 + v6 * v7 * v24) - v9),
+        v26 = v14 * (v14 * (v12 * v5 * v23 + v11 * v3 * v22 + v13 * v7 * v24) - v15),
+        v27 = v20 * (v20 * (v18 * v5 * v23 + v17 * v3 * v22 + v19 * v7 * v24) - v21);
+    w[0] = v9; w[1] = v15; w[2] = v21; w[3] = v25; w[4] = 0.0; w[5] = 0.0; w[6] = 0.0; w[7] = v26;
+    w[8] = 0.0; w[9] = 0.0; w[10] = 0.0; w[11] = v27;
     return failed;
 }
 

@@ -140,11 +140,11 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_2_of_eigenvalues(
         v17 = exp(p[5] * v16), v18 = exp(p[7] * v16), v19 = exp(p[3] * v16), v20 = 1.0 / s[2],
         v21 = v20 * (v5 * (p[7] * v18) + v3 * (p[5] * v17) + v7 * (p[3] * v19)), v22 = p[5] * p[5],
         v23 = p[7] * p[7], v24 = p[3] * p[3],
-        v25 = v14 * (v14 * (v12 * v5 * v23 + v11 * v3 * v22 + v13 * v7 * v24) - v15),
-        v26 = v20 * (v20 * (v18 * v5 * v23 + v17 * v3 * v22 + v19 * v7 * v24) - v21);
-    w[0] = v9; w[1] = v15; w[2] = v21;
-    w[3] = (v8 * (v8 * (v4 * v5 * v23 + v2 * v3 * v22 + v6 * v7 * v24) - v9)); w[4] = 0.0;
-    w[5] = 0.0; w[6] = 0.0; w[7] = v25; w[8] = 0.0; w[9] = 0.0; w[10] = 0.0; w[11] = v26;
+        v25 = v8 * (v8 * (v4 * v5 * v23 + v2 * v3 * v22 + v6 * v7 * v24) - v9),
+        v26 = v14 * (v14 * (v12 * v5 * v23 + v11 * v3 * v22 + v13 * v7 * v24) - v15),
+        v27 = v20 * (v20 * (v18 * v5 * v23 + v17 * v3 * v22 + v19 * v7 * v24) - v21);
+    w[0] = v9; w[1] = v15; w[2] = v21; w[3] = v25; w[4] = 0.0; w[5] = 0.0; w[6] = 0.0; w[7] = v26;
+    w[8] = 0.0; w[9] = 0.0; w[10] = 0.0; w[11] = v27;
     return failed;
 }
 
@@ -197,10 +197,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_0_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[3] * p[4], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = log(s[1]),
-        v5 = exp(p[3] * v4), v6 = log(s[2]), v7 = exp(p[3] * v6);
-    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
-    w[2] = (1.0 / s[2] * (v7 * v1));
+    const double v1 = p[3] * p[4], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[3] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[3] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
     return failed;
 }
 
@@ -239,10 +239,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_1_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[5] * p[6], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = log(s[1]),
-        v5 = exp(p[5] * v4), v6 = log(s[2]), v7 = exp(p[5] * v6);
-    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
-    w[2] = (1.0 / s[2] * (v7 * v1));
+    const double v1 = p[5] * p[6], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[5] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[5] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
     return failed;
 }
 
@@ -281,10 +281,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_2_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[7] * p[8], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = log(s[1]),
-        v5 = exp(p[7] * v4), v6 = log(s[2]), v7 = exp(p[7] * v6);
-    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
-    w[2] = (1.0 / s[2] * (v7 * v1));
+    const double v1 = p[7] * p[8], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[7] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[7] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
     return failed;
 }
 
@@ -323,10 +323,11 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_3_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]), v2 = p[3] * v1, v3 = p[0] * p[4], v4 = exp(v2), v5 = log(s[1]),
-        v6 = p[3] * v5, v7 = exp(v6), v8 = log(s[2]), v9 = p[3] * v8, v10 = exp(v9);
-    w[0] = (1.0 / s[0] * (v4 * (v3 * (1.0 + v2)))); w[1] = (1.0 / s[1] * (v7 * (v3 * (1.0 + v6))));
-    w[2] = (1.0 / s[2] * (v10 * (v3 * (1.0 + v9))));
+    const double v1 = log(s[0]), v2 = p[3] * v1, v3 = p[0] * p[4], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[3] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[3] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
     return failed;
 }
 
@@ -365,10 +366,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_4_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[0] * p[3], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = log(s[1]),
-        v5 = exp(p[3] * v4), v6 = log(s[2]), v7 = exp(p[3] * v6);
-    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
-    w[2] = (1.0 / s[2] * (v7 * v1));
+    const double v1 = p[0] * p[3], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[3] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[3] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
     return failed;
 }
 
@@ -407,10 +408,11 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_5_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]), v2 = p[5] * v1, v3 = p[1] * p[6], v4 = exp(v2), v5 = log(s[1]),
-        v6 = p[5] * v5, v7 = exp(v6), v8 = log(s[2]), v9 = p[5] * v8, v10 = exp(v9);
-    w[0] = (1.0 / s[0] * (v4 * (v3 * (1.0 + v2)))); w[1] = (1.0 / s[1] * (v7 * (v3 * (1.0 + v6))));
-    w[2] = (1.0 / s[2] * (v10 * (v3 * (1.0 + v9))));
+    const double v1 = log(s[0]), v2 = p[5] * v1, v3 = p[1] * p[6], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[5] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[5] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
     return failed;
 }
 
@@ -449,10 +451,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_6_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[1] * p[5], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = log(s[1]),
-        v5 = exp(p[5] * v4), v6 = log(s[2]), v7 = exp(p[5] * v6);
-    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
-    w[2] = (1.0 / s[2] * (v7 * v1));
+    const double v1 = p[1] * p[5], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[5] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[5] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
     return failed;
 }
 
@@ -491,10 +493,11 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_7_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]), v2 = p[7] * v1, v3 = p[2] * p[8], v4 = exp(v2), v5 = log(s[1]),
-        v6 = p[7] * v5, v7 = exp(v6), v8 = log(s[2]), v9 = p[7] * v8, v10 = exp(v9);
-    w[0] = (1.0 / s[0] * (v4 * (v3 * (1.0 + v2)))); w[1] = (1.0 / s[1] * (v7 * (v3 * (1.0 + v6))));
-    w[2] = (1.0 / s[2] * (v10 * (v3 * (1.0 + v9))));
+    const double v1 = log(s[0]), v2 = p[7] * v1, v3 = p[2] * p[8], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[7] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[7] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
     return failed;
 }
 
@@ -533,10 +536,10 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_by_8_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = p[2] * p[7], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = log(s[1]),
-        v5 = exp(p[7] * v4), v6 = log(s[2]), v7 = exp(p[7] * v6);
-    w[0] = (1.0 / s[0] * (v3 * v1)); w[1] = (1.0 / s[1] * (v5 * v1));
-    w[2] = (1.0 / s[2] * (v7 * v1));
+    const double v1 = p[2] * p[7], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[7] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[7] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
     return failed;
 }
 

@@ -25,7 +25,6 @@ def function(
 ) -> tuple[str, int]:
     """C text of one kernel and the number of its temporaries."""
     p = Printer(definition)
-    p.read(plan, [x.node for x in entries])
     p.line(1, "for (ptrdiff_t e = 0; e < n; ++e) {")
     _pointers(p, task)
     fallible = any(n.op is Op.CALL for n in reachable([x.node for x in entries]))

@@ -62,7 +62,7 @@ class Body:
         """The values and their stores."""
         p = self.printer
         plan = schedule(self.roots)
-        p.read(plan, self.roots, self.roots)
+        p.read(plan, self.roots)
         for stage in plan.stages:
             p.block(depth, stage.before)
         for target, n in zip(targets, self.roots, strict=True):

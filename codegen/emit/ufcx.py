@@ -10,10 +10,10 @@ from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
-from softehl.codegen.emit import support as support_c
 from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.routines import called
 from softehl.codegen.emit.schedule import Loop, Schedule
+from softehl.codegen.emit.support_lanes import ROOTS
 from softehl.codegen.graph.graph import Input, Node
 from softehl.codegen.language.definition import Definition
 
@@ -176,7 +176,7 @@ def _mark(p: _CellPrinter, task: str) -> None:
 
 def source(definition: Definition, functions: Iterable[str], before: Iterable[str] = ()) -> str:
     """The C file of a kernel family; `before` are the routines that its functions call."""
-    head = [_banner(definition), "#include <math.h>", "#include <stdint.h>", support_c.ROOTS]
+    head = [_banner(definition), "#include <math.h>", "#include <stdint.h>", ROOTS]
     return "\n".join([*head, *before, *functions])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from softehl.codegen import abi
@@ -23,8 +23,17 @@ def files(kernels: Iterable[KernelSource]) -> dict[str, str]:
     out[source.HEADER] = source.header(names)
     out["signature.c"] = SIGNATURE_C
     manifest = {k.definition.name: _manifest(k) for k in kernels}
-    out["manifest.json"] = json.dumps({"kernels": manifest}, indent=1) + "\n"
+    out["manifest.json"] = _text(manifest)
     return out
+
+
+def _text(manifest: Mapping[str, Any]) -> str:
+    """JSON with one line for each entry of a kernel."""
+    kernels = []
+    for name, kernel in manifest.items():
+        entries = (f"   {json.dumps(key)}: {json.dumps(value)}" for key, value in kernel.items())
+        kernels.append(f"  {json.dumps(name)}: {{\n" + ",\n".join(entries) + "\n  }")
+    return '{\n "kernels": {\n' + ",\n".join(kernels) + "\n }\n}\n"
 
 
 def ufcx_files(kernels: Iterable[KernelSource]) -> dict[str, str]:
