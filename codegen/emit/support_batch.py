@@ -94,6 +94,7 @@ static inline void softehl_batch(
     double *values, double *tangent)
 {
 #define SOFTEHL_AT(p, w) ((w) ? (p) + (w) * e : 0)
+    (void)room;
     if (n < 1) return;
     for (ptrdiff_t next = 0; n >= SOFTEHL_LANES && next < n; next += SOFTEHL_LANES) {
         const ptrdiff_t e = next + SOFTEHL_LANES <= n ? next : n - SOFTEHL_LANES;

@@ -1,4 +1,4 @@
-"""C of the header that tells how many lanes there are, and what four and eight of them differ in."""
+"""C of the header: how many lanes there are, and what differs between four and eight of them."""
 
 LANES = r"""
 /* One lane per element: 8 with AVX-512, else 4.  Without vector extensions a group is one element.
