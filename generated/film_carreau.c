@@ -634,3 +634,470 @@ SOFTEHL_GROUP(softehl_film_carreau_fields)
     }
 }
 SOFTEHL_BATCH(softehl_film_carreau_fields, 4, (4 + modes), 0, 0, (9 * points), 0)
+
+SOFTEHL_GROUP(softehl_film_carreau_pseudo_load)
+{
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13;
+    softehl_load4(t + 0, 14, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 14, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 14, &t8, &t9, &t10, &t11); softehl_load2(t + 12, 14, &t12, &t13);
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5]; const V v2 = parameters[2] * t7;
+    const double v3 = 1.0 - parameters[9]; const V v4 = 6.283185307179586 * t9;
+    const double v5 = 1.0 / parameters[7], v6 = 0.5 * parameters[7], v7 = 1.0 / parameters[8];
+    const V v8 = 0.5 * (t2 - t0); const double v9 = 0.5 * (parameters[8] - 1.0);
+    const V v10 = X2 + d2 - X0 - d0, v11 = 0.5 * v10, v12 = v10 * v8,
+        v13 = d3 + (X3 - parameters[0]);
+    const double v14 = v7 * v9;
+    const V v15 = parameters[4] * v8 + v11 * t8, v16 = v11 * v11, v17 = v5 * t11, v18 = 0.5 * t11,
+        v19 = d1 + (X1 - parameters[0]), v20 = X3 + d3 - X1 - d1, v21 = 0.5 * t12, v22 = 0.5 * v20,
+        v23 = v7 * (v21 - v14 * t12), v24 = v22 * v22, v25 = t1 - t4, v26 = t3 - t4,
+        v27 = 0.5 * (t3 - t1), v28 = v24 + v16, v29 = v24 * v24, v30 = v20 * v27 + v12,
+        v31 = v22 * v29, v32 = softehl_vsqrt(v28), v33 = v28 * v28, v34 = v31 * v31,
+        v35 = 1.0 / (v33 * v33), v36 = parameters[6] * v32, v37 = softehl_vsqrt(1.0 / v28),
+        v38 = v16 + v35 * v34,
+        v39 = v27 * (v29 * (v29 * (5.0 * v20))) - v30 * (v34 * (v35 * (v33 * (4.0 * v28)))),
+        v40 = v32 * t10 + v30 * (v37 * (0.5 * parameters[6])), v41 = softehl_vsqrt(v38),
+        v42 = 1.0 / v41, v43 = softehl_vsqrt(1.0 / v38),
+        v44 = (v12 + v35 * v39) * (v43 * (v42 * (0.5 * v42)));
+    V s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1; const double v49 = 0.5 * w[0]; const V v50 = p1 * v42;
+        const double v51 = 0.5 - v49, v52 = 0.5 + v49;
+        const V v53 = softehl_vexp(p0 * parameters[3]), v54 = v51 * v19 + v52 * v13,
+            v55 = parameters[0] + v54, v56 = v51 * v25 + v52 * v26, v57 = 0.5 * v54,
+            v58 = parameters[7] * v54, v59 = v57 * v50, v60 = parameters[2] * v53, v61 = 1.0 / v58,
+            v62 = parameters[1] * v60 * v61, v63 = v5 * v59, v64 = v55 * v1,
+            v65 = v1 * (t4 + v56) + v55 * v4, v66 = softehl_vlog(1.0 + v62 * v62),
+            v67 = softehl_vexp(v66 * v9), v68 = v62 * (parameters[9] + v3 * v67),
+            v69 = w[1] * (p0 * (v64 * v8 + v11 * v65));
+        s45 += v52 * v69; s46 += v51 * v69;
+        const V v70 = 0.932469514203152 * v63, v71 = 0.6612093864662645 * v63,
+            v72 = 0.2386191860831969 * v63, v73 = v68 + v70, v74 = v68 + v71, v75 = v68 + v72,
+            v76 = v68 - v72, v77 = v68 - v71, v78 = v68 - v70;
+        V v79[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v62, softehl_splat(v9), softehl_splat(v3), softehl_splat(v14), v70, v71, v72, v68, v73, v74, v75, v76, v77, v78}, v79, &failed);
+        const V v80 = v79[1], v81 = v79[2], v82 = v79[3], v83 = v79[4], v84 = v79[5], v85 = v79[6],
+            v86 = v80 * v80, v87 = v81 * v81, v88 = v82 * v82, v89 = v83 * v83, v90 = v84 * v84,
+            v91 = v85 * v85, v92 = 1.0 + v86, v93 = 1.0 + v87, v94 = 1.0 + v88, v95 = 1.0 + v89,
+            v96 = 1.0 + v90, v97 = 1.0 + v91, v98 = softehl_vlog(v92), v99 = softehl_vlog(v93),
+            v100 = softehl_vlog(v94), v101 = softehl_vlog(v95), v102 = softehl_vlog(v96),
+            v103 = softehl_vlog(v97), v104 = 2.0 * v83, v105 = 2.0 * v82, v106 = 2.0 * v84,
+            v107 = 2.0 * v81, v108 = 2.0 * v85, v109 = 2.0 * v80, v110 = softehl_vexp(v14 * v99),
+            v111 = softehl_vexp(v14 * v100), v112 = softehl_vexp(v14 * v98),
+            v113 = softehl_vexp(v14 * v103), v114 = softehl_vexp(v14 * v101),
+            v115 = softehl_vexp(v14 * v102), v116 = v14 * (1.0 / v95), v117 = v14 * (1.0 / v94),
+            v118 = v14 * (1.0 / v96), v119 = v14 * (1.0 / v93), v120 = v14 * (1.0 / v97),
+            v121 = v14 * (1.0 / v92), v122 = v107 * v119, v123 = v109 * v121, v124 = v104 * v116,
+            v125 = v105 * v117, v126 = v108 * v120, v127 = v106 * v118, v128 = v3 * v110,
+            v129 = v3 * v111, v130 = v3 * v112, v131 = v3 * v113, v132 = v3 * v114,
+            v133 = v3 * v115, v134 = parameters[9] + v128, v135 = parameters[9] + v129,
+            v136 = parameters[9] + v130, v137 = parameters[9] + v131, v138 = parameters[9] + v132,
+            v139 = parameters[9] + v133, v140 = 1.0 / v134, v141 = 1.0 / v135, v142 = 1.0 / v136,
+            v143 = 1.0 / v137, v144 = 1.0 / (v134 * v134), v145 = 1.0 / (v135 * v135),
+            v146 = 1.0 / (v136 * v136), v147 = 1.0 / v138, v148 = 1.0 / (v137 * v137),
+            v149 = 1.0 / v139, v150 = 1.0 / (v138 * v138), v151 = 1.0 / (v139 * v139),
+            v152 = v81 * v140, v153 = v140 * v140, v154 = v82 * v141, v155 = v141 * v141,
+            v156 = v153 * (0.1803807865240693 * v81), v157 = v155 * (0.23395696728634552 * v82),
+            v158 = v85 * v143, v159 = v143 * v143, v160 = v159 * (0.08566224618958518 * v85),
+            v161 = v142 * v142, v162 = v80 * v142, v163 = v83 * v147, v164 = v147 * v147,
+            v165 = v161 * (0.08566224618958518 * v80), v166 = v164 * (0.23395696728634552 * v83),
+            v167 = v128 * v156, v168 = v129 * v157, v169 = v131 * v160,
+            v170 = 0.1803807865240693 * v140 - v122 * v167, v171 = v130 * v165,
+            v172 = 0.23395696728634552 * v141 - v125 * v168, v173 = v149 * v149, v174 = v84 * v149,
+            v175 = 0.08566224618958518 * v143 - v126 * v169, v176 = v132 * v166,
+            v177 = v173 * (0.1803807865240693 * v84),
+            v178 = 0.08566224618958518 * v142 - v123 * v171, v179 = 1.0 + v86 * v146,
+            v180 = 0.23395696728634552 * v147 - v124 * v176, v181 = softehl_vlog(v179),
+            v182 = 1.0 + v87 * v144, v183 = v133 * v177, v184 = softehl_vlog(v182),
+            v185 = 1.0 + v88 * v145, v186 = 1.0 + v89 * v150, v187 = softehl_vlog(v185),
+            v188 = softehl_vlog(v186), v189 = 1.0 + v90 * v151,
+            v190 = 0.1803807865240693 * v149 - v127 * v183, v191 = softehl_vlog(v189),
+            v192 = 1.0 + v91 * v148, v193 = softehl_vlog(v192), v194 = softehl_vexp(v9 * v181),
+            v195 = softehl_vexp(v9 * v184), v196 = softehl_vexp(v9 * v187),
+            v197 = softehl_vexp(v9 * v188), v198 = softehl_vexp(v9 * v191),
+            v199 = softehl_vexp(v9 * v193), v200 = v3 * v196, v201 = v3 * v198, v202 = v3 * v199,
+            v203 = parameters[9] + v200, v204 = v200 * v154, v205 = v204 * (v9 * (1.0 / v185)),
+            v206 = parameters[9] + v201, v207 = v201 * v174, v208 = v207 * (v9 * (1.0 / v189)),
+            v209 = parameters[9] + v202, v210 = v202 * v158, v211 = v210 * (v9 * (1.0 / v192)),
+            v212 = v3 * v194, v213 = parameters[9] + v212, v214 = v212 * v162,
+            v215 = v214 * (v9 * (1.0 / v179)), v216 = v3 * v195, v217 = v3 * v197,
+            v218 = parameters[9] + v216, v219 = v216 * v152, v220 = v219 * (v9 * (1.0 / v182)),
+            v221 = parameters[9] + v217, v222 = v217 * v163, v223 = v222 * (v9 * (1.0 / v186)),
+            v224 = v80 * v161 * v213 + v146 * (v146 * (2.0 * v86 * v136)) * v215,
+            v225 = v130 * v224, v226 = v142 * v213 + v109 * (v146 * v215 - v121 * v225),
+            v227 = v81 * v153 * v218 + v144 * (v144 * (2.0 * v87 * v134)) * v220,
+            v228 = v128 * v227, v229 = v140 * v218 + v107 * (v144 * v220 - v119 * v228),
+            v230 = v82 * v155 * v203 + v145 * (v145 * (2.0 * v88 * v135)) * v205,
+            v231 = v129 * v230, v232 = v141 * v203 + v105 * (v145 * v205 - v117 * v231),
+            v233 = v83 * v164 * v221 + v150 * (v150 * (2.0 * v89 * v138)) * v223,
+            v234 = v132 * v233, v235 = v147 * v221 + v104 * (v150 * v223 - v116 * v234),
+            v236 = v84 * v173 * v206 + v151 * (v151 * (2.0 * v90 * v139)) * v208,
+            v237 = v133 * v236, v238 = v149 * v206 + v106 * (v151 * v208 - v118 * v237),
+            v239 = v85 * v159 * v209 + v148 * (v148 * (2.0 * v91 * v137)) * v211,
+            v240 = v131 * v239, v241 = v143 * v209 + v108 * (v148 * v211 - v120 * v240);
+        V v242[49];
+        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v178, v170, v172, v180, v190, v175, softehl_splat((-1.0)), v226, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v229, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v232, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v235, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v238, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v241}, v242, &failed);
+        const V v243 = v79[0], v244 = v181 * v214, v245 = v57 * (p1 * v44), v246 = v184 * v219,
+            v247 = v187 * v204, v248 = v188 * v222, v249 = v191 * v207, v250 = v193 * v210,
+            v251 = v53 * (t6 + p0 * v2);
+        const M v252 = softehl_lt(softehl_splat(0.0), -p0);
+        const V v253 = 0.5 * v56, v254 = v50 * v253,
+            v255 = v60 * t5 + parameters[1] * v251 - v62 * (parameters[7] * v56 + v54 * t11),
+            v256 = parameters[7] * v243 - v59, v257 = v98 * v225, v258 = v61 * v255,
+            v259 = v5 * (v254 - v245 - v59 * v17), v260 = v101 * v234, v261 = v99 * v228,
+            v262 = v100 * v231, v263 = v102 * v237,
+            v264 = v102 * v183 + (v100 * v168 + (v99 * v167 + (v101 * v176 + v98 * v171))),
+            v265 = 0.932469514203152 * v259, v266 = 0.6612093864662645 * v259,
+            v267 = 0.2386191860831969 * v259, v268 = v103 * v240, v269 = v103 * v169 + v264,
+            v270 = v242[0], v271 = v242[1], v272 = v242[2], v273 = v242[3], v274 = v242[4],
+            v275 = v242[5], v276 = v242[6],
+            v277 = v156 + (v177 + (v157 + (v166 - v114 * v166) - v111 * v157) - v115 * v177),
+            v278 = v267 * (v273 - v274) + (v265 * (v271 - v276) + v266 * (v272 - v275)),
+            v279 = v227 + (v195 * v152 - v152 - v110 * v227),
+            v280 = v262 * v273 + (v261 * v272 + (v257 * v271 + (v268 * v276 + v270 * v269))),
+            v281 = v249 * v275 + (v248 * v274 + (v247 * v273 + (v244 * v271 + v246 * v272))),
+            v282 = v224 + (v194 * v162 - v162) - v112 * v224,
+            v283 = v165 + (v160 + (v277 - v110 * v156) - v113 * v160 - v112 * v165),
+            v284 = v230 + (v196 * v154 - v154) - v111 * v230,
+            v285 = v258 * v270 + v278 - v21 * (v250 * v276 + v281) + v23 * (v263 * v275 + (v260 * v274 + v280)),
+            v286 = v233 + (v197 * v163 - v163) - v114 * v233,
+            v287 = v272 * v279 + v271 * v282 + v273 * v284 + v270 * v283 + v274 * v286,
+            v288 = v239 + (v199 * v158 - v158 - v113 * v239),
+            v289 = v236 + (v198 * v174 - v174) - v115 * v236,
+            v290 = parameters[7] * (v285 + t13 * (v287 + v275 * v289 + v276 * v288)),
+            v291 = v64 * (p0 * v27 - v256 * v40 - v36 * (v245 + v243 * t11 - v254 + v290)),
+            v292 = w[1] * ((p0 * v22 - v36 * v256) * v65 + v291), v293 = v52 * v292;
+        s47 += v293; const V v294 = v51 * v292; s48 += v294; V v295 = softehl_splat(0.0);
+        const M m296 = v252;
+        if (softehl_any(m296)) {
+            const V v297 = -(w[1] * (p0 * v15)); v295 = softehl_blend(m296, v297, v295);
+        }
+        const V v298 = 1.0 / v60, v299 = v54 * v54, v300 = 0.1192694691878821 * v81,
+            v301 = 0.05582662111236089 * v82, v302 = 0.07987743308995329 * v80,
+            v303 = 0.07987743308995329 * v85, v304 = 0.05582662111236089 * v83,
+            v305 = 0.1192694691878821 * v84, v306 = v242[7], v307 = v242[8], v308 = v242[9],
+            v309 = v242[10], v310 = v242[11], v311 = v242[12], v312 = v242[13], v313 = v242[14],
+            v314 = v242[15], v315 = v242[16], v316 = v242[17], v317 = v242[18], v318 = v242[19],
+            v319 = v242[20], v320 = v242[21], v321 = v242[22], v322 = v242[23], v323 = v242[24],
+            v324 = v242[25], v325 = v242[26], v326 = v242[27], v327 = v242[28], v328 = v242[29],
+            v329 = v242[30], v330 = v242[31], v331 = v242[32], v332 = v242[33], v333 = v242[34],
+            v334 = v242[35], v335 = v242[36], v336 = v242[37], v337 = v242[38], v338 = v242[39],
+            v339 = v242[40], v340 = v242[41], v341 = v242[42], v342 = v242[43], v343 = v242[44],
+            v344 = v242[45], v345 = v242[46], v346 = v242[47], v347 = v242[48],
+            v348 = v266 * (v329 - v332) + (v265 * (v328 - v333) + v267 * (v330 - v331)),
+            v349 = v266 * (v322 - v325) + (v265 * (v321 - v326) + v267 * (v323 - v324)),
+            v350 = v267 * (v309 - v310) + (v265 * (v307 - v312) + v266 * (v308 - v311)),
+            v351 = v267 * (v337 - v338) + (v265 * (v335 - v340) + v266 * (v336 - v339)),
+            v352 = v267 * (v344 - v345) + (v265 * (v342 - v347) + v266 * (v343 - v346)),
+            v353 = v267 * (v316 - v317) + (v265 * (v314 - v319) + v266 * (v315 - v318)),
+            v354 = v249 * v318 + (v247 * v316 + (v246 * v315 + (v244 * v314 + v248 * v317))),
+            v355 = v263 * v318 + (v262 * v316 + (v261 * v315 + (v257 * v314 + v260 * v317))),
+            v356 = v318 * v289 + (v316 * v284 + (v315 * v279 + (v314 * v282 + v317 * v286))),
+            v357 = v249 * v346 + (v247 * v344 + (v246 * v343 + (v244 * v342 + v248 * v345))),
+            v358 = v263 * v346 + (v262 * v344 + (v261 * v343 + (v257 * v342 + v260 * v345))),
+            v359 = v346 * v289 + (v344 * v284 + (v343 * v279 + (v342 * v282 + v345 * v286))),
+            v360 = v249 * v339 + (v247 * v337 + (v246 * v336 + (v244 * v335 + v248 * v338))),
+            v361 = v263 * v339 + (v262 * v337 + (v261 * v336 + (v257 * v335 + v260 * v338))),
+            v362 = v339 * v289 + (v337 * v284 + (v336 * v279 + (v335 * v282 + v338 * v286))),
+            v363 = v258 * v313 + v353 + t13 * (v313 * v283 + (v319 * v288 + v356)) + v23 * (v269 * v313 + (v268 * v319 + v355)),
+            v364 = v258 * v341 + v352 + t13 * (v341 * v283 + (v347 * v288 + v359)) + v23 * (v269 * v341 + (v268 * v347 + v358)),
+            v365 = v258 * v334 + v351 + t13 * (v334 * v283 + (v340 * v288 + v362)) + v23 * (v269 * v334 + (v268 * v340 + v361)),
+            v366 = v365 - v21 * (v250 * v340 + v360), v367 = v363 - v21 * (v250 * v319 + v354),
+            v368 = v364 - v21 * (v250 * v347 + v357),
+            v369 = v303 * v143 + v304 * v147 - v300 * v140 - v301 * v141 - v302 * v142,
+            v370 = v305 * v149 + v369,
+            v371 = v303 * v159 * (t13 * (1.0 - v113) + v131 * (v103 * v23 + v126 * v368)),
+            v372 = v300 * v153 * (t13 * (1.0 - v110) + v128 * (v99 * v23 + v122 * v367)),
+            v373 = v305 * v173 * (t13 * (1.0 - v115) + v133 * (v102 * v23 + v127 * v366)),
+            v374 = 0.1192694691878821 * (v149 * v366 - v140 * v367) - v371 + v372 - v373,
+            v375 = v262 * v309 + (v261 * v308 + (v257 * v307 + (v269 * v306 + v260 * v310))),
+            v376 = v262 * v323 + (v261 * v322 + (v257 * v321 + (v269 * v320 + v260 * v324))),
+            v377 = v262 * v330 + (v261 * v329 + (v257 * v328 + (v269 * v327 + v260 * v331))),
+            v378 = v309 * v284 + (v308 * v279 + (v307 * v282 + (v310 * v286 + v306 * v283))),
+            v379 = v323 * v284 + (v322 * v279 + (v321 * v282 + (v324 * v286 + v320 * v283))),
+            v380 = v330 * v284 + (v329 * v279 + (v328 * v282 + (v331 * v286 + v327 * v283))),
+            v381 = v249 * v311 + (v247 * v309 + (v246 * v308 + (v244 * v307 + v248 * v310))),
+            v382 = v249 * v325 + (v247 * v323 + (v246 * v322 + (v244 * v321 + v248 * v324))),
+            v383 = v249 * v332 + (v247 * v330 + (v246 * v329 + (v244 * v328 + v248 * v331))),
+            v384 = v258 * v306 + v350 + v23 * (v268 * v312 + (v263 * v311 + v375)) - v21 * (v250 * v312 + v381),
+            v385 = v258 * v327 + v348 + v23 * (v268 * v333 + (v263 * v332 + v377)) - v21 * (v250 * v333 + v383),
+            v386 = v258 * v320 + v349 + v23 * (v268 * v326 + (v263 * v325 + v376)) - v21 * (v250 * v326 + v382),
+            v387 = v384 + t13 * (v312 * v288 + (v311 * v289 + v378)),
+            v388 = v385 + t13 * (v333 * v288 + (v332 * v289 + v380)),
+            v389 = v386 + t13 * (v326 * v288 + (v325 * v289 + v379)),
+            v390 = v374 - v251 * (v298 * v370) + 0.07987743308995329 * (v143 * v368 - v142 * v387),
+            v391 = v302 * v161 * (t13 * (1.0 - v112) + v130 * (v98 * v23 + v123 * v387)),
+            v392 = v301 * v155 * (t13 * (1.0 - v111) + v129 * (v100 * v23 + v125 * v389)),
+            v393 = v304 * v164 * (t13 * (1.0 - v114) + v132 * (v101 * v23 + v124 * v388)),
+            v394 = v390 + v391 + v392 - v393 + 0.05582662111236089 * (v147 * v388 - v141 * v389),
+            v395 = parameters[1] * v253 + v57 * t5 + v298 * ((v299 * v18 + v58 * v56) * v370 + v6 * v299 * v394),
+            v396 = w[1] * v395;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v295 + D * v396;
+        }
+    }
+    const V v397 = -s45, v398 = -s46;
+    R_lanes[0] = s48; R_lanes[1] = v398; R_lanes[2] = s47; R_lanes[3] = v397;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, (4 + modes));
+    }
+}
+SOFTEHL_BATCH(softehl_film_carreau_pseudo_load, 4, (4 + modes), 0, 14, (4 + modes), 0)
+
+SOFTEHL_GROUP(softehl_film_carreau_fields_rate)
+{
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17;
+    softehl_load4(t + 0, (14 + (4 + modes)), &t0, &t1, &t2, &t3);
+    softehl_load4(t + 4, (14 + (4 + modes)), &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, (14 + (4 + modes)), &t8, &t9, &t10, &t11);
+    softehl_load4(t + 12, (14 + (4 + modes)), &t12, &t13, &t14, &t15);
+    softehl_load2(t + 16, (14 + (4 + modes)), &t16, &t17); (void)t8; (void)t9; (void)t10;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V t_lanes[(14 + (4 + modes))];
+#else
+    const V *const t_lanes = t;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(t_lanes, t, (14 + (4 + modes)));
+#endif
+    const double v1 = 1.0 - parameters[9];
+    const V v2 = t1 + t15, v3 = t2 + t16, v4 = t3 + t17;
+    const double v5 = 1.0 / parameters[7], v6 = 0.5 * parameters[7], v7 = 6.0 * parameters[7],
+        v8 = 1.0 / parameters[8];
+    const V v9 = X2 + d2 - X0 - d0; const double v10 = 0.5 * (parameters[8] - 1.0);
+    const V v11 = v2 - t4, v12 = v4 - t4, v13 = 0.5 * (v4 - v2), v14 = 0.5 * v9, v15 = v14 * v14,
+        v16 = d1 + (X1 - parameters[0]);
+    const double v17 = v8 * v10;
+    const V v18 = d3 + (X3 - parameters[0]), v19 = X3 + d3 - X1 - d1, v20 = 0.5 * t12,
+        v21 = 0.5 * v19, v22 = t0 + t14, v23 = 0.5 * (v3 - t0 - t14), v24 = v8 * (v20 - v17 * t12),
+        v25 = v21 * v21, v26 = v9 * v23, v27 = 0.5 * t11, v28 = v5 * t11, v29 = 6.0 * t11,
+        v30 = v25 + v15, v31 = v25 * v25, v32 = v21 * v31, v33 = v30 * v30, v34 = v32 * v32,
+        v35 = 1.0 / (v33 * v33),
+        v36 = v31 * (v31 * (5.0 * v19)) * v13 - v34 * (v35 * (v33 * (4.0 * v30))) * (v26 + v19 * v13),
+        v37 = v15 + v35 * v34, v38 = softehl_vsqrt(v37), v39 = 1.0 / v38,
+        v40 = softehl_vsqrt(1.0 / v37), v41 = v40 * (0.5 * v39) * (v26 + v35 * v36);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1; V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            tp0 += B[2 * i] * t_lanes[18 + i]; tp1 += B[2 * i + 1] * t_lanes[18 + i];
+        }
+        (void)tp0, (void)tp1; const double v42 = 0.5 * w[0];
+        const V v43 = softehl_vexp(p0 * parameters[3]), v44 = p1 * v39;
+        const double v45 = 0.5 - v42, v46 = 0.5 + v42;
+        const V v47 = w[1] * v23, v48 = v45 * v16 + v46 * v18, v49 = parameters[2] * v43,
+            v50 = v46 * v3 + v45 * v22, v51 = v45 * v11 + v46 * v12, v52 = 0.5 * v48,
+            v53 = parameters[7] * v48, v54 = v52 * v44, v55 = 1.0 / v53,
+            v56 = parameters[1] * v49 * v55, v57 = v5 * v54, v58 = softehl_vlog(1.0 + v56 * v56),
+            v59 = softehl_vexp(v58 * v10), v60 = v56 * (parameters[9] + v1 * v59),
+            v61 = 0.932469514203152 * v57, v62 = 0.6612093864662645 * v57,
+            v63 = 0.2386191860831969 * v57, v64 = v60 + v61, v65 = v60 + v62, v66 = v60 + v63,
+            v67 = v60 - v63, v68 = v60 - v62, v69 = v60 - v61;
+        V v70[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v56, softehl_splat(v10), softehl_splat(v1), softehl_splat(v17), v61, v62, v63, v60, v64, v65, v66, v67, v68, v69}, v70, &failed);
+        const V v71 = v70[1], v72 = v70[2], v73 = v70[3], v74 = v70[4], v75 = v70[5], v76 = v70[6],
+            v77 = v71 * v71, v78 = v72 * v72, v79 = v73 * v73, v80 = v74 * v74, v81 = v75 * v75,
+            v82 = v76 * v76, v83 = 1.0 + v77, v84 = 1.0 + v78, v85 = 1.0 + v79, v86 = 1.0 + v80,
+            v87 = 1.0 + v81, v88 = 1.0 + v82, v89 = softehl_vlog(v83), v90 = softehl_vlog(v84),
+            v91 = softehl_vlog(v85), v92 = softehl_vlog(v86), v93 = softehl_vlog(v87),
+            v94 = softehl_vlog(v88), v95 = 2.0 * v74, v96 = 2.0 * v73, v97 = 2.0 * v75,
+            v98 = 2.0 * v72, v99 = 2.0 * v76, v100 = 2.0 * v71, v101 = softehl_vexp(v17 * v90),
+            v102 = softehl_vexp(v17 * v91), v103 = softehl_vexp(v17 * v89),
+            v104 = softehl_vexp(v17 * v94), v105 = softehl_vexp(v17 * v92),
+            v106 = softehl_vexp(v17 * v93), v107 = v17 * (1.0 / v86), v108 = v17 * (1.0 / v85),
+            v109 = v17 * (1.0 / v87), v110 = v17 * (1.0 / v84), v111 = v17 * (1.0 / v88),
+            v112 = v17 * (1.0 / v83), v113 = v98 * v110, v114 = v100 * v112, v115 = v95 * v107,
+            v116 = v96 * v108, v117 = v99 * v111, v118 = v97 * v109, v119 = v1 * v101,
+            v120 = v1 * v102, v121 = v1 * v103, v122 = v1 * v104, v123 = v1 * v105,
+            v124 = v1 * v106, v125 = parameters[9] + v119, v126 = parameters[9] + v120,
+            v127 = parameters[9] + v121, v128 = parameters[9] + v122, v129 = parameters[9] + v123,
+            v130 = parameters[9] + v124, v131 = 1.0 / v125, v132 = 1.0 / v126, v133 = 1.0 / v127,
+            v134 = 1.0 / v128, v135 = 1.0 / (v125 * v125), v136 = 1.0 / (v126 * v126),
+            v137 = 1.0 / (v127 * v127), v138 = 1.0 / v129, v139 = 1.0 / (v128 * v128),
+            v140 = 1.0 / v130, v141 = 1.0 / (v129 * v129), v142 = 1.0 / (v130 * v130),
+            v143 = v72 * v131, v144 = v131 * v131, v145 = v73 * v132, v146 = v132 * v132,
+            v147 = v144 * (0.1803807865240693 * v72), v148 = v146 * (0.23395696728634552 * v73),
+            v149 = v76 * v134, v150 = v134 * v134, v151 = v150 * (0.08566224618958518 * v76),
+            v152 = v133 * v133, v153 = v71 * v133, v154 = v74 * v138, v155 = v138 * v138,
+            v156 = v152 * (0.08566224618958518 * v71), v157 = v155 * (0.23395696728634552 * v74),
+            v158 = v119 * v147, v159 = v120 * v148, v160 = v122 * v151,
+            v161 = 0.1803807865240693 * v131 - v113 * v158, v162 = v121 * v156,
+            v163 = 0.23395696728634552 * v132 - v116 * v159, v164 = v140 * v140, v165 = v75 * v140,
+            v166 = 0.08566224618958518 * v134 - v117 * v160, v167 = v123 * v157,
+            v168 = v164 * (0.1803807865240693 * v75),
+            v169 = 0.08566224618958518 * v133 - v114 * v162, v170 = 1.0 + v77 * v137,
+            v171 = 0.23395696728634552 * v138 - v115 * v167, v172 = softehl_vlog(v170),
+            v173 = 1.0 + v78 * v135, v174 = v124 * v168, v175 = softehl_vlog(v173),
+            v176 = 1.0 + v79 * v136, v177 = 1.0 + v80 * v141, v178 = softehl_vlog(v176),
+            v179 = softehl_vlog(v177), v180 = 1.0 + v81 * v142,
+            v181 = 0.1803807865240693 * v140 - v118 * v174, v182 = softehl_vlog(v180),
+            v183 = 1.0 + v82 * v139, v184 = softehl_vlog(v183), v185 = softehl_vexp(v10 * v172),
+            v186 = softehl_vexp(v10 * v175), v187 = softehl_vexp(v10 * v178),
+            v188 = softehl_vexp(v10 * v179), v189 = softehl_vexp(v10 * v182),
+            v190 = softehl_vexp(v10 * v184), v191 = v1 * v187, v192 = v1 * v189, v193 = v1 * v190,
+            v194 = parameters[9] + v191, v195 = v191 * v145, v196 = v195 * (v10 * (1.0 / v176)),
+            v197 = parameters[9] + v192, v198 = v192 * v165, v199 = v198 * (v10 * (1.0 / v180)),
+            v200 = parameters[9] + v193, v201 = v193 * v149, v202 = v201 * (v10 * (1.0 / v183)),
+            v203 = v1 * v185, v204 = parameters[9] + v203, v205 = v203 * v153,
+            v206 = v205 * (v10 * (1.0 / v170)), v207 = v1 * v186, v208 = v1 * v188,
+            v209 = parameters[9] + v207, v210 = v207 * v143, v211 = v210 * (v10 * (1.0 / v173)),
+            v212 = parameters[9] + v208, v213 = v208 * v154, v214 = v213 * (v10 * (1.0 / v177)),
+            v215 = v71 * v152 * v204 + v137 * (v137 * (2.0 * v77 * v127)) * v206,
+            v216 = v121 * v215, v217 = v133 * v204 + v100 * (v137 * v206 - v112 * v216),
+            v218 = v72 * v144 * v209 + v135 * (v135 * (2.0 * v78 * v125)) * v211,
+            v219 = v119 * v218, v220 = v131 * v209 + v98 * (v135 * v211 - v110 * v219),
+            v221 = v73 * v146 * v194 + v136 * (v136 * (2.0 * v79 * v126)) * v196,
+            v222 = v120 * v221, v223 = v132 * v194 + v96 * (v136 * v196 - v108 * v222),
+            v224 = v74 * v155 * v212 + v141 * (v141 * (2.0 * v80 * v129)) * v214,
+            v225 = v123 * v224, v226 = v138 * v212 + v95 * (v141 * v214 - v107 * v225),
+            v227 = v75 * v164 * v197 + v142 * (v142 * (2.0 * v81 * v130)) * v199,
+            v228 = v124 * v227, v229 = v140 * v197 + v97 * (v142 * v199 - v109 * v228),
+            v230 = v76 * v150 * v200 + v139 * (v139 * (2.0 * v82 * v128)) * v202,
+            v231 = v122 * v230, v232 = v134 * v200 + v99 * (v139 * v202 - v111 * v231);
+        V v233[49];
+        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v169, v161, v163, v171, v181, v166, softehl_splat((-1.0)), v217, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v220, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v223, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v226, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v229, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v232}, v233, &failed);
+        const V v234 = v43 * t6 + v49 * (p0 * t7 + parameters[3] * tp0), v235 = v70[0],
+            v236 = v172 * v205, v237 = v175 * v210, v238 = v178 * v195, v239 = v179 * v213,
+            v240 = v182 * v198, v241 = v184 * v201, v242 = v89 * v216, v243 = v90 * v219,
+            v244 = v91 * v222, v245 = v92 * v225, v246 = v93 * v228,
+            v247 = v93 * v174 + (v92 * v167 + (v91 * v159 + (v90 * v158 + v89 * v162))),
+            v248 = v94 * v231, v249 = v94 * v160 + v247, v250 = v233[0], v251 = v233[1],
+            v252 = v233[2], v253 = v233[3], v254 = v233[4], v255 = v233[5], v256 = v233[6],
+            v257 = v147 + (v168 + (v148 + (v157 - v105 * v157) - v102 * v148) - v106 * v168),
+            v258 = v218 + (v186 * v143 - v143 - v101 * v218),
+            v259 = v215 + (v185 * v153 - v153) - v103 * v215,
+            v260 = v244 * v253 + (v243 * v252 + (v242 * v251 + (v248 * v256 + v250 * v249))),
+            v261 = v240 * v255 + (v239 * v254 + (v238 * v253 + (v236 * v251 + v237 * v252))),
+            v262 = v151 + (v156 + (v257 - v101 * v147 - v103 * v156)) - v104 * v151,
+            v263 = v221 + (v187 * v145 - v145) - v102 * v221,
+            v264 = v224 + (v188 * v154 - v154) - v105 * v224,
+            v265 = v24 * (v246 * v255 + (v245 * v254 + v260)) - v20 * (v241 * v256 + v261),
+            v266 = 0.5 * v51, v267 = v227 + (v189 * v165 - v165) - v106 * v227,
+            v268 = v255 * v267 + (v252 * v258 + v251 * v259 + v253 * v263 + v254 * v264),
+            v269 = v230 + (v190 * v149 - v149 - v104 * v230),
+            v270 = v44 * v266 + v52 * (v39 * (tp1 - p1 * v41)),
+            v271 = v49 * t5 + parameters[1] * v234 - v56 * (v48 * t11 + parameters[7] * v51),
+            v272 = v55 * v271, v273 = v5 * (v270 - v54 * v28), v274 = 0.932469514203152 * v273,
+            v275 = (v251 - v256) * v274 + (v250 * v272 + v265 + t13 * (v256 * v269 + v268 + v250 * v262)),
+            v276 = 0.6612093864662645 * v273, v277 = 0.2386191860831969 * v273,
+            v278 = parameters[7] * ((v253 - v254) * v277 + ((v252 - v255) * v276 + v275)),
+            v279 = v235 * t11 + v278, v280 = v270 + v279, v281 = v279 - v270, v282 = 1.0 / v49,
+            v283 = v48 * v48, v284 = 0.1192694691878821 * v72, v285 = 0.05582662111236089 * v73,
+            v286 = 0.07987743308995329 * v71, v287 = 0.07987743308995329 * v76,
+            v288 = 0.05582662111236089 * v74, v289 = 0.1192694691878821 * v75, v290 = v233[7],
+            v291 = v233[8], v292 = v233[9], v293 = v233[10], v294 = v233[11], v295 = v233[12],
+            v296 = v233[13], v297 = v233[14], v298 = v233[15], v299 = v233[16], v300 = v233[17],
+            v301 = v233[18], v302 = v233[19], v303 = v233[20], v304 = v233[21], v305 = v233[22],
+            v306 = v233[23], v307 = v233[24], v308 = v233[25], v309 = v233[26], v310 = v233[27],
+            v311 = v233[28], v312 = v233[29], v313 = v233[30], v314 = v233[31], v315 = v233[32],
+            v316 = v233[33], v317 = v233[34], v318 = v233[35], v319 = v233[36], v320 = v233[37],
+            v321 = v233[38], v322 = v233[39], v323 = v233[40], v324 = v233[41], v325 = v233[42],
+            v326 = v233[43], v327 = v233[44], v328 = v233[45], v329 = v233[46], v330 = v233[47],
+            v331 = v233[48],
+            v332 = v240 * v302 + (v238 * v300 + (v237 * v299 + (v236 * v298 + v239 * v301))),
+            v333 = v246 * v302 + (v244 * v300 + (v243 * v299 + (v242 * v298 + v245 * v301))),
+            v334 = v302 * v267 + (v300 * v263 + (v299 * v258 + (v298 * v259 + v301 * v264))),
+            v335 = v240 * v323 + (v238 * v321 + (v237 * v320 + (v236 * v319 + v239 * v322))),
+            v336 = v246 * v323 + (v244 * v321 + (v243 * v320 + (v242 * v319 + v245 * v322))),
+            v337 = v323 * v267 + (v321 * v263 + (v320 * v258 + (v319 * v259 + v322 * v264))),
+            v338 = v240 * v330 + (v238 * v328 + (v237 * v327 + (v236 * v326 + v239 * v329))),
+            v339 = v246 * v330 + (v244 * v328 + (v243 * v327 + (v242 * v326 + v245 * v329))),
+            v340 = v330 * v267 + (v328 * v263 + (v327 * v258 + (v326 * v259 + v329 * v264))),
+            v341 = t13 * (v318 * v262 + (v324 * v269 + v337)) + ((v319 - v324) * v274 - v20 * (v241 * v324 + v335)),
+            v342 = t13 * (v325 * v262 + (v331 * v269 + v340)) + ((v326 - v331) * v274 - v20 * (v241 * v331 + v338)),
+            v343 = t13 * (v297 * v262 + (v303 * v269 + v334)) + ((v298 - v303) * v274 - v20 * (v241 * v303 + v332)),
+            v344 = v297 * v272 + (v24 * (v249 * v297 + (v248 * v303 + v333)) + v343),
+            v345 = v318 * v272 + (v24 * (v249 * v318 + (v248 * v324 + v336)) + v341),
+            v346 = v325 * v272 + (v24 * (v249 * v325 + (v248 * v331 + v339)) + v342),
+            v347 = v288 * v138 + (v287 * v134 - v286 * v133 - v284 * v131 - v285 * v132),
+            v348 = v289 * v140 + v347, v349 = (v300 - v301) * v277 + ((v299 - v302) * v276 + v344),
+            v350 = (v321 - v322) * v277 + ((v320 - v323) * v276 + v345),
+            v351 = (v328 - v329) * v277 + ((v327 - v330) * v276 + v346),
+            v352 = (v293 - v294) * v277 + ((v291 - v296) * v274 + (v292 - v295) * v276),
+            v353 = (v307 - v308) * v277 + ((v305 - v310) * v274 + (v306 - v309) * v276),
+            v354 = (v314 - v315) * v277 + ((v312 - v317) * v274 + (v313 - v316) * v276),
+            v355 = v284 * v144 * (t13 * (1.0 - v101) + v119 * (v90 * v24 + v113 * v349)),
+            v356 = v287 * v150 * (t13 * (1.0 - v104) + v122 * (v94 * v24 + v117 * v351)),
+            v357 = v289 * v164 * (t13 * (1.0 - v106) + v124 * (v93 * v24 + v118 * v350)),
+            v358 = 0.1192694691878821 * (v140 * v350 - v131 * v349) + v355 - v356 - v357,
+            v359 = v244 * v307 + (v243 * v306 + (v249 * v304 + (v242 * v305 + v245 * v308))),
+            v360 = v244 * v293 + (v243 * v292 + (v242 * v291 + (v249 * v290 + v245 * v294))),
+            v361 = v244 * v314 + (v243 * v313 + (v242 * v312 + (v249 * v311 + v245 * v315))),
+            v362 = v293 * v263 + (v292 * v258 + (v291 * v259 + (v294 * v264 + v290 * v262))),
+            v363 = v307 * v263 + (v306 * v258 + (v304 * v262 + (v305 * v259 + v308 * v264))),
+            v364 = v314 * v263 + (v313 * v258 + (v312 * v259 + (v315 * v264 + v311 * v262))),
+            v365 = v240 * v295 + (v238 * v293 + (v237 * v292 + (v236 * v291 + v239 * v294))),
+            v366 = v240 * v309 + (v238 * v307 + (v237 * v306 + (v236 * v305 + v239 * v308))),
+            v367 = v240 * v316 + (v238 * v314 + (v237 * v313 + (v236 * v312 + v239 * v315))),
+            v368 = v24 * (v248 * v317 + (v246 * v316 + v361)) + (v311 * v272 + v354),
+            v369 = v24 * (v248 * v296 + (v246 * v295 + v360)) + (v290 * v272 + v352),
+            v370 = v304 * v272 + v353 + v24 * (v248 * v310 + (v246 * v309 + v359)) - v20 * (v241 * v310 + v366),
+            v371 = t13 * (v296 * v269 + (v295 * v267 + v362)) + (v369 - v20 * (v241 * v296 + v365)),
+            v372 = v370 + t13 * (v310 * v269 + (v309 * v267 + v363)),
+            v373 = t13 * (v317 * v269 + (v316 * v267 + v364)) + (v368 - v20 * (v241 * v317 + v367)),
+            v374 = v286 * v152 * (t13 * (1.0 - v103) + v121 * (v89 * v24 + v114 * v371)),
+            v375 = v285 * v146 * (t13 * (1.0 - v102) + v120 * (v91 * v24 + v116 * v372)),
+            v376 = v358 + 0.07987743308995329 * (v134 * v351 - v133 * v371) + v374 + v375,
+            v377 = v288 * v155 * (t13 * (1.0 - v105) + v123 * (v92 * v24 + v115 * v373)),
+            v378 = v376 - v377 + 0.05582662111236089 * (v138 * v373 - v132 * v372),
+            v379 = (v283 * v27 + v53 * v51) * v348 + v6 * v283 * (v378 - v234 * (v282 * v348)),
+            v380 = v52 * t5 + parameters[1] * v266 + v282 * v379, v381 = 1.0 / v48,
+            v382 = v381 * (v7 * (v51 * (v348 * v381) - v378) - v348 * v29);
+        softehl_store4(R + 9 * q + 0, (9 * points), v50, v47, v51, tp0);
+        softehl_store4(R + 9 * q + 4, (9 * points), v281, v380, v280, v234);
+        softehl_store1(R + 9 * q + 8, (9 * points), v382);
+    }
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, (9 * points));
+    }
+}
+SOFTEHL_BATCH(softehl_film_carreau_fields_rate, 4, (4 + modes), 0, (14 + (4 + modes)), (9 * points), 0)

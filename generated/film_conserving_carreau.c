@@ -1024,3 +1024,802 @@ SOFTEHL_GROUP(softehl_film_conserving_carreau_fields)
     }
 }
 SOFTEHL_BATCH(softehl_film_conserving_carreau_fields, 4, (4 + modes), 2, 0, (14 * points), 0)
+
+SOFTEHL_GROUP(softehl_film_conserving_carreau_pseudo_load)
+{
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15;
+    softehl_load4(t + 0, 16, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 16, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 16, &t8, &t9, &t10, &t11);
+    softehl_load4(t + 12, 16, &t12, &t13, &t14, &t15);
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 1.0 - parameters[8], v2 = 6.283185307179586 * parameters[4];
+    const V v3 = d1 + (X1 - parameters[0]), v4 = d3 + (X3 - parameters[0]), v5 = parameters[2] * t9,
+        v6 = a1 + d2 * parameters[9], v7 = a0 + d0 * parameters[9], v8 = 6.283185307179586 * t10,
+        v9 = t4 + d0 * t15, v10 = t5 + d2 * t15, v11 = 0.5 * (t2 - t0),
+        v12 = 0.5 * (X2 + d2 - X0 - d0), v13 = 0.5 * (v4 - v3), v14 = t1 - t6, v15 = t3 - t6;
+    const double v16 = 1.0 / parameters[7], v17 = 0.5 * parameters[6], v18 = 1.0 / parameters[6];
+    const V v19 = 1.0 / v12; const double v20 = 0.5 * (parameters[7] - 1.0);
+    const V v21 = 1.0 / (parameters[6] * v12), v22 = 0.5 * (v15 - v14), v23 = v13 * v13 + v12 * v12,
+        v24 = 0.5 * t12;
+    const double v25 = v16 * v20;
+    const V v26 = softehl_vsqrt(v23), v27 = v18 * t12, v28 = 0.5 * t13, v29 = v19 * v19 * v11,
+        v30 = v21 * (parameters[6] * v11 + v12 * t12), v31 = v16 * (v28 - v25 * t13),
+        v32 = parameters[5] * v26, v33 = softehl_vsqrt(1.0 / v23),
+        v34 = v26 * t11 + 2.0 * (v13 * v22 + v12 * v11) * (v33 * (0.5 * parameters[5]));
+    V s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 4 * q; (void)w;
+        const double *restrict B = basis + 8 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
+        const double v39 = 0.5 * w[0]; const V v40 = p1 * v19;
+        const double v41 = 0.5 + v39, v42 = 0.5 - v39;
+        const V v43 = softehl_vexp(p0 * parameters[3]), v44 = parameters[1] - v41 * v6 - v42 * v7,
+            v45 = v42 * v3 + v41 * v4, v46 = parameters[0] + v45, v47 = v42 * v14 + v41 * v15,
+            v48 = 0.5 * v45, v49 = v48 * v40, v50 = 1.0 / (parameters[6] * v45),
+            v51 = parameters[2] * v43, v52 = v50 * (v51 * v44), v53 = v46 * v2,
+            v54 = v2 * (t6 + v47) + v46 * v8, v55 = v18 * v49, v56 = softehl_vlog(1.0 + v52 * v52),
+            v57 = softehl_vexp(v20 * v56), v58 = v52 * (parameters[8] + v1 * v57),
+            v59 = 0.932469514203152 * v55, v60 = 0.6612093864662645 * v55,
+            v61 = 0.2386191860831969 * v55, v62 = w[3] * (p0 * (v53 * v11 + v12 * v54));
+        s35 += v41 * v62; s36 += v42 * v62;
+        const V v63 = v58 + v59, v64 = v58 + v60, v65 = v58 + v61, v66 = v58 - v61, v67 = v58 - v60,
+            v68 = v58 - v59;
+        V v69[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v20), softehl_splat(v1), softehl_splat(v25), v52, v59, v60, v61, v58, v63, v64, v65, v66, v67, v68}, v69, &failed);
+        const V v70 = v69[1], v71 = v69[2], v72 = v69[3], v73 = v69[4], v74 = v69[5], v75 = v69[6],
+            v76 = v70 * v70, v77 = v71 * v71, v78 = v72 * v72, v79 = v73 * v73, v80 = v74 * v74,
+            v81 = v75 * v75, v82 = 1.0 + v76, v83 = 1.0 + v77, v84 = 1.0 + v78, v85 = 1.0 + v79,
+            v86 = 1.0 + v80, v87 = 1.0 + v81, v88 = softehl_vlog(v82), v89 = softehl_vlog(v83),
+            v90 = softehl_vlog(v84), v91 = softehl_vlog(v85), v92 = softehl_vlog(v86),
+            v93 = softehl_vlog(v87), v94 = softehl_vexp(v25 * v88), v95 = softehl_vexp(v25 * v93),
+            v96 = softehl_vexp(v25 * v89), v97 = softehl_vexp(v25 * v92),
+            v98 = softehl_vexp(v25 * v90), v99 = softehl_vexp(v25 * v91), v100 = 2.0 * v73,
+            v101 = 2.0 * v72, v102 = 2.0 * v74, v103 = 2.0 * v71, v104 = 2.0 * v75,
+            v105 = 2.0 * v70, v106 = v1 * v94, v107 = v1 * v95, v108 = v1 * v96, v109 = v1 * v97,
+            v110 = v1 * v98, v111 = v1 * v99, v112 = v25 * (1.0 / v85), v113 = v25 * (1.0 / v84),
+            v114 = v25 * (1.0 / v86), v115 = v25 * (1.0 / v83), v116 = parameters[8] + v106,
+            v117 = parameters[8] + v107, v118 = parameters[8] + v108, v119 = parameters[8] + v109,
+            v120 = parameters[8] + v110, v121 = parameters[8] + v111, v122 = 1.0 / v116,
+            v123 = 1.0 / v117, v124 = 1.0 / v118, v125 = 1.0 / (v116 * v116), v126 = 1.0 / v119,
+            v127 = 1.0 / (v117 * v117), v128 = 1.0 / (v118 * v118), v129 = 1.0 / v120,
+            v130 = 1.0 / v121, v131 = 1.0 / (v119 * v119), v132 = 1.0 / (v120 * v120),
+            v133 = 1.0 / (v121 * v121), v134 = v25 * (1.0 / v87), v135 = v25 * (1.0 / v82),
+            v136 = v122 * v122, v137 = v70 * v122, v138 = v123 * v123, v139 = v75 * v123,
+            v140 = v136 * (0.08566224618958518 * v70), v141 = v124 * v124, v142 = v71 * v124,
+            v143 = v138 * (0.08566224618958518 * v75), v144 = v141 * (0.1803807865240693 * v71),
+            v145 = v129 * v129, v146 = v126 * v126, v147 = v74 * v126, v148 = v72 * v129,
+            v149 = v106 * v140, v150 = v146 * (0.1803807865240693 * v74), v151 = v107 * v143,
+            v152 = v145 * (0.23395696728634552 * v72), v153 = v108 * v144,
+            v154 = 0.08566224618958518 * v122 - v105 * v135 * v149,
+            v155 = 0.08566224618958518 * v123 - v104 * v134 * v151, v156 = v109 * v150,
+            v157 = 0.1803807865240693 * v124 - v103 * v115 * v153, v158 = v110 * v152,
+            v159 = v130 * v130, v160 = v73 * v130,
+            v161 = 0.1803807865240693 * v126 - v102 * v114 * v156,
+            v162 = v159 * (0.23395696728634552 * v73),
+            v163 = 0.23395696728634552 * v129 - v101 * v113 * v158, v164 = 1.0 + v76 * v125,
+            v165 = 1.0 + v77 * v128, v166 = softehl_vlog(v164), v167 = softehl_vlog(v165),
+            v168 = 1.0 + v78 * v132, v169 = v111 * v162, v170 = softehl_vlog(v168),
+            v171 = 1.0 + v79 * v133, v172 = 1.0 + v80 * v131, v173 = softehl_vlog(v171),
+            v174 = softehl_vlog(v172), v175 = 1.0 + v81 * v127,
+            v176 = 0.23395696728634552 * v130 - v100 * v112 * v169, v177 = softehl_vlog(v175),
+            v178 = softehl_vexp(v20 * v166), v179 = softehl_vexp(v20 * v167),
+            v180 = softehl_vexp(v20 * v170), v181 = softehl_vexp(v20 * v173),
+            v182 = softehl_vexp(v20 * v174), v183 = softehl_vexp(v20 * v177), v184 = v1 * v180,
+            v185 = v1 * v182, v186 = v1 * v183, v187 = parameters[8] + v184, v188 = v184 * v148,
+            v189 = v188 * (v20 * (1.0 / v168)), v190 = parameters[8] + v185, v191 = v185 * v147,
+            v192 = v191 * (v20 * (1.0 / v172)), v193 = parameters[8] + v186, v194 = v186 * v139,
+            v195 = v194 * (v20 * (1.0 / v175)), v196 = v1 * v178, v197 = parameters[8] + v196,
+            v198 = v196 * v137, v199 = v198 * (v20 * (1.0 / v164)), v200 = v1 * v179,
+            v201 = v1 * v181, v202 = parameters[8] + v200, v203 = v200 * v142,
+            v204 = v203 * (v20 * (1.0 / v165)), v205 = parameters[8] + v201, v206 = v201 * v160,
+            v207 = v206 * (v20 * (1.0 / v171)),
+            v208 = v70 * v136 * v197 + v125 * (v125 * (2.0 * v76 * v116)) * v199,
+            v209 = v106 * v208, v210 = v122 * v197 + v105 * (v125 * v199 - v135 * v209),
+            v211 = v71 * v141 * v202 + v128 * (v128 * (2.0 * v77 * v118)) * v204,
+            v212 = v108 * v211, v213 = v124 * v202 + v103 * (v128 * v204 - v115 * v212),
+            v214 = v72 * v145 * v187 + v132 * (v132 * (2.0 * v78 * v120)) * v189,
+            v215 = v110 * v214, v216 = v129 * v187 + v101 * (v132 * v189 - v113 * v215),
+            v217 = v73 * v159 * v205 + v133 * (v133 * (2.0 * v79 * v121)) * v207,
+            v218 = v111 * v217, v219 = v130 * v205 + v100 * (v133 * v207 - v112 * v218),
+            v220 = v74 * v146 * v190 + v131 * (v131 * (2.0 * v80 * v119)) * v192,
+            v221 = v109 * v220, v222 = v126 * v190 + v102 * (v131 * v192 - v114 * v221),
+            v223 = v75 * v138 * v193 + v127 * (v127 * (2.0 * v81 * v117)) * v195,
+            v224 = v107 * v223, v225 = v123 * v193 + v104 * (v127 * v195 - v134 * v224);
+        V v226[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v154, v157, v163, v176, v161, v155, softehl_splat((-1.0)), v210, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v213, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v216, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v219, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v222, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v225}, v226, &failed);
+        const V v227 = v69[0], v228 = v48 * (p1 * v29), v229 = 0.5 * v40 * v47, v230 = 1.0 - p6,
+            v231 = 1.0 - p4, v232 = parameters[6] * v227;
+        const M v233 = softehl_lt(softehl_splat(0.0), v232);
+        const V v234 = t7 - v41 * v10 - v42 * v9,
+            v235 = v51 * v234 + v44 * (v43 * (t8 + p0 * v5)) - v52 * (parameters[6] * v47 + v45 * t12),
+            v236 = v92 * v156 + (v91 * v169 + (v90 * v158 + (v89 * v153 + v88 * v149))),
+            v237 = v226[0], v238 = v226[1], v239 = v226[2], v240 = v226[3], v241 = v226[4],
+            v242 = v226[5], v243 = v226[6],
+            v244 = v88 * v209 * v238 + (v92 * v221 * v242 + v237 * (v93 * v151 + v236)),
+            v245 = 0.932469514203152 * (v238 - v243) + 0.6612093864662645 * (v239 - v242),
+            v246 = v173 * v206 * v241 + (v170 * v188 * v240 + (v166 * v198 * v238 + v167 * v203 * v239)),
+            v247 = v144 + (v150 + (v152 + (v162 - v99 * v162) - v98 * v152) - v97 * v150),
+            v248 = v91 * v218 * v241 + (v90 * v215 * v240 + (v89 * v212 * v239 + v244)),
+            v249 = v18 * (v229 - v228 - v49 * v27) * (v245 + 0.2386191860831969 * (v240 - v241)),
+            v250 = v238 * (v208 + (v178 * v137 - v137) - v94 * v208) + v239 * (v211 + (v179 * v142 - v142 - v96 * v211)),
+            v251 = v50 * v235 * v237 + v249 - v28 * (v177 * v194 * v243 + (v174 * v191 * v242 + v246)),
+            v252 = v237 * (v143 + (v140 + (v247 - v96 * v144 - v94 * v140)) - v95 * v143),
+            v253 = v250 + v240 * (v214 + (v180 * v148 - v148) - v98 * v214) + v252 + v242 * (v220 + (v182 * v147 - v147 - v97 * v220)),
+            v254 = v253 + v241 * (v217 + (v181 * v160 - v160) - v99 * v217) + v243 * (v223 + (v183 * v139 - v139 - v95 * v223)),
+            v255 = parameters[6] * (v251 + v31 * (v93 * v224 * v243 + v248) + t14 * v254),
+            v256 = v227 * t12 + v255;
+        V v257 = softehl_splat(0.0), v258 = softehl_splat(0.0), v259 = softehl_splat(0.0),
+            v260 = softehl_splat(0.0);
+        const M m261 = v233;
+        if (softehl_any(m261)) {
+            const V v262 = v231 * v256; v257 = softehl_blend(m261, softehl_splat(0.0), v257);
+            v258 = softehl_blend(m261, v262, v258); v259 = softehl_blend(m261, v232, v259);
+            v260 = softehl_blend(m261, softehl_splat(0.0), v260);
+        }
+        const M m263 = ~v233;
+        if (softehl_any(m263)) {
+            const V v264 = v230 * v256; v257 = softehl_blend(m263, v264, v257);
+            v258 = softehl_blend(m263, softehl_splat(0.0), v258);
+            v259 = softehl_blend(m263, softehl_splat(0.0), v259);
+            v260 = softehl_blend(m263, v232, v260);
+        }
+        const double v265 = 0.5 * w[1], v266 = 0.5 * w[2];
+        const V v267 = 0.5 * p3, v268 = softehl_vexp(p2 * parameters[3]);
+        const double v269 = 0.5 - v265, v270 = 0.5 + v265, v271 = 0.5 - v266, v272 = 0.5 + v266;
+        const V v273 = v269 * v3 + v270 * v4, v274 = v271 * v3 + v272 * v4,
+            v275 = v231 * v259 + (v230 * v260 - v49), v276 = v273 + v274, v277 = 0.5 * v276,
+            v278 = parameters[2] * v268, v279 = v267 * v277, v280 = 1.0 / (parameters[6] * v277),
+            v281 = v53 * (p0 * v22 - v34 * v275 - v32 * (v258 + (v228 - v229 + v257))),
+            v282 = v280 * (v278 * v44), v283 = v21 * v279, v284 = softehl_vlog(1.0 + v282 * v282),
+            v285 = w[3] * (v54 * (p0 * v13 - v32 * v275) + v281), v286 = softehl_vexp(v20 * v284),
+            v287 = v282 * (parameters[8] + v1 * v286), v288 = 0.932469514203152 * v283,
+            v289 = 0.6612093864662645 * v283, v290 = 0.2386191860831969 * v283, v291 = v41 * v285;
+        s37 += v291; const V v292 = v42 * v285; s38 += v292;
+        const V v293 = v287 + v288, v294 = v287 + v289, v295 = v287 + v290, v296 = v287 - v290,
+            v297 = v287 - v289, v298 = v287 - v288;
+        V v299[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v282, softehl_splat(v20), softehl_splat(v1), softehl_splat(v25), v288, v289, v290, v287, v293, v294, v295, v296, v297, v298}, v299, &failed);
+        const V v300 = v299[1], v301 = v299[2], v302 = v299[3], v303 = v299[4], v304 = v299[5],
+            v305 = v299[6], v306 = v300 * v300, v307 = 2.0 * v300, v308 = v301 * v301,
+            v309 = 2.0 * v301, v310 = v302 * v302, v311 = 2.0 * v302, v312 = 1.0 + v306,
+            v313 = 1.0 + v308, v314 = 1.0 + v310, v315 = v305 * v305, v316 = 2.0 * v305,
+            v317 = v303 * v303, v318 = 2.0 * v303, v319 = 1.0 + v315, v320 = 1.0 + v317,
+            v321 = v304 * v304, v322 = 2.0 * v304, v323 = softehl_vlog(v312),
+            v324 = softehl_vlog(v313), v325 = softehl_vlog(v314), v326 = 1.0 + v321,
+            v327 = softehl_vlog(v319), v328 = softehl_vlog(v320), v329 = softehl_vlog(v326),
+            v330 = 1.0 / v320, v331 = 1.0 / v314, v332 = 1.0 / v326, v333 = 1.0 / v313,
+            v334 = 1.0 / v319, v335 = 1.0 / v312, v336 = softehl_vexp(v25 * v324),
+            v337 = softehl_vexp(v25 * v325), v338 = softehl_vexp(v25 * v323),
+            v339 = softehl_vexp(v25 * v327), v340 = softehl_vexp(v25 * v328),
+            v341 = softehl_vexp(v25 * v329), v342 = v25 * v330, v343 = v25 * v331,
+            v344 = v25 * v332, v345 = v25 * v333, v346 = v25 * v334, v347 = v25 * v335,
+            v348 = v1 * v336, v349 = v1 * v337, v350 = v1 * v338, v351 = v1 * v339,
+            v352 = v1 * v340, v353 = v1 * v341, v354 = parameters[8] + v348,
+            v355 = parameters[8] + v349, v356 = parameters[8] + v350, v357 = parameters[8] + v351,
+            v358 = parameters[8] + v352, v359 = parameters[8] + v353, v360 = 1.0 / v354,
+            v361 = 1.0 / v355, v362 = 1.0 / v356, v363 = 1.0 / v357, v364 = 1.0 / (v354 * v354),
+            v365 = 1.0 / v358, v366 = 1.0 / (v355 * v355), v367 = 1.0 / (v356 * v356),
+            v368 = 1.0 / v359, v369 = 1.0 / (v357 * v357), v370 = 1.0 / (v358 * v358),
+            v371 = 1.0 / (v359 * v359), v372 = v360 * v360, v373 = 0.1803807865240693 * v301 * v372,
+            v374 = v361 * v361, v375 = v301 * v360, v376 = v302 * v361, v377 = v362 * v362,
+            v378 = v300 * v362, v379 = 0.23395696728634552 * v302 * v374,
+            v380 = 0.08566224618958518 * v300 * v377, v381 = v363 * v363, v382 = v305 * v363,
+            v383 = 0.08566224618958518 * v305 * v381, v384 = v365 * v365, v385 = v303 * v365,
+            v386 = 0.23395696728634552 * v303 * v384, v387 = v348 * v373, v388 = v349 * v379,
+            v389 = v350 * v380, v390 = v368 * v368, v391 = v304 * v368, v392 = v351 * v383,
+            v393 = 0.1803807865240693 * v304 * v390, v394 = v352 * v386, v395 = 1.0 + v306 * v367,
+            v396 = 1.0 + v308 * v364, v397 = softehl_vlog(v395), v398 = v353 * v393,
+            v399 = softehl_vlog(v396), v400 = 1.0 + v310 * v366,
+            v401 = 0.08566224618958518 * v363 - v316 * (v334 * (v25 * v392)),
+            v402 = 0.1803807865240693 * v360 - v309 * (v333 * (v25 * v387)),
+            v403 = 0.23395696728634552 * v361 - v311 * (v331 * (v25 * v388)),
+            v404 = softehl_vlog(v400),
+            v405 = 0.23395696728634552 * v365 - v318 * (v330 * (v25 * v394)),
+            v406 = 0.08566224618958518 * v362 - v307 * (v335 * (v25 * v389)),
+            v407 = 1.0 + v317 * v370,
+            v408 = 0.1803807865240693 * v368 - v322 * (v332 * (v25 * v398)),
+            v409 = softehl_vlog(v407), v410 = 1.0 + v321 * v371, v411 = 1.0 + v315 * v369,
+            v412 = softehl_vlog(v410), v413 = softehl_vlog(v411), v414 = softehl_vexp(v20 * v397),
+            v415 = softehl_vexp(v20 * v399), v416 = softehl_vexp(v20 * v404),
+            v417 = softehl_vexp(v20 * v409), v418 = softehl_vexp(v20 * v412),
+            v419 = softehl_vexp(v20 * v413), v420 = v1 * v414, v421 = v1 * v415, v422 = v1 * v416,
+            v423 = v1 * v417, v424 = v1 * v418, v425 = v1 * v419, v426 = parameters[8] + v420,
+            v427 = v378 * v420, v428 = v20 * v427 * (1.0 / v395), v429 = parameters[8] + v421,
+            v430 = v375 * v421, v431 = v20 * v430 * (1.0 / v396), v432 = parameters[8] + v422,
+            v433 = v376 * v422, v434 = v20 * v433 * (1.0 / v400), v435 = parameters[8] + v423,
+            v436 = v385 * v423, v437 = v20 * v436 * (1.0 / v407), v438 = parameters[8] + v424,
+            v439 = v391 * v424, v440 = v20 * v439 * (1.0 / v410), v441 = parameters[8] + v425,
+            v442 = v382 * v425, v443 = v20 * v442 * (1.0 / v411),
+            v444 = v367 * (v367 * (2.0 * v306 * v356)) * v428 + v300 * v377 * v426,
+            v445 = v350 * v444, v446 = v362 * v426 + v307 * (v367 * v428 - v347 * v445),
+            v447 = v364 * (v364 * (2.0 * v308 * v354)) * v431 + v301 * v372 * v429,
+            v448 = v348 * v447, v449 = v360 * v429 + v309 * (v364 * v431 - v345 * v448),
+            v450 = v366 * (v366 * (2.0 * v310 * v355)) * v434 + v302 * v374 * v432,
+            v451 = v349 * v450, v452 = v361 * v432 + v311 * (v366 * v434 - v343 * v451),
+            v453 = v370 * (v370 * (2.0 * v317 * v358)) * v437 + v303 * v384 * v435,
+            v454 = v352 * v453, v455 = v365 * v435 + v318 * (v370 * v437 - v342 * v454),
+            v456 = v371 * (v371 * (2.0 * v321 * v359)) * v440 + v304 * v390 * v438,
+            v457 = v353 * v456, v458 = v368 * v438 + v322 * (v371 * v440 - v344 * v457),
+            v459 = v369 * (v369 * (2.0 * v315 * v357)) * v443 + v305 * v381 * v441,
+            v460 = v351 * v459, v461 = v363 * v441 + v316 * (v369 * v443 - v346 * v460);
+        V v462[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v406, v402, v403, v405, v408, v401, softehl_splat((-1.0)), v446, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v449, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v452, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v455, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v458, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v461}, v462, &failed);
+        const V v463 = v277 * v277, v464 = 1.0 / v463, v465 = v273 * v274 * v464,
+            v466 = v269 * v14 + v270 * v15, v467 = v271 * v14 + v272 * v15,
+            v468 = 0.5 * (v466 + v467), v469 = v276 * v468,
+            v470 = v464 * (v274 * v466 + v273 * v467 - v465 * v469),
+            v471 = 0.1192694691878821 * v301, v472 = 0.05582662111236089 * v302,
+            v473 = 0.07987743308995329 * v300, v474 = 0.07987743308995329 * v305,
+            v475 = 0.05582662111236089 * v303, v476 = 0.1192694691878821 * v304, v477 = v397 * v427,
+            v478 = v399 * v430, v479 = v404 * v433, v480 = v409 * v436, v481 = v412 * v439,
+            v482 = v413 * v442, v483 = v268 * (t8 + p2 * v5), v484 = 1.0 / v278,
+            v485 = v21 * (v267 * v468 - v279 * v30), v486 = v465 * v465,
+            v487 = v44 * v483 + (v278 * v234 - v282 * (parameters[6] * v468 + v277 * t12)),
+            v488 = v280 * v487, v489 = v323 * v445, v490 = v324 * v448,
+            v491 = 0.932469514203152 * v485, v492 = 0.6612093864662645 * v485,
+            v493 = 0.2386191860831969 * v485, v494 = v325 * v451, v495 = v328 * v454,
+            v496 = v329 * v457,
+            v497 = v329 * v398 + (v328 * v394 + (v325 * v388 + (v324 * v387 + v323 * v389))),
+            v498 = v327 * v460, v499 = v327 * v392 + v497, v500 = v462[7], v501 = v462[8],
+            v502 = v462[9], v503 = v462[10], v504 = v462[11], v505 = v462[12], v506 = v462[13],
+            v507 = v462[14], v508 = v462[15], v509 = v462[16], v510 = v462[17], v511 = v462[18],
+            v512 = v462[19], v513 = v462[20], v514 = v462[21], v515 = v462[22], v516 = v462[23],
+            v517 = v462[24], v518 = v462[25], v519 = v462[26], v520 = v462[27], v521 = v462[28],
+            v522 = v462[29], v523 = v462[30], v524 = v462[31], v525 = v462[32], v526 = v462[33],
+            v527 = v462[34], v528 = v462[35], v529 = v462[36], v530 = v462[37], v531 = v462[38],
+            v532 = v462[39], v533 = v462[40], v534 = v462[41], v535 = v462[42], v536 = v462[43],
+            v537 = v462[44], v538 = v462[45], v539 = v462[46], v540 = v462[47], v541 = v462[48],
+            v542 = v17 * v463,
+            v543 = v492 * (v537 - v540) + (v491 * (v536 - v541) + v493 * (v538 - v539)),
+            v544 = v444 + (v378 * v414 - v378) - v338 * v444,
+            v545 = v450 + (v376 * v416 - v376 - v337 * v450),
+            v546 = v453 + (v385 * v417 - v385 - v340 * v453),
+            v547 = v447 + (v375 * v415 - v375) - v336 * v447,
+            v548 = v380 + (v379 + (v386 - v340 * v386) - v337 * v379 - v338 * v380) - v336 * v373,
+            v549 = v456 + (v391 * v418 - v391) - v341 * v456,
+            v550 = v459 + (v382 * v419 - v382) - v339 * v459,
+            v551 = v383 + (v393 + (v373 + v548) - v341 * v393 - v339 * v383),
+            v552 = v493 * (v524 - v525) + (v491 * (v522 - v527) + v492 * (v523 - v526)),
+            v553 = v493 * (v503 - v504) + (v491 * (v501 - v506) + v492 * (v502 - v505)),
+            v554 = v493 * (v510 - v511) + (v491 * (v508 - v513) + v492 * (v509 - v512)),
+            v555 = v493 * (v517 - v518) + (v491 * (v515 - v520) + v492 * (v516 - v519)),
+            v556 = v491 * (v529 - v534) + (v492 * (v530 - v533) + v493 * (v531 - v532)),
+            v557 = v494 * v531 + (v490 * v530 + (v489 * v529 + (v495 * v532 + v498 * v534))),
+            v558 = v501 * v544 + v502 * v547 + v505 * v549 + v504 * v546 + v503 * v545,
+            v559 = v494 * v538 + (v490 * v537 + (v489 * v536 + (v495 * v539 + v498 * v541))),
+            v560 = v494 * v510 + (v490 * v509 + (v489 * v508 + (v495 * v511 + v498 * v513))),
+            v561 = v479 * v510 + (v478 * v509 + (v477 * v508 + (v480 * v511 + v482 * v513))),
+            v562 = v508 * v544 + v511 * v546 + v513 * v550 + v509 * v547 + v510 * v545,
+            v563 = v479 * v531 + (v478 * v530 + (v477 * v529 + (v480 * v532 + v482 * v534))),
+            v564 = v479 * v538 + (v478 * v537 + (v477 * v536 + (v480 * v539 + v482 * v541))),
+            v565 = v532 * v546 + v534 * v550 + v529 * v544 + v530 * v547 + v531 * v545,
+            v566 = v539 * v546 + v541 * v550 + v536 * v544 + v537 * v547 + v538 * v545,
+            v567 = v481 * v505 + (v477 * v501 + (v479 * v503 + (v478 * v502 + v480 * v504))),
+            v568 = v496 * v505 + (v489 * v501 + (v494 * v503 + (v490 * v502 + v495 * v504))),
+            v569 = v481 * v519 + (v477 * v515 + (v479 * v517 + (v478 * v516 + v480 * v518))),
+            v570 = v498 * v520 + (v489 * v515 + (v494 * v517 + (v490 * v516 + v495 * v518))),
+            v571 = v515 * v544 + v518 * v546 + v516 * v547 + v517 * v545 + v520 * v550,
+            v572 = v556 + v528 * v488 + t14 * (v565 + v533 * v549 + v528 * v551) - v28 * (v481 * v533 + v563),
+            v573 = v554 + v507 * v488 + t14 * (v562 + v512 * v549 + v507 * v551) - v28 * (v481 * v512 + v561),
+            v574 = v543 + v535 * v488 + t14 * (v566 + v540 * v549 + v535 * v551) - v28 * (v481 * v540 + v564),
+            v575 = v482 * v527 + (v479 * v524 + (v478 * v523 + (v477 * v522 + v480 * v525))),
+            v576 = v498 * v527 + (v494 * v524 + (v490 * v523 + (v489 * v522 + v495 * v525))),
+            v577 = v525 * v546 + v522 * v544 + v523 * v547 + v524 * v545 + v527 * v550,
+            v578 = v553 + v500 * v488 + t14 * (v558 + v500 * v551 + v506 * v550) - v28 * (v482 * v506 + v567),
+            v579 = v572 + v31 * (v496 * v533 + v557 + v528 * v499),
+            v580 = v573 + v31 * (v496 * v512 + v560 + v507 * v499),
+            v581 = v574 + v31 * (v496 * v540 + v559 + v535 * v499),
+            v582 = v578 + v31 * (v498 * v506 + (v568 + v500 * v499)),
+            v583 = v471 * v372 * (t14 * (1.0 - v336) + v348 * (v31 * v324 + v309 * v345 * v580)),
+            v584 = v476 * v368 + (v474 * v363 + v475 * v365 - v473 * v362) - v471 * v360,
+            v585 = v473 * v377 * (t14 * (1.0 - v338) + v350 * (v31 * v323 + v307 * v347 * v582)),
+            v586 = v584 - v472 * v361,
+            v587 = v474 * v381 * (t14 * (1.0 - v339) + v351 * (v31 * v327 + v316 * v346 * v581)),
+            v588 = v555 - v28 * (v482 * v520 + v569) + v514 * v488 + t14 * (v571 + v519 * v549 + v514 * v551),
+            v589 = v552 - v28 * (v481 * v526 + v575) + v521 * v488 + t14 * (v577 + v526 * v549 + v521 * v551),
+            v590 = v476 * v390 * (t14 * (1.0 - v341) + v353 * (v31 * v329 + v322 * v344 * v579)),
+            v591 = (v486 * (v17 * v469 + v463 * v24) + v542 * (2.0 * v465) * v470) * v586,
+            v592 = v583 + v585 - v587 - v590 + 0.1192694691878821 * (v368 * v579 - v360 * v580),
+            v593 = v588 + v31 * (v496 * v519 + v570 + v514 * v499),
+            v594 = v589 + v31 * (v496 * v526 + v576 + v521 * v499),
+            v595 = v592 + 0.07987743308995329 * (v363 * v581 - v362 * v582) - v484 * v483 * v586,
+            v596 = v472 * v374 * (t14 * (1.0 - v337) + v349 * (v31 * v325 + v311 * v343 * v593)),
+            v597 = v475 * v384 * (t14 * (1.0 - v340) + v352 * (v31 * v328 + v318 * v342 * v594)),
+            v598 = v595 + 0.05582662111236089 * (v365 * v594 - v361 * v593) + v596 - v597,
+            v599 = v484 * (v591 + v542 * v486 * v598);
+        const M v600 = softehl_lt(softehl_splat(0.0), v44);
+        V v601 = softehl_splat(0.0), v602 = softehl_splat(0.0), v603 = softehl_splat(0.0),
+            v604 = softehl_splat(0.0);
+        const M m605 = v600;
+        if (softehl_any(m605)) {
+            const V v606 = v231 * v234; v601 = softehl_blend(m605, v606, v601);
+            v602 = softehl_blend(m605, softehl_splat(0.0), v602);
+            v603 = softehl_blend(m605, v44, v603);
+            v604 = softehl_blend(m605, softehl_splat(0.0), v604);
+        }
+        const M m607 = ~v600;
+        if (softehl_any(m607)) {
+            const V v608 = v230 * v234; v601 = softehl_blend(m607, softehl_splat(0.0), v601);
+            v602 = softehl_blend(m607, v608, v602);
+            v603 = softehl_blend(m607, softehl_splat(0.0), v603);
+            v604 = softehl_blend(m607, v44, v604);
+        }
+        const V v609 = 0.5 * (v230 * v604 + v231 * v603),
+            v610 = v465 * (v609 * v47 + v48 * (v602 + v601)) + (v45 * v609 * v470 + v599),
+            v611 = w[3] * v610;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
+            (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
+            R_lanes[4 + i] += D1 * v611;
+        }
+    }
+    const V v612 = -s35, v613 = -s36;
+    R_lanes[0] = s38; R_lanes[1] = v613; R_lanes[2] = s37; R_lanes[3] = v612;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, (4 + modes));
+    }
+}
+SOFTEHL_BATCH(softehl_film_conserving_carreau_pseudo_load, 4, (4 + modes), 2, 16, (4 + modes), 0)
+
+SOFTEHL_GROUP(softehl_film_conserving_carreau_fields_rate)
+{
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17, t18, t19;
+    softehl_load4(t + 0, (16 + (4 + modes)), &t0, &t1, &t2, &t3);
+    softehl_load4(t + 4, (16 + (4 + modes)), &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, (16 + (4 + modes)), &t8, &t9, &t10, &t11);
+    softehl_load4(t + 12, (16 + (4 + modes)), &t12, &t13, &t14, &t15);
+    softehl_load4(t + 16, (16 + (4 + modes)), &t16, &t17, &t18, &t19); (void)t10; (void)t11;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V t_lanes[(16 + (4 + modes))];
+#else
+    const V *const t_lanes = t;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(t_lanes, t, (16 + (4 + modes)));
+#endif
+    const double v1 = 1.0 - parameters[8];
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]),
+        v4 = a1 + d2 * parameters[9], v5 = a0 + d0 * parameters[9];
+    const double v6 = 1.0 / parameters[7];
+    const V v7 = 0.5 * (X2 + d2 - X0 - d0), v8 = t1 + t17 - t6, v9 = t3 + t19 - t6;
+    const double v10 = 0.5 * (parameters[7] - 1.0), v11 = 0.5 * parameters[6],
+        v12 = 1.0 / parameters[6], v13 = 6.0 * parameters[6];
+    const V v14 = t2 + t18, v15 = t5 + d2 * t15 + parameters[9] * t18,
+        v16 = t4 + d0 * t15 + parameters[9] * t16, v17 = 1.0 / v7, v18 = 0.5 * t12,
+        v19 = 1.0 / (parameters[6] * v7), v20 = 6.0 * t12;
+    const double v21 = v6 * v10;
+    const V v22 = 0.5 * t13, v23 = t0 + t16, v24 = v12 * t12, v25 = v6 * (v22 - v21 * t13),
+        v26 = 0.5 * (v14 - t16 - t0), v27 = v17 * v26, v28 = v19 * (v7 * t12 + parameters[6] * v26);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 4 * q; (void)w;
+        const double *restrict B = basis + 8 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
+        V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0), tp4 = softehl_splat(0.0), tp5 = softehl_splat(0.0), tp6 = softehl_splat(0.0), tp7 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            tp0 += B[8 * i] * t_lanes[20 + i]; tp1 += B[8 * i + 1] * t_lanes[20 + i];
+            tp2 += B[8 * i + 2] * t_lanes[20 + i]; tp3 += B[8 * i + 3] * t_lanes[20 + i];
+            tp4 += B[8 * i + 4] * t_lanes[20 + i]; tp5 += B[8 * i + 5] * t_lanes[20 + i];
+            tp6 += B[8 * i + 6] * t_lanes[20 + i]; tp7 += B[8 * i + 7] * t_lanes[20 + i];
+        }
+        (void)tp0, (void)tp1, (void)tp2, (void)tp3, (void)tp4, (void)tp5, (void)tp6, (void)tp7;
+        const double v29 = 0.5 * w[0];
+        const V v30 = softehl_vexp(p0 * parameters[3]), v31 = p1 * v17;
+        const double v32 = 0.5 + v29, v33 = 0.5 - v29;
+        const V v34 = w[3] * v26, v35 = parameters[1] - v32 * v4 - v33 * v5,
+            v36 = v33 * v2 + v32 * v3, v37 = v32 * v14 + v33 * v23, v38 = v33 * v8 + v32 * v9,
+            v39 = 0.5 * v36, v40 = v39 * v31, v41 = 1.0 / (parameters[6] * v36),
+            v42 = parameters[2] * v30, v43 = v41 * (v42 * v35), v44 = v12 * v40,
+            v45 = softehl_vlog(1.0 + v43 * v43), v46 = softehl_vexp(v10 * v45),
+            v47 = v43 * (parameters[8] + v1 * v46), v48 = 0.932469514203152 * v44,
+            v49 = 0.6612093864662645 * v44, v50 = 0.2386191860831969 * v44, v51 = v47 + v48,
+            v52 = v47 + v49, v53 = v47 + v50, v54 = v47 - v50, v55 = v47 - v49, v56 = v47 - v48;
+        V v57[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v10), softehl_splat(v1), softehl_splat(v21), v43, v48, v49, v50, v47, v51, v52, v53, v54, v55, v56}, v57, &failed);
+        const V v58 = v57[1], v59 = v57[2], v60 = v57[3], v61 = v57[4], v62 = v57[5], v63 = v57[6],
+            v64 = v58 * v58, v65 = v59 * v59, v66 = v60 * v60, v67 = v61 * v61, v68 = v62 * v62,
+            v69 = v63 * v63, v70 = 1.0 + v64, v71 = 1.0 + v65, v72 = 1.0 + v66, v73 = 1.0 + v67,
+            v74 = 1.0 + v68, v75 = 1.0 + v69, v76 = softehl_vlog(v70), v77 = softehl_vlog(v71),
+            v78 = softehl_vlog(v72), v79 = softehl_vlog(v73), v80 = softehl_vlog(v74),
+            v81 = softehl_vlog(v75), v82 = 2.0 * v61, v83 = 2.0 * v60, v84 = 2.0 * v62,
+            v85 = 2.0 * v59, v86 = 2.0 * v63, v87 = 2.0 * v58, v88 = softehl_vexp(v21 * v76),
+            v89 = softehl_vexp(v21 * v81), v90 = softehl_vexp(v21 * v77),
+            v91 = softehl_vexp(v21 * v80), v92 = softehl_vexp(v21 * v78),
+            v93 = softehl_vexp(v21 * v79), v94 = v21 * (1.0 / v73), v95 = v21 * (1.0 / v72),
+            v96 = v21 * (1.0 / v74), v97 = v21 * (1.0 / v71), v98 = v21 * (1.0 / v75),
+            v99 = v21 * (1.0 / v70), v100 = v85 * v97, v101 = v82 * v94, v102 = v83 * v95,
+            v103 = v86 * v98, v104 = v84 * v96, v105 = v87 * v99, v106 = v1 * v88, v107 = v1 * v89,
+            v108 = v1 * v90, v109 = v1 * v91, v110 = v1 * v92, v111 = v1 * v93,
+            v112 = parameters[8] + v106, v113 = parameters[8] + v107, v114 = parameters[8] + v108,
+            v115 = parameters[8] + v109, v116 = parameters[8] + v110, v117 = parameters[8] + v111,
+            v118 = 1.0 / v112, v119 = 1.0 / v113, v120 = 1.0 / v114, v121 = 1.0 / v115,
+            v122 = 1.0 / (v112 * v112), v123 = 1.0 / (v113 * v113), v124 = 1.0 / v116,
+            v125 = 1.0 / (v114 * v114), v126 = 1.0 / (v115 * v115), v127 = 1.0 / v117,
+            v128 = 1.0 / (v116 * v116), v129 = 1.0 / (v117 * v117), v130 = v63 * v119,
+            v131 = v119 * v119, v132 = v118 * v118, v133 = v58 * v118, v134 = v59 * v120,
+            v135 = v120 * v120, v136 = v135 * (0.1803807865240693 * v59),
+            v137 = v132 * (0.08566224618958518 * v58), v138 = v131 * (0.08566224618958518 * v63),
+            v139 = v62 * v121, v140 = v121 * v121, v141 = v60 * v124, v142 = v124 * v124,
+            v143 = v140 * (0.1803807865240693 * v62), v144 = v106 * v137, v145 = v107 * v138,
+            v146 = v108 * v136, v147 = v142 * (0.23395696728634552 * v60),
+            v148 = 0.08566224618958518 * v118 - v105 * v144,
+            v149 = 0.08566224618958518 * v119 - v103 * v145, v150 = v109 * v143,
+            v151 = 0.1803807865240693 * v120 - v100 * v146, v152 = v127 * v127, v153 = v61 * v127,
+            v154 = v110 * v147, v155 = v152 * (0.23395696728634552 * v61),
+            v156 = 0.1803807865240693 * v121 - v104 * v150, v157 = 1.0 + v64 * v122,
+            v158 = 0.23395696728634552 * v124 - v102 * v154, v159 = softehl_vlog(v157),
+            v160 = 1.0 + v65 * v125, v161 = 1.0 + v66 * v128, v162 = v111 * v155,
+            v163 = softehl_vlog(v160), v164 = softehl_vlog(v161), v165 = 1.0 + v67 * v129,
+            v166 = 1.0 + v68 * v126, v167 = softehl_vlog(v165), v168 = softehl_vlog(v166),
+            v169 = 0.23395696728634552 * v127 - v101 * v162, v170 = 1.0 + v69 * v123,
+            v171 = softehl_vlog(v170), v172 = softehl_vexp(v10 * v159),
+            v173 = softehl_vexp(v10 * v163), v174 = softehl_vexp(v10 * v164),
+            v175 = softehl_vexp(v10 * v167), v176 = softehl_vexp(v10 * v168),
+            v177 = softehl_vexp(v10 * v171), v178 = v1 * v174, v179 = v1 * v176, v180 = v1 * v177,
+            v181 = parameters[8] + v178, v182 = v178 * v141, v183 = v182 * (v10 * (1.0 / v161)),
+            v184 = parameters[8] + v179, v185 = v179 * v139, v186 = v185 * (v10 * (1.0 / v166)),
+            v187 = parameters[8] + v180, v188 = v180 * v130, v189 = v188 * (v10 * (1.0 / v170)),
+            v190 = v1 * v172, v191 = parameters[8] + v190, v192 = v190 * v133,
+            v193 = v192 * (v10 * (1.0 / v157)), v194 = v1 * v173, v195 = v1 * v175,
+            v196 = parameters[8] + v194, v197 = v194 * v134, v198 = v197 * (v10 * (1.0 / v160)),
+            v199 = parameters[8] + v195, v200 = v195 * v153, v201 = v200 * (v10 * (1.0 / v165)),
+            v202 = v58 * v132 * v191 + v122 * (v122 * (2.0 * v64 * v112)) * v193,
+            v203 = v106 * v202, v204 = v118 * v191 + v87 * (v122 * v193 - v99 * v203),
+            v205 = v59 * v135 * v196 + v125 * (v125 * (2.0 * v65 * v114)) * v198,
+            v206 = v108 * v205, v207 = v120 * v196 + v85 * (v125 * v198 - v97 * v206),
+            v208 = v60 * v142 * v181 + v128 * (v128 * (2.0 * v66 * v116)) * v183,
+            v209 = v110 * v208, v210 = v124 * v181 + v83 * (v128 * v183 - v95 * v209),
+            v211 = v61 * v152 * v199 + v129 * (v129 * (2.0 * v67 * v117)) * v201,
+            v212 = v111 * v211, v213 = v127 * v199 + v82 * (v129 * v201 - v94 * v212),
+            v214 = v62 * v140 * v184 + v126 * (v126 * (2.0 * v68 * v115)) * v186,
+            v215 = v109 * v214, v216 = v121 * v184 + v84 * (v126 * v186 - v96 * v215),
+            v217 = v63 * v131 * v187 + v123 * (v123 * (2.0 * v69 * v113)) * v189,
+            v218 = v107 * v217, v219 = v119 * v187 + v86 * (v123 * v189 - v98 * v218);
+        V v220[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v148, v151, v158, v169, v156, v149, softehl_splat((-1.0)), v204, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v207, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v210, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v213, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v216, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v219}, v220, &failed);
+        const V v221 = v57[0], v222 = v159 * v192, v223 = v163 * v197, v224 = v164 * v182,
+            v225 = 1.0 - p6, v226 = 1.0 - p4, v227 = v167 * v200, v228 = v168 * v185,
+            v229 = v171 * v188, v230 = parameters[6] * v221;
+        const M v231 = softehl_lt(softehl_splat(0.0), v230);
+        const V v232 = t7 - v32 * v15 - v33 * v16,
+            v233 = v30 * t8 + v42 * (p0 * t9 + parameters[3] * tp0), v234 = v76 * v203,
+            v235 = v77 * v206,
+            v236 = v42 * v232 + v35 * v233 - v43 * (v36 * t12 + parameters[6] * v38),
+            v237 = v39 * (v17 * (tp1 - p1 * v27)) + 0.5 * v31 * v38, v238 = v78 * v209,
+            v239 = v41 * v236, v240 = v79 * v212, v241 = v80 * v215,
+            v242 = v80 * v150 + (v79 * v162 + (v78 * v154 + (v77 * v146 + v76 * v144))),
+            v243 = v81 * v218, v244 = v81 * v145 + v242, v245 = v220[0], v246 = v220[1],
+            v247 = v220[2], v248 = v220[3], v249 = v220[4], v250 = v220[5], v251 = v220[6],
+            v252 = v12 * (v237 - v40 * v24),
+            v253 = v136 + (v143 + (v147 + (v155 - v93 * v155) - v92 * v147) - v91 * v143),
+            v254 = 0.932469514203152 * v252, v255 = 0.6612093864662645 * v252,
+            v256 = 0.2386191860831969 * v252,
+            v257 = (v248 - v249) * v256 + ((v247 - v250) * v255 + (v245 * v239 + (v246 - v251) * v254)),
+            v258 = v240 * v249 + (v235 * v247 + (v234 * v246 + (v241 * v250 + v245 * v244))),
+            v259 = v229 * v251 + (v228 * v250 + (v227 * v249 + (v222 * v246 + v223 * v247))),
+            v260 = v202 + (v172 * v133 - v133) - v88 * v202,
+            v261 = v205 + (v173 * v134 - v134 - v90 * v205),
+            v262 = v137 + (v138 + (v253 - v90 * v136) - v89 * v138 - v88 * v137),
+            v263 = v257 + v25 * (v238 * v248 + (v243 * v251 + v258)) - v22 * (v224 * v248 + v259),
+            v264 = v208 + (v174 * v141 - v141) - v92 * v208,
+            v265 = v211 + (v175 * v153 - v153) - v93 * v211,
+            v266 = v217 + (v177 * v130 - v130 - v89 * v217),
+            v267 = v214 + (v176 * v139 - v139) - v91 * v214,
+            v268 = v249 * v265 + (v248 * v264 + (v246 * v260 + v247 * v261 + v245 * v262)),
+            v269 = parameters[6] * (v263 + t14 * (v251 * v266 + (v268 + v250 * v267))),
+            v270 = v221 * t12 + v269;
+        V v271 = softehl_splat(0.0), v272 = softehl_splat(0.0);
+        const M m273 = v231;
+        if (softehl_any(m273)) {
+            const V v274 = v226 * v270 - v230 * tp4; v271 = softehl_blend(m273, v274, v271);
+            v272 = softehl_blend(m273, softehl_splat(0.0), v272);
+        }
+        const M m275 = ~v231;
+        if (softehl_any(m275)) {
+            const V v276 = v225 * v270 - v230 * tp6;
+            v271 = softehl_blend(m275, softehl_splat(0.0), v271);
+            v272 = softehl_blend(m275, v276, v272);
+        }
+        const double v277 = 0.5 * w[1], v278 = 0.5 * w[2];
+        const V v279 = softehl_vexp(p2 * parameters[3]);
+        const double v280 = 0.5 - v277, v281 = 0.5 + v277, v282 = 0.5 - v278, v283 = 0.5 + v278;
+        const V v284 = v272 + v271, v285 = v280 * v2 + v281 * v3, v286 = v282 * v2 + v283 * v3,
+            v287 = v285 + v286, v288 = parameters[2] * v279, v289 = v284 - v237, v290 = 0.5 * v287,
+            v291 = 0.25 * v287, v292 = 1.0 / (parameters[6] * v290), v293 = v292 * (v288 * v35),
+            v294 = p3 * v291, v295 = v19 * v294, v296 = softehl_vlog(1.0 + v293 * v293),
+            v297 = softehl_vexp(v10 * v296), v298 = v293 * (parameters[8] + v1 * v297),
+            v299 = 0.932469514203152 * v295, v300 = 0.6612093864662645 * v295,
+            v301 = 0.2386191860831969 * v295, v302 = v298 + v299, v303 = v298 + v300,
+            v304 = v298 + v301, v305 = v298 - v301, v306 = v298 - v300, v307 = v298 - v299;
+        V v308[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v293, softehl_splat(v10), softehl_splat(v1), softehl_splat(v21), v299, v300, v301, v298, v302, v303, v304, v305, v306, v307}, v308, &failed);
+        const V v309 = v308[1], v310 = v308[2], v311 = v308[3], v312 = v308[4], v313 = v308[5],
+            v314 = v308[6], v315 = v309 * v309, v316 = v310 * v310, v317 = v311 * v311,
+            v318 = v312 * v312, v319 = v313 * v313, v320 = v314 * v314, v321 = 1.0 + v315,
+            v322 = 1.0 + v316, v323 = 1.0 + v317, v324 = 1.0 + v318, v325 = 1.0 + v319,
+            v326 = 1.0 + v320, v327 = softehl_vlog(v321), v328 = softehl_vlog(v322),
+            v329 = softehl_vlog(v323), v330 = softehl_vlog(v324), v331 = softehl_vlog(v325),
+            v332 = softehl_vlog(v326), v333 = 2.0 * v312, v334 = 2.0 * v311, v335 = 2.0 * v313,
+            v336 = 2.0 * v310, v337 = 2.0 * v314, v338 = 2.0 * v309,
+            v339 = softehl_vexp(v21 * v328), v340 = softehl_vexp(v21 * v329),
+            v341 = softehl_vexp(v21 * v327), v342 = softehl_vexp(v21 * v332),
+            v343 = softehl_vexp(v21 * v330), v344 = softehl_vexp(v21 * v331),
+            v345 = v21 * (1.0 / v324), v346 = v21 * (1.0 / v323), v347 = v21 * (1.0 / v325),
+            v348 = v21 * (1.0 / v322), v349 = v21 * (1.0 / v326), v350 = v21 * (1.0 / v321),
+            v351 = v336 * v348, v352 = v338 * v350, v353 = v333 * v345, v354 = v334 * v346,
+            v355 = v337 * v349, v356 = v335 * v347, v357 = v1 * v339, v358 = v1 * v340,
+            v359 = v1 * v341, v360 = v1 * v342, v361 = v1 * v343, v362 = v1 * v344,
+            v363 = parameters[8] + v357, v364 = parameters[8] + v358, v365 = parameters[8] + v359,
+            v366 = parameters[8] + v360, v367 = parameters[8] + v361, v368 = parameters[8] + v362,
+            v369 = 1.0 / v363, v370 = 1.0 / v364, v371 = 1.0 / v365, v372 = 1.0 / v366,
+            v373 = 1.0 / (v363 * v363), v374 = 1.0 / (v364 * v364), v375 = 1.0 / (v365 * v365),
+            v376 = 1.0 / v367, v377 = 1.0 / (v366 * v366), v378 = 1.0 / v368,
+            v379 = 1.0 / (v367 * v367), v380 = 1.0 / (v368 * v368), v381 = v310 * v369,
+            v382 = v369 * v369, v383 = v311 * v370, v384 = v370 * v370,
+            v385 = v382 * (0.1803807865240693 * v310), v386 = v384 * (0.23395696728634552 * v311),
+            v387 = v314 * v372, v388 = v372 * v372, v389 = v388 * (0.08566224618958518 * v314),
+            v390 = v371 * v371, v391 = v309 * v371, v392 = v312 * v376, v393 = v376 * v376,
+            v394 = v390 * (0.08566224618958518 * v309), v395 = v393 * (0.23395696728634552 * v312),
+            v396 = v357 * v385, v397 = v358 * v386, v398 = v360 * v389,
+            v399 = 0.1803807865240693 * v369 - v351 * v396, v400 = v359 * v394,
+            v401 = 0.23395696728634552 * v370 - v354 * v397, v402 = v378 * v378, v403 = v313 * v378,
+            v404 = 0.08566224618958518 * v372 - v355 * v398, v405 = v361 * v395,
+            v406 = v402 * (0.1803807865240693 * v313),
+            v407 = 0.08566224618958518 * v371 - v352 * v400, v408 = 1.0 + v315 * v375,
+            v409 = 0.23395696728634552 * v376 - v353 * v405, v410 = softehl_vlog(v408),
+            v411 = 1.0 + v316 * v373, v412 = v362 * v406, v413 = softehl_vlog(v411),
+            v414 = 1.0 + v317 * v374, v415 = 1.0 + v318 * v379, v416 = softehl_vlog(v414),
+            v417 = softehl_vlog(v415), v418 = 1.0 + v319 * v380,
+            v419 = 0.1803807865240693 * v378 - v356 * v412, v420 = softehl_vlog(v418),
+            v421 = 1.0 + v320 * v377, v422 = softehl_vlog(v421), v423 = softehl_vexp(v10 * v410),
+            v424 = softehl_vexp(v10 * v413), v425 = softehl_vexp(v10 * v416),
+            v426 = softehl_vexp(v10 * v417), v427 = softehl_vexp(v10 * v420),
+            v428 = softehl_vexp(v10 * v422), v429 = v1 * v425, v430 = v1 * v427, v431 = v1 * v428,
+            v432 = parameters[8] + v429, v433 = v429 * v383, v434 = v433 * (v10 * (1.0 / v414)),
+            v435 = parameters[8] + v430, v436 = v430 * v403, v437 = v436 * (v10 * (1.0 / v418)),
+            v438 = parameters[8] + v431, v439 = v431 * v387, v440 = v439 * (v10 * (1.0 / v421)),
+            v441 = v1 * v423, v442 = parameters[8] + v441, v443 = v441 * v391,
+            v444 = v443 * (v10 * (1.0 / v408)), v445 = v1 * v424, v446 = v1 * v426,
+            v447 = parameters[8] + v445, v448 = v445 * v381, v449 = v448 * (v10 * (1.0 / v411)),
+            v450 = parameters[8] + v446, v451 = v446 * v392, v452 = v451 * (v10 * (1.0 / v415)),
+            v453 = v309 * v390 * v442 + v375 * (v375 * (2.0 * v315 * v365)) * v444,
+            v454 = v359 * v453, v455 = v371 * v442 + v338 * (v375 * v444 - v350 * v454),
+            v456 = v310 * v382 * v447 + v373 * (v373 * (2.0 * v316 * v363)) * v449,
+            v457 = v357 * v456, v458 = v369 * v447 + v336 * (v373 * v449 - v348 * v457),
+            v459 = v311 * v384 * v432 + v374 * (v374 * (2.0 * v317 * v364)) * v434,
+            v460 = v358 * v459, v461 = v370 * v432 + v334 * (v374 * v434 - v346 * v460),
+            v462 = v312 * v393 * v450 + v379 * (v379 * (2.0 * v318 * v367)) * v452,
+            v463 = v361 * v462, v464 = v376 * v450 + v333 * (v379 * v452 - v345 * v463),
+            v465 = v313 * v402 * v435 + v380 * (v380 * (2.0 * v319 * v368)) * v437,
+            v466 = v362 * v465, v467 = v378 * v435 + v335 * (v380 * v437 - v347 * v466),
+            v468 = v314 * v388 * v438 + v377 * (v377 * (2.0 * v320 * v366)) * v440,
+            v469 = v360 * v468, v470 = v372 * v438 + v337 * (v377 * v440 - v349 * v469);
+        V v471[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v407, v399, v401, v409, v419, v404, softehl_splat((-1.0)), v455, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v458, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v461, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v464, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v467, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v470}, v471, &failed);
+        const V v472 = v290 * v290, v473 = 1.0 / v472, v474 = v285 * v286 * v473,
+            v475 = v280 * v8 + v281 * v9, v476 = v282 * v8 + v283 * v9, v477 = 0.5 * (v475 + v476),
+            v478 = v287 * v477, v479 = v473 * (v286 * v475 + v285 * v476 - v474 * v478),
+            v480 = 0.1192694691878821 * v310, v481 = 0.05582662111236089 * v311,
+            v482 = 0.07987743308995329 * v309, v483 = 0.07987743308995329 * v314,
+            v484 = 0.05582662111236089 * v312, v485 = 0.1192694691878821 * v313, v486 = v410 * v443,
+            v487 = v413 * v448, v488 = v416 * v433, v489 = v417 * v451, v490 = v420 * v436,
+            v491 = v422 * v439, v492 = v279 * t8 + v288 * (p2 * t9 + parameters[3] * tp2),
+            v493 = 1.0 / v288, v494 = v19 * (0.5 * p3 * v477 + (v291 * tp3 - v294 * v28)),
+            v495 = v474 * v474, v496 = v327 * v454, v497 = v328 * v457,
+            v498 = v35 * v492 + (v288 * v232 - v293 * (v290 * t12 + parameters[6] * v477)),
+            v499 = v292 * v498, v500 = 0.932469514203152 * v494, v501 = 0.6612093864662645 * v494,
+            v502 = 0.2386191860831969 * v494, v503 = v329 * v460, v504 = v330 * v463,
+            v505 = v331 * v466,
+            v506 = v331 * v412 + (v330 * v405 + (v329 * v397 + (v328 * v396 + v327 * v400))),
+            v507 = v332 * v469, v508 = v332 * v398 + v506, v509 = v471[7], v510 = v471[8],
+            v511 = v471[9], v512 = v471[10], v513 = v471[11], v514 = v471[12], v515 = v471[13],
+            v516 = v471[14], v517 = v471[15], v518 = v471[16], v519 = v471[17], v520 = v471[18],
+            v521 = v471[19], v522 = v471[20], v523 = v471[21], v524 = v471[22], v525 = v471[23],
+            v526 = v471[24], v527 = v471[25], v528 = v471[26], v529 = v471[27], v530 = v471[28],
+            v531 = v471[29], v532 = v471[30], v533 = v471[31], v534 = v471[32], v535 = v471[33],
+            v536 = v471[34], v537 = v471[35], v538 = v471[36], v539 = v471[37], v540 = v471[38],
+            v541 = v471[39], v542 = v471[40], v543 = v471[41], v544 = v471[42], v545 = v471[43],
+            v546 = v471[44], v547 = v471[45], v548 = v471[46], v549 = v471[47], v550 = v471[48],
+            v551 = v11 * v472, v552 = v459 + (v425 * v383 - v383 - v340 * v459),
+            v553 = v453 + (v423 * v391 - v391) - v341 * v453,
+            v554 = v462 + (v426 * v392 - v392 - v343 * v462),
+            v555 = v456 + (v424 * v381 - v381) - v339 * v456,
+            v556 = v394 + (v386 + (v395 - v343 * v395) - v340 * v386 - v341 * v394) - v339 * v385,
+            v557 = v465 + (v427 * v403 - v403) - v344 * v465,
+            v558 = v468 + (v428 * v387 - v387) - v342 * v468,
+            v559 = v389 + (v406 + (v385 + v556) - v344 * v406) - v342 * v389,
+            v560 = (v531 - v536) * v500 + (v533 - v534) * v502 + (v532 - v535) * v501,
+            v561 = (v510 - v515) * v500 + (v512 - v513) * v502 + (v511 - v514) * v501,
+            v562 = (v517 - v522) * v500 + (v519 - v520) * v502 + (v518 - v521) * v501,
+            v563 = (v524 - v529) * v500 + (v526 - v527) * v502 + (v525 - v528) * v501,
+            v564 = (v545 - v550) * v500 + (v547 - v548) * v502 + (v546 - v549) * v501,
+            v565 = (v540 - v541) * v502 + (v539 - v542) * v501 + (v538 - v543) * v500,
+            v566 = v503 * v540 + (v497 * v539 + (v496 * v538 + v507 * v543) + v537 * v508),
+            v567 = v538 * v553 + v543 * v558 + v539 * v555 + v537 * v559 + v540 * v552,
+            v568 = v545 * v553 + v550 * v558 + v546 * v555 + v544 * v559 + v547 * v552,
+            v569 = v503 * v547 + (v497 * v546 + (v496 * v545 + v507 * v550) + v544 * v508),
+            v570 = v484 * v376 + (v483 * v372 - v480 * v369 - v481 * v370 - v482 * v371),
+            v571 = v485 * v378 + v570,
+            v572 = v489 * v541 + (v488 * v540 + (v487 * v539 + (v486 * v538 + v491 * v543))),
+            v573 = v489 * v548 + (v488 * v547 + (v487 * v546 + (v486 * v545 + v491 * v550))),
+            v574 = (v495 * (v472 * v18 + v11 * v478) + v551 * (2.0 * v474) * v479) * v571,
+            v575 = v565 + v537 * v499 - v22 * (v490 * v542 + v572) + v25 * (v505 * v542 + (v504 * v541 + v566)),
+            v576 = v564 + v544 * v499 - v22 * (v490 * v549 + v573) + v25 * (v505 * v549 + (v504 * v548 + v569)),
+            v577 = v575 + t14 * (v567 + v541 * v554 + v542 * v557),
+            v578 = v576 + t14 * (v568 + v548 * v554 + v549 * v557),
+            v579 = v518 * v555 + v517 * v553 + v520 * v554 + v521 * v557 + v519 * v552,
+            v580 = v488 * v519 + (v487 * v518 + (v490 * v521 + (v486 * v517 + v489 * v520))),
+            v581 = v503 * v519 + (v497 * v518 + (v505 * v521 + (v496 * v517 + v504 * v520))),
+            v582 = v510 * v553 + v511 * v555 + v514 * v557 + v513 * v554 + v512 * v552,
+            v583 = v491 * v515 + (v488 * v512 + (v487 * v511 + (v486 * v510 + v489 * v513))),
+            v584 = v507 * v515 + (v503 * v512 + (v497 * v511 + (v496 * v510 + v504 * v513))),
+            v585 = v562 - v22 * (v491 * v522 + v580) + v516 * v499 + v25 * (v507 * v522 + v581 + v516 * v508),
+            v586 = v585 + t14 * (v579 + v522 * v558 + v516 * v559),
+            v587 = v561 + v509 * v499 + v25 * (v505 * v514 + (v584 + v509 * v508)) + t14 * (v582 + v515 * v558 + v509 * v559),
+            v588 = v587 - v22 * (v490 * v514 + v583),
+            v589 = v525 * v555 + v527 * v554 + v524 * v553 + v528 * v557 + v523 * v559,
+            v590 = v532 * v555 + v531 * v553 + v534 * v554 + v535 * v557 + v530 * v559,
+            v591 = v497 * v525 + (v505 * v528 + (v496 * v524 + v504 * v527) + v523 * v508),
+            v592 = v497 * v532 + (v505 * v535 + (v496 * v531 + v504 * v534) + v530 * v508),
+            v593 = v480 * v382 * (t14 * (1.0 - v339) + v357 * (v328 * v25 + v351 * v586)),
+            v594 = v488 * v526 + (v487 * v525 + (v490 * v528 + (v486 * v524 + v489 * v527))),
+            v595 = v488 * v533 + (v487 * v532 + (v490 * v535 + (v486 * v531 + v489 * v534))),
+            v596 = v482 * v390 * (t14 * (1.0 - v341) + v359 * (v327 * v25 + v352 * v588)),
+            v597 = 0.1192694691878821 * (v378 * v577 - v369 * v586) + v593 + v596 + 0.07987743308995329 * (v372 * v578 - v371 * v588),
+            v598 = v483 * v388 * (t14 * (1.0 - v342) + v360 * (v332 * v25 + v355 * v578)),
+            v599 = v563 + v523 * v499 + t14 * (v589 + v526 * v552 + v529 * v558) - v22 * (v491 * v529 + v594),
+            v600 = v560 + v530 * v499 + t14 * (v590 + v533 * v552 + v536 * v558) - v22 * (v491 * v536 + v595),
+            v601 = v599 + v25 * (v507 * v529 + (v503 * v526 + v591)),
+            v602 = v600 + v25 * (v507 * v536 + (v503 * v533 + v592)),
+            v603 = v485 * v402 * (t14 * (1.0 - v344) + v362 * (v331 * v25 + v356 * v577)),
+            v604 = v597 - v598 - v603 - v492 * (v493 * v571) + 0.05582662111236089 * (v376 * v602 - v370 * v601),
+            v605 = v481 * v384 * (t14 * (1.0 - v340) + v358 * (v329 * v25 + v354 * v601)),
+            v606 = v484 * v393 * (t14 * (1.0 - v343) + v361 * (v330 * v25 + v353 * v602)),
+            v607 = v493 * (v574 + v551 * v495 * (v604 + v605 - v606));
+        const M v608 = softehl_lt(softehl_splat(0.0), v35);
+        V v609 = softehl_splat(0.0), v610 = softehl_splat(0.0), v611 = softehl_splat(0.0),
+            v612 = softehl_splat(0.0);
+        const M m613 = v608;
+        if (softehl_any(m613)) {
+            const V v614 = v226 * v232 - v35 * tp4; v609 = softehl_blend(m613, v614, v609);
+            v610 = softehl_blend(m613, softehl_splat(0.0), v610);
+            v611 = softehl_blend(m613, v35, v611);
+            v612 = softehl_blend(m613, softehl_splat(0.0), v612);
+        }
+        const M m615 = ~v608;
+        if (softehl_any(m615)) {
+            const V v616 = v225 * v232 - v35 * tp6;
+            v609 = softehl_blend(m615, softehl_splat(0.0), v609);
+            v610 = softehl_blend(m615, v616, v610);
+            v611 = softehl_blend(m615, softehl_splat(0.0), v611);
+            v612 = softehl_blend(m615, v35, v612);
+        }
+        const V v617 = 0.5 * (v225 * v612 + v226 * v611),
+            v618 = v474 * (v617 * v38 + v39 * (v610 + v609)) + (v36 * v617 * v479 + v607),
+            v619 = v237 + v284, v620 = 1.0 / v36, v621 = 0.1192694691878821 * v59,
+            v622 = 0.05582662111236089 * v60, v623 = 0.07987743308995329 * v58,
+            v624 = 0.07987743308995329 * v63, v625 = 0.05582662111236089 * v61,
+            v626 = 0.1192694691878821 * v62, v627 = v220[7], v628 = v220[8], v629 = v220[9],
+            v630 = v220[10], v631 = v220[11], v632 = v220[12], v633 = v220[13], v634 = v220[14],
+            v635 = v220[15], v636 = v220[16], v637 = v220[17], v638 = v220[18], v639 = v220[19],
+            v640 = v220[20], v641 = v220[21], v642 = v220[22], v643 = v220[23], v644 = v220[24],
+            v645 = v220[25], v646 = v220[26], v647 = v220[27], v648 = v220[28], v649 = v220[29],
+            v650 = v220[30], v651 = v220[31], v652 = v220[32], v653 = v220[33], v654 = v220[34],
+            v655 = v220[35], v656 = v220[36], v657 = v220[37], v658 = v220[38], v659 = v220[39],
+            v660 = v220[40], v661 = v220[41], v662 = v220[42], v663 = v220[43], v664 = v220[44],
+            v665 = v220[45], v666 = v220[46], v667 = v220[47], v668 = v220[48],
+            v669 = v256 * (v651 - v652) + (v254 * (v649 - v654) + v255 * (v650 - v653)),
+            v670 = v256 * (v637 - v638) + (v254 * (v635 - v640) + v255 * (v636 - v639)),
+            v671 = v256 * (v644 - v645) + (v254 * (v642 - v647) + v255 * (v643 - v646)),
+            v672 = v254 * (v656 - v661) + (v255 * (v657 - v660) + v256 * (v658 - v659)),
+            v673 = v254 * (v628 - v633) + (v255 * (v629 - v632) + v256 * (v630 - v631)),
+            v674 = v254 * (v663 - v668) + (v255 * (v664 - v667) + v256 * (v665 - v666)),
+            v675 = v244 * v655 + (v234 * v656 + (v243 * v661 + (v240 * v659 + v241 * v660))),
+            v676 = v262 * v655 + (v260 * v656 + (v266 * v661 + (v265 * v659 + v267 * v660))),
+            v677 = v244 * v662 + (v234 * v663 + (v243 * v668 + (v240 * v666 + v241 * v667))),
+            v678 = v262 * v662 + (v260 * v663 + (v266 * v668 + (v265 * v666 + v267 * v667))),
+            v679 = v127 * v625 + (v119 * v624 - v118 * v623 - v120 * v621 - v124 * v622),
+            v680 = v121 * v626 + v679,
+            v681 = v223 * v664 + (v222 * v663 + (v229 * v668 + (v227 * v666 + v228 * v667))),
+            v682 = v223 * v657 + (v222 * v656 + (v229 * v661 + (v227 * v659 + v228 * v660))),
+            v683 = v239 * v655 + v672 + v25 * (v238 * v658 + (v235 * v657 + v675)) - v22 * (v224 * v658 + v682),
+            v684 = v239 * v662 + v674 + v25 * (v238 * v665 + (v235 * v664 + v677)) - v22 * (v224 * v665 + v681),
+            v685 = v683 + t14 * (v264 * v658 + (v261 * v657 + v676)),
+            v686 = v684 + t14 * (v264 * v665 + (v261 * v664 + v678)),
+            v687 = v234 * v628 + (v238 * v630 + (v235 * v629 + (v244 * v627 + v240 * v631))),
+            v688 = v260 * v628 + (v264 * v630 + (v261 * v629 + (v265 * v631 + v262 * v627))),
+            v689 = v228 * v632 + (v222 * v628 + (v224 * v630 + (v223 * v629 + v227 * v631))),
+            v690 = v140 * v626 * (t14 * (1.0 - v91) + v109 * (v80 * v25 + v104 * v685)),
+            v691 = v131 * v624 * (t14 * (1.0 - v89) + v107 * (v81 * v25 + v103 * v686)),
+            v692 = v239 * v627 + v673 - v22 * (v229 * v633 + v689) + t14 * (v266 * v633 + (v267 * v632 + v688)),
+            v693 = v692 + v25 * (v243 * v633 + (v241 * v632 + v687)),
+            v694 = v620 * v38 * v680 + v690 + v691 - 0.07987743308995329 * (v119 * v686 - v118 * v693),
+            v695 = v132 * v623 * (t14 * (1.0 - v88) + v106 * (v76 * v25 + v105 * v693)),
+            v696 = v235 * v636 + (v244 * v634 + (v243 * v640 + (v234 * v635 + v240 * v638))),
+            v697 = v235 * v643 + (v244 * v641 + (v243 * v647 + (v234 * v642 + v240 * v645))),
+            v698 = v235 * v650 + (v244 * v648 + (v243 * v654 + (v234 * v649 + v240 * v652))),
+            v699 = v261 * v643 + (v262 * v641 + (v266 * v647 + (v260 * v642 + v265 * v645))),
+            v700 = v261 * v650 + (v262 * v648 + (v266 * v654 + (v260 * v649 + v265 * v652))),
+            v701 = v261 * v636 + (v262 * v634 + (v266 * v640 + (v260 * v635 + v265 * v638))),
+            v702 = v224 * v644 + (v223 * v643 + (v229 * v647 + (v222 * v642 + v227 * v645))),
+            v703 = v224 * v651 + (v223 * v650 + (v229 * v654 + (v222 * v649 + v227 * v652))),
+            v704 = v224 * v637 + (v223 * v636 + (v229 * v640 + (v222 * v635 + v227 * v638))),
+            v705 = v239 * v634 + v670 + v25 * (v241 * v639 + (v238 * v637 + v696)) - v22 * (v228 * v639 + v704),
+            v706 = v239 * v641 + v671 + v25 * (v241 * v646 + (v238 * v644 + v697)) - v22 * (v228 * v646 + v702),
+            v707 = v239 * v648 + v669 + v25 * (v241 * v653 + (v238 * v651 + v698)) - v22 * (v228 * v653 + v703),
+            v708 = v705 + t14 * (v267 * v639 + (v264 * v637 + v701)),
+            v709 = v706 + t14 * (v267 * v646 + (v264 * v644 + v699)),
+            v710 = v707 + t14 * (v267 * v653 + (v264 * v651 + v700)),
+            v711 = v135 * v621 * (t14 * (1.0 - v90) + v108 * (v77 * v25 + v100 * v708)),
+            v712 = v694 - v695 - 0.1192694691878821 * (v121 * v685 - v120 * v708) - v711,
+            v713 = v142 * v622 * (t14 * (1.0 - v92) + v110 * (v78 * v25 + v102 * v709)),
+            v714 = v152 * v625 * (t14 * (1.0 - v93) + v111 * (v79 * v25 + v101 * v710)),
+            v715 = v712 - v713 + v714 - 0.05582662111236089 * (v127 * v710 - v124 * v709),
+            v716 = v620 * (v13 * v715 - v20 * v680);
+        softehl_store4(R + 14 * q + 0, (14 * points), v37, v34, v38, tp0);
+        softehl_store4(R + 14 * q + 4, (14 * points), v289, v618, v619, v233);
+        softehl_store1(R + 14 * q + 8, (14 * points), v38);
+        softehl_store3(R + 14 * q + 11, (14 * points), tp4, tp6, v716);
+    }
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        softehl_store2(R + 14 * q + 9, (14 * points), softehl_splat(0.0), softehl_splat(0.0));
+    }
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, (14 * points));
+    }
+}
+SOFTEHL_BATCH(softehl_film_conserving_carreau_fields_rate, 4, (4 + modes), 2, (16 + (4 + modes)), (14 * points), 0)

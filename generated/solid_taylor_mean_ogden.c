@@ -277,6 +277,387 @@ static void softehl_solid_taylor_mean_ogden_isochoric_of_stress_1_lanes(
     }
 }
 
+/* isochoric_1_by_0: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_0_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[3] * p[4], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[3] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[3] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_0(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_0_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_0_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_0(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_1: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_1_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[5] * p[6], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[5] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[5] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_1(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_1_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_1_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_1(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_2: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_2_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[7] * p[8], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[7] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[7] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_2(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_2_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_2_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_2(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_3: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_3_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = log(s[0]), v2 = p[3] * v1, v3 = p[0] * p[4], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[3] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[3] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_3(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_3_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_3_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_3(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_4: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_4_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[0] * p[3], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[3] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[3] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_4(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_4_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_4_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_4(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_5: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_5_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = log(s[0]), v2 = p[5] * v1, v3 = p[1] * p[6], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[5] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[5] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_5(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_5_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_5_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_5(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_6: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_6_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[1] * p[5], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[5] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[5] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_6(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_6_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_6_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_6(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_7: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_7_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = log(s[0]), v2 = p[7] * v1, v3 = p[2] * p[8], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[7] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[7] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_7(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_7_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_7_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_7(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_8: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_8_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[2] * p[7], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[7] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[7] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_8(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_8_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_8_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_8(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
 SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_energy)
 {
     SOFTEHL_IDLE;
@@ -989,3 +1370,299 @@ SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_fields)
     }
 }
 SOFTEHL_BATCH(softehl_solid_taylor_mean_ogden_fields, 8, 8, 0, 0, (7 * points), 0)
+
+SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_pseudo_load)
+{
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14;
+    softehl_load4(t + 0, 15, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 15, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 15, &t8, &t9, &t10, &t11); softehl_load3(t + 12, 15, &t12, &t13, &t14);
+    const double v1 = 0.5 * parameters[1], v2 = 1.0 / parameters[1], v3 = 0.5 * parameters[3],
+        v4 = 1.0 / parameters[3], v5 = 0.5 * parameters[5], v6 = 1.0 / parameters[5],
+        v7 = 0.5 * parameters[6], v8 = 1.5707963267948966 * parameters[6];
+    const V v9 = X0 - X2, v10 = X4 - X2, v11 = X4 - X6, v12 = X6 + (X4 - X0 - X2), v13 = X1 - X3,
+        v14 = X1 + X3, v15 = v9 + v11, v16 = 0.25 * v12, v17 = 0.0625 * v12, v18 = v11 - v9,
+        v19 = t9 * (v2 * v2), v20 = 0.5 * t9, v21 = 0.25 * v18, v22 = 0.0625 * v18,
+        v23 = t11 * (v4 * v4), v24 = 0.5 * t11, v25 = t13 * (v6 * v6), v26 = 0.5 * t13,
+        v27 = X5 - X3, v28 = X5 - X7, v29 = X5 + X7, v30 = d0 - d2, v31 = v13 + v28,
+        v32 = v14 + v29, v33 = d1 + d3, v34 = d1 - d3, v35 = v28 - v13, v36 = v29 - v14,
+        v37 = 0.25 * v32, v38 = 0.25 * v35, v39 = 0.0625 * v35, v40 = 0.25 * v36,
+        v41 = 0.0625 * v36, v42 = 1.0 / v37, v43 = 1.0 / (v37 * v37), v44 = v15 * v39,
+        v45 = v15 * v41, v46 = d0 + d2 - d4 - d6, v47 = d4 - d6, v48 = d5 + d7, v49 = d5 - d7,
+        v50 = v30 - v47, v51 = v30 + v47, v52 = v33 - v48, v53 = v33 + v48, v54 = t0 - t2,
+        v55 = t1 - t3, v56 = t1 + t3, v57 = v34 - v49, v58 = v34 + v49, v59 = 0.25 * v42,
+        v60 = t4 - t2, v61 = t4 - t6, v62 = v54 + v61, v63 = t6 + v60 - t0, v64 = t5 - t3,
+        v65 = v61 - v54, v66 = t5 - t7, v67 = t5 + t7, v68 = 0.25 * v63, v69 = 0.0625 * v63,
+        v70 = 0.25 * v65, v71 = 0.0625 * v65, v72 = v66 - v55, v73 = v67 - v56,
+        v74 = 0.25 * (v56 + v67), v75 = 0.25 * v72, v76 = 0.0625 * v72, v77 = 0.25 * v73,
+        v78 = 0.0625 * v73, v79 = v74 * (v42 * v42), v80 = v74 * (v43 * (0.5 * v32)),
+        v81 = 1.0 / (v21 * v40 - v38 * v16), v82 = v39 * v81, v83 = v41 * v81,
+        v84 = (v21 * v77 + (v40 * v70 - v38 * v68 - v16 * v75)) * (v81 * v81),
+        v85 = v81 * v76 - v39 * v84, v86 = v81 * v78 - v41 * v84,
+        v87 = v81 * (v55 + v66) - v31 * v84, v88 = v31 * v81, v89 = v81 * v44,
+        v90 = v81 * (v39 * v62 + v15 * v76) - v44 * v84, v91 = v81 * v45, v92 = v81 * v17,
+        v93 = v22 * v81, v94 = v81 * v69 - v17 * v84, v95 = v17 * v88, v96 = v22 * v88,
+        v97 = v88 * v69 + v17 * v87, v98 = 0.25 * v89, v99 = 0.25 * v91,
+        v100 = v88 * v71 + v22 * v87, v101 = v91 - v95, v102 = 0.25 * v95, v103 = v99 - v102,
+        v104 = 0.25 * v96, v105 = v81 * v71 - v22 * v84,
+        v106 = v81 * (v41 * v62 + v15 * v78) - v45 * v84, v107 = v96 - v89,
+        v108 = v50 * v92 - v46 * v93, v109 = 1.0 + v57 * v92 - v52 * v93,
+        v110 = v52 * v82 - v57 * v83, v111 = 1.0 + v46 * v82 - v50 * v83, v112 = v104 - v98,
+        v113 = v50 * v94 - v46 * v105, v114 = v57 * v94 - v52 * v105, v115 = v46 * v85 - v50 * v86,
+        v116 = v52 * v85 - v57 * v86, v117 = v106 - v97, v118 = v100 - v90;
+    V s119 = {0}, s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0}, s125 = {0},
+        s126 = {0}, s127 = {0}, s128 = {0}, s129 = {0}, s130 = {0}, s131 = {0}, s132 = {0},
+        s133 = {0}, s134 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v135 = 1.0 - w[1], v136 = 1.0 + w[1], v137 = 0.25 * w[1], v138 = 1.0 - w[0],
+            v139 = 1.0 + w[0], v140 = 0.25 * v135, v141 = 0.25 * v136, v142 = 0.25 * w[0],
+            v143 = 0.25 - v137, v144 = 0.25 + v137, v145 = 0.25 + v142, v146 = 0.25 - v142,
+            v147 = v140 * v138, v148 = v140 * v139, v149 = v139 * v141, v150 = v138 * v141,
+            v151 = v137 - 0.25;
+        const V v152 = X2 * v143; const double v153 = v142 - 0.25;
+        const V v154 = v144 * v28, v155 = X6 * v146, v156 = v145 * v27, v157 = X5 * v149,
+            v158 = v149 * t5, v159 = v144 * v11, v160 = v152 + v159, v161 = v143 * t2,
+            v162 = v146 * t6, v163 = v145 * v10, v164 = v155 + v163, v165 = v144 * v66,
+            v166 = v144 * v61, v167 = v161 + v166, v168 = v145 * v64, v169 = v145 * v60,
+            v170 = v162 + v169, v171 = X0 * v151, v172 = v171 + v160, v173 = X0 * v153,
+            v174 = v173 + v164, v175 = X3 * v143, v176 = v175 + v154, v177 = X3 * v148,
+            v178 = v143 * t3, v179 = v178 + v165, v180 = v148 * t3, v181 = v151 * t0,
+            v182 = v181 + v167, v183 = v153 * t0, v184 = v183 + v170, v185 = X7 * v146,
+            v186 = v185 + v156, v187 = X7 * v150, v188 = v146 * t7, v189 = v188 + v168,
+            v190 = v150 * t7, v191 = X1 * v151, v192 = v191 + v176, v193 = v151 * t1,
+            v194 = v193 + v179, v195 = X1 * v153, v196 = v195 + v186, v197 = v153 * t1,
+            v198 = v197 + v189, v199 = X1 * v147, v200 = v199 + (v187 + (v157 + v177)),
+            v201 = v147 * t1, v202 = v201 + (v190 + (v158 + v180)), v203 = v196 * v172,
+            v204 = w[0] * v172 - w[1] * v174;
+        const double v205 = w[1] * w[2];
+        const V v206 = v174 * v192, v207 = v203 - v206, v208 = w[1] * v196 - w[0] * v192,
+            v209 = w[2] * v200, v210 = v196 * v182 + v172 * v198 - v192 * v184 - v174 * v194,
+            v211 = w[2] * v202, v212 = 0.25 * v207, v213 = v207 * v200, v214 = v208 * v209;
+        s125 += v214; const V v215 = v204 * v209; s126 += v215;
+        const V v216 = v207 * v202 + v200 * v210, v217 = 0.25 * v210;
+        s134 += (w[0] * v182 - w[1] * v184) * v209; s134 += v204 * v211;
+        s133 += v209 * (w[1] * v198 - w[0] * v194); s133 += v208 * v211; const V v218 = w[2] * v212;
+        s119 += v218; const V v219 = v205 * v212; s121 += v219; const V v220 = w[2] * v213;
+        s122 += v220; const V v221 = v205 * v213; s124 += v221; const V v222 = w[0] * v218;
+        s120 += v222; const V v223 = w[2] * v217; s127 += v223; const V v224 = v205 * v217;
+        s129 += v224; const V v225 = w[2] * v216; s130 += v225; const V v226 = v205 * v216;
+        s132 += v226; const V v227 = w[0] * v220; s123 += v227; const V v228 = w[0] * v223;
+        s128 += v228; const V v229 = w[0] * v225; s131 += v229;
+    }
+    const V v230 = 1.0 / s122, v231 = v8 * s122, v232 = v230 * v230 * s130,
+        v233 = v230 * s133 - s125 * v232, v234 = v230 * s125, v235 = 0.25 * v234,
+        v236 = s123 * v230, v237 = v230 * s124, v238 = v230 * s126,
+        v239 = v230 * s134 - s126 * v232, v240 = s119 * v230, v241 = s120 * v230,
+        v242 = s121 * v230, v243 = 0.25 * v238, v244 = v102 * v238, v245 = v102 * v234,
+        v246 = v104 * v234, v247 = v104 * v238, v248 = v98 * v234, v249 = v98 * v238,
+        v250 = v99 * v234, v251 = v99 * v238, v252 = v250 - v245, v253 = v246 - v248,
+        v254 = v247 - v249, v255 = 0.25 * v233, v256 = v234 * v90 + v89 * v233,
+        v257 = v234 * v106 + v91 * v233, v258 = v238 * v106 + v91 * v239, v259 = 0.25 * v239,
+        v260 = v238 * v90 + v89 * v239, v261 = v251 - v244, v262 = s123 * v232 - v230 * s131,
+        v263 = s124 * v232 - v230 * s132, v264 = v38 * v262, v265 = v40 * v263,
+        v266 = v21 * v262 - v16 * v263, v267 = v95 * v233 + v234 * v97,
+        v268 = v96 * v233 + v234 * v100, v269 = v95 * v239 + v238 * v97,
+        v270 = v96 * v239 + v238 * v100, v271 = 0.25 * (v257 - v267), v272 = 0.25 * (v258 - v269),
+        v273 = 0.25 * (v270 - v260), v274 = 0.25 * (v268 - v256), v275 = v230 * s127 - s119 * v232,
+        v276 = v230 * s128 - s120 * v232, v277 = v230 * s129 - s121 * v232,
+        v278 = v276 + v59 * v262, v279 = v277 + v59 * v263,
+        v280 = v46 * v253 + (v51 * v235 + (v111 + v50 * v252)),
+        v281 = v52 * v253 + (v58 * v235 + (v110 + v57 * v252)),
+        v282 = v46 * v273 + (v51 * v259 + (v113 + v50 * v272)),
+        v283 = v52 * v273 + (v58 * v259 + (v114 + v57 * v272)),
+        v284 = v52 * v254 + (v58 * v243 + (v109 + v57 * v261)),
+        v285 = v46 * v254 + (v51 * v243 + (v108 + v50 * v261)),
+        v286 = v46 * v274 + (v51 * v255 + (v115 + v50 * v271)),
+        v287 = v52 * v274 + (v58 * v255 + (v116 + v57 * v271)),
+        v288 = 1.0 + v53 * v240 - v57 * v241 - v52 * v242,
+        v289 = v53 * v275 - v57 * v276 - v52 * v277, v290 = 2.0 * v288, v291 = v288 * v288,
+        v292 = v280 * v284 - v281 * v285, v293 = 2.0 * v292, v294 = v292 * v292, v295 = v289 * v290,
+        v296 = v280 * v283 + v284 * v286 - v285 * v287 - v281 * v282, v297 = 1.0 / (v291 * v294),
+        v298 = v293 * v296, v299 = v231 * v297,
+        v300 = 3.141592653589793 * (t14 * (0.5 * s122) + v7 * s130) * (1.0 - v297),
+        v301 = (v294 * v295 + v291 * v298) * (v297 * v299) + v300, v302 = v231 - v299,
+        v303 = v294 * v302, v304 = v291 * v302, v305 = v293 * v304,
+        v306 = v293 * (v295 * v302 + v291 * v301) + v296 * (2.0 * v304), v307 = v290 * v303,
+        v308 = v290 * (v298 * v302 + v294 * v301) + v289 * (2.0 * v303),
+        v309 = v287 * v305 + v281 * v306, v310 = v281 * v305, v311 = v282 * v305 + v285 * v306,
+        v312 = v285 * v305, v313 = v276 * v307, v314 = v277 * v307,
+        v315 = v275 * v307 + v240 * v308, v316 = v241 * v308, v317 = v242 * v308,
+        v318 = (v248 - v246) * v311, v319 = (v245 - v250) * v311, v320 = v235 * v311,
+        v321 = (v249 - v247) * v309, v322 = (v244 - v251) * v309, v323 = v243 * v309,
+        v324 = v255 * v312, v325 = v259 * v310, v326 = v284 * v305,
+        v327 = 0.25 * (v260 - v270) * v310 + v274 * v326,
+        v328 = 0.25 * (v269 - v258) * v310 + v271 * v326, v329 = v283 * v305 + v284 * v306,
+        v330 = v286 * v305 + v280 * v306, v331 = v280 * v305, v332 = v259 * v331 + v243 * v330,
+        v333 = 0.25 * (v256 - v268) * v312 + v273 * v331,
+        v334 = 0.25 * (v267 - v257) * v312 + v272 * v331, v335 = v255 * v326 + v235 * v329,
+        v336 = v254 * v330, v337 = v261 * v330, v338 = v253 * v329, v339 = v252 * v329;
+    V s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0}, s344 = {0}, s345 = {0}, s346 = {0},
+        s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0}, s351 = {0}, s352 = {0}, s353 = {0},
+        s354 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v355 = w[0] - v236, v356 = w[1] - v237, v357 = v38 * v355, v358 = 0.25 * v355,
+            v359 = v40 * v356, v360 = 0.25 * v356, v361 = v21 * v355 - v16 * v356,
+            v362 = v241 + v42 * v358, v363 = v242 + v42 * v360, v364 = v238 + v81 * v361,
+            v365 = v359 - v357, v366 = v234 + v81 * v365, v367 = 0.25 * (v359 + v357),
+            v368 = 0.25 * v364, v369 = v240 - v43 * v367, v370 = v112 * v364, v371 = v103 * v364,
+            v372 = v112 * v366, v373 = v103 * v366, v374 = 0.25 * v366,
+            v375 = v53 * v369 + (1.0 - v57 * v362 - v52 * v363),
+            v376 = v58 * v368 + (v57 * v371 + (v109 + v52 * v370)),
+            v377 = v51 * v368 + (v50 * v371 + (v108 + v46 * v370)), v378 = v375 * v375,
+            v379 = v50 * v373 + (v51 * v374 + (v111 + v46 * v372)),
+            v380 = v57 * v373 + (v58 * v374 + (v110 + v52 * v372)),
+            v381 = v376 * v376 + v377 * v377, v382 = v376 * v380 + v377 * v379,
+            v383 = v376 * v379 - v377 * v380, v384 = v379 * v379 + v380 * v380, v385 = v383 * v383,
+            v386 = softehl_vrcbrt(v378), v387 = v386 * v386, v388 = v378 * v387,
+            v389 = softehl_vrcbrt(v385), v390 = v389 * v389, v391 = v385 * v390,
+            v392 = 1.0 / (v388 * v391), v393 = v384 * v392, v394 = v382 * v392, v395 = v381 * v392,
+            v396 = v378 * v392;
+        V v397[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v397, &failed);
+        const double v398 = 6.283185307179586 * w[2], v399 = 1.0 - w[0], v400 = 1.0 + w[0],
+            v401 = 0.25 * w[0], v402 = 1.0 - w[1], v403 = 1.0 + w[1], v404 = 0.25 * w[1];
+        const V v405 = 2.0 * v383;
+        const double v406 = 0.25 * v402, v407 = 0.25 * v403, v408 = 0.25 + v401, v409 = 0.25 - v401,
+            v410 = 0.25 - v404, v411 = 0.25 + v404;
+        const V v412 = 0.3333333333333333 * v390;
+        const double v413 = v401 - 0.25, v414 = v406 * v399, v415 = v406 * v400, v416 = v400 * v407,
+            v417 = v399 * v407, v418 = v404 - 0.25;
+        const V v419 = X2 * v410, v420 = X6 * v409, v421 = X3 * v410, v422 = X3 * v415,
+            v423 = X7 * v409, v424 = X7 * v417, v425 = v411 * v11, v426 = v419 + v425,
+            v427 = v411 * v28, v428 = v421 + v427, v429 = v408 * v10, v430 = v420 + v429,
+            v431 = v408 * v27, v432 = v423 + v431, v433 = X5 * v416, v434 = 2.0 * v379,
+            v435 = X0 * v418, v436 = v435 + v426, v437 = X0 * v413, v438 = v437 + v430,
+            v439 = X1 * v418, v440 = v439 + v428, v441 = X1 * v413, v442 = v441 + v432,
+            v443 = X1 * v414, v444 = v443 + (v433 + (v424 + v422)), v445 = v442 * v436,
+            v446 = 2.0 * v380, v447 = 2.0 * v377, v448 = v438 * v440, v449 = v445 - v448,
+            v450 = v449 * v444, v451 = 2.0 * v376, v452 = v397[0], v453 = v397[1], v454 = v397[2],
+            v455 = v397[3], v456 = v392 * v392, v457 = v398 * v450, v458 = v452 * v457,
+            v459 = v453 * v457, v460 = v454 * v457, v461 = v455 * v457, v462 = v392 * v459,
+            v463 = v392 * v461, v464 = v392 * v458,
+            v465 = v378 * v460 + v381 * v459 + v382 * v461 + v384 * v458, v466 = v456 * v465,
+            v467 = v388 * v466, v468 = v412 * v467, v469 = v405 * v468,
+            v470 = v434 * v464 - v376 * v469 + v377 * v463;
+        s343 += v470; const V v471 = v446 * v464 + v376 * v463 + v377 * v469; s341 += v471;
+        const V v472 = v447 * v462 + v379 * v463 + v380 * v469; s342 += v472;
+        const V v473 = v451 * v462 + v380 * v463 - v379 * v469; s340 += v473; V v474[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_1_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v474, &failed);
+        const V v475 = v474[2]; V v476[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_0_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v476, &failed);
+        const V v477 = v476[2]; V v478[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_2_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v478, &failed);
+        const V v479 = v478[2]; V v480[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_3_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v480, &failed);
+        const V v481 = v480[2]; V v482[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_5_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v482, &failed);
+        const V v483 = v482[2],
+            v484 = v24 * v483 + (v20 * v481 + (t12 * v479 + (t8 * v477 + t10 * v475)));
+        V v485[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_7_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v485, &failed);
+        const V v486 = v485[2]; V v487[21];
+        softehl_solid_taylor_mean_ogden_isochoric_1_2_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v487, &failed);
+        const V v488 = 2.0 * v375, v489 = 0.3333333333333333 * v387, v490 = v356 * v77 + v265,
+            v491 = v355 * v75 + v264, v492 = v278 - v79 * v358, v493 = v279 - v79 * v360,
+            v494 = v239 - v361 * v84 + v81 * (v355 * v70 + (v266 - v356 * v68)),
+            v495 = v81 * (v490 - v491) + (v233 - v365 * v84), v496 = 0.25 * v494, v497 = v487[2],
+            v498 = v487[7], v499 = v487[11], v500 = v487[12],
+            v501 = v275 + v43 * (v80 * v367 - 0.25 * (v490 + v491)), v502 = 0.25 * v495,
+            v503 = 0.25 * (v364 * v118 + v107 * v494), v504 = 0.25 * (v364 * v117 + v101 * v494),
+            v505 = 0.25 * (v366 * v118 + v107 * v495), v506 = 0.25 * (v366 * v117 + v101 * v495),
+            v507 = v53 * v501 - v52 * v493 - v57 * v492, v508 = v488 * v507,
+            v509 = v114 + v58 * v496 + v52 * v503 + v57 * v504,
+            v510 = v113 + v51 * v496 + v46 * v503 + v50 * v504,
+            v511 = v115 + v51 * v502 + v46 * v505 + v50 * v506,
+            v512 = v116 + v58 * v502 + v52 * v505 + v57 * v506, v513 = v489 * v508,
+            v514 = v451 * v509 + v447 * v510, v515 = v434 * v511 + v446 * v512,
+            v516 = v379 * v509 - v380 * v510 + v376 * v511 - v377 * v512,
+            v517 = v379 * v510 + v380 * v509 + v376 * v512 + v377 * v511, v518 = v405 * v516,
+            v519 = v412 * v518, v520 = v456 * (v391 * v513 + v388 * v519),
+            v521 = v392 * v515 - v384 * v520, v522 = v392 * v517 - v382 * v520,
+            v523 = v392 * v514 - v381 * v520, v524 = v392 * v508 - v378 * v520,
+            v525 = v26 * v486 + v484 + v497 * v521 + v498 * v523 + v499 * v524 + v500 * v522;
+        V v526[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_4_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v526, &failed);
+        const V v527 = v526[2]; V v528[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_6_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v528, &failed);
+        const V v529 = v528[2]; V v530[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_8_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v530, &failed);
+        const V v531 = v416 * t5, v532 = 2.0 * v462, v533 = 2.0 * v464, v534 = v414 * t1,
+            v535 = v487[0], v536 = v487[1], v537 = v487[3], v538 = v487[6], v539 = v487[8],
+            v540 = v487[15], v541 = v417 * t7, v542 = v409 * t7, v543 = v409 * t6, v544 = v415 * t3,
+            v545 = v544 + (v541 + (v534 + v531)), v546 = v410 * t3, v547 = v410 * t2,
+            v548 = v408 * v60, v549 = v543 + v548, v550 = v408 * v64, v551 = v542 + v550,
+            v552 = v411 * v66, v553 = v546 + v552, v554 = v411 * v61, v555 = v547 + v554,
+            v556 = v476[0], v557 = v476[1], v558 = v476[3], v559 = v474[0], v560 = v474[1],
+            v561 = v474[3], v562 = v478[0], v563 = v478[1], v564 = v478[3], v565 = v480[0],
+            v566 = v480[1], v567 = v480[3],
+            v568 = t10 * v559 + (t8 * v556 + (v537 * v522 + (v535 * v521 + v536 * v523))),
+            v569 = t10 * v560 + (t8 * v557 + (v539 * v522 + (v536 * v521 + v538 * v523))),
+            v570 = t10 * v561 + (t8 * v558 + (v540 * v522 + (v537 * v521 + v539 * v523))),
+            v571 = v526[0], v572 = v526[1], v573 = v526[3], v574 = v482[0], v575 = v482[1],
+            v576 = v482[3], v577 = v528[0], v578 = v528[1], v579 = v528[3], v580 = v485[0],
+            v581 = v485[1], v582 = v485[3], v583 = v530[0], v584 = v530[1], v585 = v530[2],
+            v586 = v530[3],
+            v587 = v24 * v574 + (v20 * v565 + (t12 * v562 + v568) - v19 * v571) - v23 * v577,
+            v588 = v24 * v575 + (v20 * v566 + (t12 * v563 + v569) - v19 * v572) - v23 * v578,
+            v589 = v24 * v576 + (v20 * v567 + (t12 * v564 + v570) - v19 * v573) - v23 * v579,
+            v590 = v418 * t0, v591 = v590 + v555, v592 = v418 * t1, v593 = v592 + v553,
+            v594 = v413 * t0, v595 = v594 + v549, v596 = v413 * t1, v597 = v596 + v551,
+            v598 = v442 * v591 + v436 * v597 - v440 * v595 - v438 * v593,
+            v599 = v449 * v545 + v444 * v598, v600 = v398 * v599, v601 = v391 * v466,
+            v602 = v457 * (v497 * v524 + (v26 * v580 + v587 - v25 * v583)) + v452 * v600,
+            v603 = v457 * (v498 * v524 + (v26 * v581 + v588 - v25 * v584)) + v453 * v600,
+            v604 = (v525 - v19 * v527 - v23 * v529 - v25 * v585) * v457 + v454 * v600,
+            v605 = v457 * (v500 * v524 + (v26 * v582 + v589 - v25 * v586)) + v455 * v600,
+            v606 = v392 * v460 - v489 * v601, v607 = v488 * v606,
+            v608 = v508 * v460 + (v515 * v458 + (v514 * v459 + v517 * v461)) + v378 * v604,
+            v609 = v508 * (v387 * (v387 * (0.2222222222222222 * v386)) * v601) + v392 * v604,
+            v610 = v392 * v602 - v520 * v458, v611 = v392 * v603 - v520 * v459,
+            v612 = v392 * v605 - v520 * v461,
+            v613 = v456 * (v608 + v381 * v603 + v382 * v605 + v384 * v602) - v520 * (2.0 * v392 * v465);
+        s351 += v503 * v473; s351 -= v493 * v607; s350 += v504 * v473; s350 -= v492 * v607;
+        const V v614 = v412 * (v513 * v466 + v388 * v613) - v518 * (v390 * (v390 * (0.2222222222222222 * v389)) * v467),
+            v615 = v507 * (2.0 * v606) + v488 * (v609 - v520 * v460 - v489 * (v519 * v466 + v391 * v613)),
+            v616 = v516 * (2.0 * v468) + v405 * v614,
+            v617 = v512 * v463 + (v509 * v532 + (v451 * v611 + v380 * v612)) - v511 * v469,
+            v618 = v512 * v469 + (v511 * v463 + (v510 * v532 + (v447 * v611 + v379 * v612))),
+            v619 = v512 * v533 + (v510 * v469 + (v509 * v463 + (v446 * v610 + v376 * v612))),
+            v620 = v511 * v533 + (v510 * v463 + (v434 * v610 + v377 * v612 - v509 * v469)),
+            v621 = v618 + v380 * v616;
+        s347 += v621; const V v622 = v619 + v377 * v616; s346 += v622;
+        const V v623 = v620 - v376 * v616; s348 += v623; const V v624 = v617 - v379 * v616;
+        s345 += v624; s350 -= v362 * v615; s351 -= v363 * v615; s344 += v501 * v607;
+        s344 += v369 * v615; s349 += v496 * v473; s349 += v502 * v471; s352 += v496 * v472;
+        s352 += v502 * v470; s351 += v505 * v471; s354 += v503 * v472; s354 += v505 * v470;
+        s350 += v506 * v471; s353 += v504 * v472; s353 += v506 * v470; s349 += v368 * v624;
+        s352 += v368 * v621; s351 += v370 * v624; s354 += v370 * v621; s350 += v371 * v624;
+        s353 += v371 * v621; s351 += v372 * v622; s354 += v372 * v623; s349 += v374 * v622;
+        s352 += v374 * v623; s350 += v373 * v622; s353 += v373 * v623;
+    }
+    const V v625 = v326 + s343, v626 = v331 + s340, v627 = s341 - v312, v628 = s342 - v310,
+        v629 = v329 + s348, v630 = v330 + s345, v631 = s344 + v315, v632 = s346 - v311,
+        v633 = s347 - v309, v634 = v332 + (s349 - v324 - v320), v635 = v335 + (s352 - v325),
+        v636 = v631 - v634, v637 = v631 + v634,
+        v638 = v333 + (s351 + (v318 + (v336 - v314 - v317)) - v105 * v626) - v93 * v630,
+        v639 = v92 * v630 + (v334 + (v94 * v626 + (s350 + (v319 + (v337 - v313 - v316))))),
+        v640 = v635 - v323,
+        v641 = v85 * v625 + (v327 + (s354 + (v321 + v338)) - v105 * v628 - v93 * v633),
+        v642 = v92 * v633 + (v94 * v628 + (v328 + (s353 + (v322 + v339)))) - v86 * v625,
+        v643 = v82 * v632 + (v85 * v627 + v638), v644 = v82 * v629 + v641, v645 = v642 - v83 * v629,
+        v646 = v639 - v86 * v627 - v83 * v632, v647 = v643 + v646, v648 = v644 + v645,
+        v649 = v645 - v644, v650 = v646 - v643, v651 = v640 + v648, v652 = v640 - v648,
+        v653 = v637 + v647, v654 = v637 - v647, v655 = v323 - v635 - v649, v656 = v636 - v650;
+    softehl_store4(R + 0, 8, v651, v653, v655, v656);
+    const V v657 = v636 + v650, v658 = v649 - v640;
+    softehl_store4(R + 4, 8, v652, v654, v658, v657);
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, 8);
+    }
+}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_ogden_pseudo_load, 8, 8, 0, 15, 8, 0)
