@@ -10,8 +10,8 @@
     schedule    what is computed once, what at each point, what inside a branch
     choice      of all ways the one with fewest operations
     order       straight pieces in the order of a small register file
-    print       one value, one line of C: several elements at once, or where there is little to
-                compute one after another
+    print       C, with a name for each value that is used again: several elements at once, or where
+                there is little to compute one after another
     routines    local iterations and functions of stretches as C functions of their own
 
 A page of fields on a large cell goes another way (`form`): all of this for the function of a point
