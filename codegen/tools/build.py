@@ -88,6 +88,11 @@ def compiler() -> list[str]:
         raise BuildError(f"CC={given!r} is no command ({reason}): set CC to a C compiler") from None
 
 
+def large(text: str) -> bool:
+    """True for a file of C with more operations than `LARGE`."""
+    return sum(map(text.count, OPERATORS)) > LARGE
+
+
 def build(
     directory: Path, *, flags: Sequence[str] = FLAGS, extra: Sequence[str] = ()
 ) -> dict[str, float]:
@@ -105,7 +110,7 @@ def build(
         def compiled(source: Path, to: Path) -> float:
             start = perf_counter()
             text = source.read_text(encoding="utf-8")
-            light = [LIGHT] if sum(map(text.count, OPERATORS)) > LARGE else []
+            light = [LIGHT] if large(text) else []
             words = [*compiling, *light, *extra]
             if source.name.startswith(SHARED):
                 shutil.copyfile(_shared(source, text, words, flags), to)
