@@ -17,7 +17,7 @@ PATH = Path(__file__).with_name("budget.json")
 REMEDY = "if the rise is meant: python -m tests.codegen.budget"
 COSTS = ("operations", "temporaries", "peak_live")
 LARGEST_FILE = 140_000
-"""Bytes of C of one family; the largest, a conserving film of Carreau oil, has two local iterations."""
+"""Bytes of C of one family; the largest, a conserving film of Carreau oil, has two iterations."""
 
 Budget = dict[str, int]
 
